@@ -50,7 +50,9 @@ class Prediction(types.Prediction):
     most_likely : str or None
         Label of the most likely class, which changes only when another one leads by 0.05; None if none was solved.
     unknown : float
-        Share of the likelihood of classes that the search has seen and that are no candidates; with it, likelihoods sum to one.
+        Share of the likelihood of classes that the search has seen and that are no candidates.
+    other : float
+        Share of the likelihood of a goal that nobody announced; with both, likelihoods sum to one.
     obstacles, goals : Obstacles, ndarray of shape (g, 2)
         The scene at time `t`.
     cleared : tuple of bool

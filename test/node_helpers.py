@@ -9,7 +9,7 @@ import numpy as np
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
 from ros_helpers import Graph
 
-from foc_ros.ros.messages.encode_prediction import UNKNOWN
+from foc_ros.ros.messages.encode_prediction import OTHER, UNKNOWN
 from foc_ros.ros.messages.types import RclpyTypes
 
 TYPES = RclpyTypes()
@@ -127,8 +127,8 @@ class Bench:
 
 
 def list_labels(table: Any) -> list[str]:
-    """Return the labels of the candidates in a table of likelihoods, without the share that is unknown."""
-    return [label for label in table.layout.dim[0].label.split(';') if label not in ('', UNKNOWN)]
+    """Return the labels of the candidates in a table of likelihoods, without the shares that none has."""
+    return [label for label in table.layout.dim[0].label.split(';') if label not in ('', UNKNOWN, OTHER)]
 
 
 def figures(status: Any) -> dict[str, str]:

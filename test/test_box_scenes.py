@@ -12,7 +12,8 @@ from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.evaluation.evaluate import find_label_mismatches
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
-from foc_ros.analysis.evaluation.questions import GAP, PATH_CLASS, ask_all
+from foc_ros.analysis.evaluation.other_goal import leave_goals_out
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask_all
 from foc_ros.analysis.recordings import TableRecording, find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
@@ -21,6 +22,7 @@ from foc_ros.io.bags import BagReader
 from foc_ros.ros.parameters import load_parameter_file
 
 SHARED = Path(__file__).parents[2] / 'shared' / 'data' / 'hlp_reaching'
+PICKS = SHARED.with_name('hlp_picks')
 HEADER = 'recording,object,x_m,y_m,z_m,width_m,depth_m,height_m\n'
 BOXES = (
     'a,Target,0.3,0,0,0.05,0.05,0.08\n'
@@ -103,6 +105,62 @@ def test_a_wrong_table_is_named(folder: Path, text: str, words: str) -> None:
     with pytest.raises(RecordingError) as caught:
         find_recordings(folder)
     assert words in str(caught.value)
+
+
+@pytest.fixture
+def picks(folder: Path) -> Path:
+    """Let the reach of the folder end at one of two objects, between them and the walls; the other one is picked up later."""
+    boxes = BOXES.replace('0.3,0,0,', '0.3,0.0,0,').splitlines(keepends=True)
+    (folder / 'scenes.csv').write_text(HEADER + ''.join(each for each in boxes if 'RightBoundary' not in each))
+    (folder / 'trials.csv').write_text('recording,person,object\na,one,Target\nb,one,Target\nc,one,ObstacleLong\n')
+    return folder
+
+
+def test_objects_that_are_picked_up_are_goals_and_obstacles(picks: Path) -> None:
+    recording = find_recordings(picks)['a']
+    observed = observe_one(picks, 0.0)
+    first = observed.observations[0]
+    assert recording.goal == observed.path.goal == 0
+    assert first.ids == ('Target/0', 'ObstacleLong/0', 'LeftBoundary/0') and first.goals.tolist() == [[0.3, 0.0], [0.15, 0.0]]
+    assert {*first.candidates.goal.tolist()} == {0, 1} and first.candidates.has_likelihood.all()
+    assert find_label_mismatches(picks, [observed]) == {}
+    ((_, question), *_) = ask_all(observed, GOAL)
+    assert (question.possible, question.truth) == (2, 0)
+
+
+def test_the_share_of_another_goal_is_judged_with_the_goal_left_out(
+    picks: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert {name: len(each.scene.goals) for name, each in leave_goals_out(find_recordings(picks)).items()} == {'a': 1}
+    monkeypatch.setattr('foc_ros.analysis.parallel.open_executor', lambda *_: ThreadPoolExecutor(1))
+    assert main(['evaluate', str(picks), '--params', str(picks / 'parameters.yaml'), '--unannounced', '--json']) == 0
+    answer = json.loads(capsys.readouterr().out)
+    found = answer['other_goal']
+    assert 0.0 < found['share'] < found['share_left_out'] and found['area_under_curve'] > 0.5
+    assert 0.0 <= found['calibration_error'] < 1.0 and answer['verdict'][-1].startswith('Another goal: ')
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('recording,object\na,\n', "trials.csv: row 2, column object: expected a name, got ''"),
+        ('recording,object\na,Cup\nb,Target\n', "scenes.csv: no row of recording 'a' has the object Cup, which was picked up"),
+        ('recording,object\nb,Target\n', "scenes.csv: no row of recording 'a' has the object None, which was picked up"),
+    ],
+)
+def test_a_wrong_table_of_objects_is_named(picks: Path, text: str, words: str) -> None:
+    (picks / 'trials.csv').write_text(text)
+    with pytest.raises(RecordingError) as caught:
+        find_recordings(picks)
+    assert words in str(caught.value)
+
+
+@pytest.mark.skipif(not PICKS.is_dir(), reason='optional data ../shared/data/hlp_picks is not there')
+def test_the_data_set_of_picks_is_read_as_it_is() -> None:
+    found = find_recordings(PICKS)
+    assert len(found) == 952
+    assert {len(each.scene.goals) for each in found.values()} == {5, 7}
+    assert all(0 <= each.goal < len(each.scene.goals) for each in found.values())
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/hlp_reaching is not there')

@@ -182,14 +182,15 @@ def test_tenths_include_their_lower_bound() -> None:
 
 def test_the_final_lead_begins_after_the_last_wrong_forecast() -> None:
     found = make_scores([0.5] * 6, [1, 0, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1], [0.1, 0.4, 0.6, 0.2, 0.5, 0.9])
-    assert find_final_leads(found) == {0: 0.6, 1: 1.0}
+    assert find_final_leads(found) == {0: 2, 1: None}
 
 
 def test_a_summary_counts_by_tenths() -> None:
-    found = summarise(make_scores([0.5] * 4, [1, 0, 1, 1], progress=[0.05, 0.06, 0.95, 1.0]))
+    found = summarise(make_scores([0.5] * 4, [1, 0, 1, 1], progress=[0.05, 0.06, 0.95, 1.0]), np.array([1.0, 0.9, 0.2, 0.0]))
     assert [each['predictions'] for each in found['by_tenth']] == [2, 0, 0, 0, 0, 0, 0, 0, 0, 2]
     assert found['by_tenth'][0]['right'] == 0.5 and found['by_tenth'][1]['right'] is None
     assert found['right_from_half_way'] == 1.0
+    assert (found['leads_for_good_from'], found['leads_for_good_before_s']) == (0.95, 0.2)
     assert found['gain'] == pytest.approx(np.log(2.0))
 
 

@@ -25,7 +25,7 @@ def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = C
             assert np.isfinite(array).all()
         assert outcome.has_likelihood or outcome.likelihood == 0.0
     shares = [outcome.likelihood for outcome in prediction.candidates_with_likelihood]
-    assert sum(shares) + prediction.unknown == pytest.approx(1.0)
+    assert sum(shares) + prediction.unknown + prediction.other == pytest.approx(1.0)
     assert (prediction.most_likely is None) == (not shares)
     numbers = {each.way: each.label for each in prediction.candidates}
     assert numbers.get(memory.most_likely) == prediction.most_likely
@@ -33,8 +33,9 @@ def predicted(obstacles: Obstacles, goals: np.ndarray = GOAL, config: Config = C
 
 
 def test_an_empty_scene_is_the_straight_way() -> None:
-    (only,) = predicted(make_obstacles()).solved_candidates
-    assert only.likelihood == 1.0
+    prediction = predicted(make_obstacles())
+    (only,) = prediction.solved_candidates
+    assert only.likelihood == pytest.approx(1.0 - prediction.other)
     assert abs(only.solution.path[:, 1]).max() < 1e-9
 
 

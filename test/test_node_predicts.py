@@ -11,7 +11,7 @@ import ros_helpers
 ros_helpers.require_ros()
 
 from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
+from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path, list_labels  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
@@ -226,7 +226,7 @@ def test_diagnostics_contain_rates_ages_times_and_candidates(ros: Graph) -> None
     assert (values['obstacles of cloud'], values['goals']) == ('1', '1')
     assert float(values['hand_pose age [s]']) >= 0.0
     assert [float(text) > 0.0 for text in values['solve time p50, p99 [ms]'].split(', ')] == [True, True]
-    labels = bench.received['likelihoods'][-1].layout.dim[0].label.split(';')
+    labels = list_labels(bench.received['likelihoods'][-1])
     for label in labels:
         assert values[f'candidate {label}'].startswith('solved, likelihood ')
     assert values['most likely'] == labels[0]

@@ -334,7 +334,8 @@ def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatc
     assert numbers['hand_samples'] == 60
     assert numbers['predictions'], 'how many depends on how busy the machine is'
     shown = page.last('prediction')
-    assert sum(each['likelihood'] or 0.0 for each in shown['candidates']) == pytest.approx(1.0, abs=2e-3)
+    shares = [shown['other'], *(each['likelihood'] or 0.0 for each in shown['candidates'])]
+    assert sum(shares) == pytest.approx(1.0, abs=2e-3)
     low_x, high_x, low_y, high_y = BOUNDS
     for each in shown['candidates']:
         path = np.cumsum([each['x'], each['y']], axis=1).T * LENGTH

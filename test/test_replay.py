@@ -63,7 +63,7 @@ def test_json_has_the_promised_names(bag: Path, capsys: pytest.CaptureFixture[st
     assert [each['stamp_ns'] for each in answer['predictions']] == [ns(time) for time, _ in reach(FEW)]
     for prediction in answer['predictions']:
         solved = [each for each in prediction['candidates'] if each['status'] == 'solved']
-        assert solved and sum(each['likelihood'] for each in solved) == pytest.approx(1)
+        assert solved and sum(each['likelihood'] for each in solved) == pytest.approx(1 - prediction['other'])
         assert prediction['candidates'][0]['label'] == prediction['most_likely']
         for each in prediction['candidates']:
             assert ' '.join(

@@ -17,7 +17,7 @@ from foc_ros.core.types import HandState, Prediction, Solution, Status, make_obs
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_markers
 
-CONFIG = replace_values(Config(), {'foc.steps': 20})
+CONFIG = replace_values(Config(), {'foc.steps': 20, 'likelihood.other_goal': 0.0})
 HAND = HandState(0, np.zeros(6), np.zeros((6, 6)), frame_id='world')
 ROW = make_obstacles([[0.15, 0.04], [0.15, -0.045]], 0.025, 0.001)
 GOALS = np.array([[0.3, 0.0]])
@@ -38,7 +38,7 @@ def let_fail(monkeypatch: pytest.MonkeyPatch, number: int, status: Status) -> No
 
 
 def total(prediction: Prediction) -> float:
-    return sum(each.likelihood for each in prediction.candidates) + prediction.unknown
+    return sum(each.likelihood for each in prediction.candidates) + prediction.unknown + prediction.other
 
 
 @pytest.mark.parametrize('status', [Status.LEFT_CLASS, Status.ITERATION_LIMIT, Status.INFEASIBLE])

@@ -37,6 +37,8 @@ FEWEST_STEPS = 2
 """Steps from which the unit of a recording can be told."""
 TIME_UNITS = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
 LENGTH_UNITS = {'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6}
+NO_GOAL = -1
+"""Row of a goal that is not in the list: the movement ends with its recording."""
 SCENE_PERIOD_NS, SCENE_LEAD_NS = NANOSECONDS // 2, NANOSECONDS // 10
 """The scene is sent twice a second, for the first time a tenth of a second before the first hand pose."""
 
@@ -140,12 +142,14 @@ class RecordedScene:
     """What a recording took place in.
 
     obstacles: rows of `encode_obstacles`; goals (g, 3) [m], None where they are unknown; boxes: by name, instead of the rows,
-    x, y, z of the centre and the full lengths along these axes [m].
+    x, y, z of the centre and the full lengths along these axes [m]; goal: row of the goal that was reached, `NO_GOAL` if it is
+    not among them, None where no table says it.
     """
 
     obstacles: tuple[tuple[float, ...], ...] = ()
     goals: Array | None = None
     boxes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    goal: int | None = None
 
     def find_boxes(self, positions: Array) -> dict[str, tuple[float, ...]]:
         """Return the boxes at the median height of a hand at positions (n, 3) [m]: a ceiling or a table top is no obstacle."""

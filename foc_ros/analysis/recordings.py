@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from foc_ros.core.errors import FocError, RecordingError, collect, join_errors
 from foc_ros.io.bags import BagReader, Item, check_bag, is_bag_file
 from foc_ros.io.csv_tables import Row
 
-from .box_scenes import BoxScenes
+from .box_scenes import BoxScenes, read_picked
 from .csv_recordings import (
     Movement,
     RecordedScene,
@@ -32,6 +33,7 @@ class BagRecording:
 
     name: str
     path: Path
+    goal: ClassVar[None] = None
 
     def items(self) -> Iterator[Item]:
         """Yield the recorded messages; raises RecordingError, also for a recording of which only a part can be read."""
@@ -46,6 +48,11 @@ class TableRecording:
     name: str
     movement: Movement | RecordingError
     scene: RecordedScene
+
+    @property
+    def goal(self) -> int | None:
+        """Row of the goal that was reached, None where no table says it."""
+        return self.scene.goal
 
     def read_movement(self) -> Movement:
         """Return the movement of the hand; raises RecordingError."""
@@ -115,7 +122,7 @@ def _parse_movement(name: str, rows: Iterable[Row]) -> Movement | RecordingError
 
 def _read_scenes(data: Path) -> SceneTables | BoxScenes:
     if (data / SCENES).exists():
-        return BoxScenes(data / SCENES)
+        return BoxScenes(data / SCENES, read_picked(data / TRIALS) if (data / TRIALS).exists() else {})
     return read_scenes(data / OBSTACLES if (data / OBSTACLES).exists() else None, data / GOALS)
 
 

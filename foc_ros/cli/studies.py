@@ -102,7 +102,7 @@ def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = 
 
 
 @app.command(group=RECORDINGS)
-def evaluate(data: Existing, /, *, in_order: bool = False, study: Study = PLAIN) -> int:
+def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = False, study: Study = PLAIN) -> int:
     """Compare predictions with recordings of people, beside simple baselines.
 
     Parameters
@@ -111,13 +111,15 @@ def evaluate(data: Existing, /, *, in_order: bool = False, study: Study = PLAIN)
         Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.
     in_order
         Replay the recordings of an operator one after the other, with what is learnt from one to the next.
+    unannounced
+        Replay each recording of tables also with its goal left out of the list, and judge the share of another goal.
     """
     from foc_ros.analysis.recordings import find_recordings
 
     study.check(EVALUATION_PAGE)
     recordings = find_recordings(data)
     write_report = study.load_report('evaluation_report')
-    from foc_ros.analysis.evaluation import evaluate, observations, tables
+    from foc_ros.analysis.evaluation import evaluate, observations, other_goal, tables
 
     with study.open_executor() as executor:
         observed, failed = observations.observe_all(recordings, study.params, executor, in_order)
@@ -126,6 +128,13 @@ def evaluate(data: Existing, /, *, in_order: bool = False, study: Study = PLAIN)
             print(f'foc_ros evaluate: none of the {len(failed)} recordings could be evaluated', file=sys.stderr)
             return 3
         answer = evaluate.evaluate(observed, study.params, executor)
+        if unannounced:
+            left_out, _ = observations.observe_all(other_goal.leave_goals_out(recordings), study.params, executor, in_order)
+            answer['other_goal'] = other_goal.score_other_goal(observed, left_out, study.params.likelihood.other_goal)
+            if answer['other_goal'] is None:
+                warn_all('evaluate', ['no recording has several goals of which one could be left out'])
+            else:
+                answer['verdict'].append(other_goal.describe_scores(answer['other_goal']))
     mismatches = evaluate.find_label_mismatches(data, observed)
     differ = 'the label differs from the recorded path'
     warn_all('evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])

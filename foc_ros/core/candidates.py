@@ -80,17 +80,18 @@ def _classify(candidate: Candidate, solution: Solution, problem: Problem) -> Pre
     return PredictedCandidate(candidate, solution, sides, solution.expected_effort * solution.dt, 0.0)
 
 
-def estimate_unsolved(candidates: Sequence[PredictedCandidate], obstacles: Obstacles) -> list[PredictedCandidate]:
+def estimate_unsolved(candidates: Sequence[PredictedCandidate], in_the_way: Sequence[Obstacles]) -> list[PredictedCandidate]:
     """Return the candidates with an estimate for those that the solver could not solve although the search has a path for them.
 
     The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from the class
     to the same goal, or else to any, that is solved and of most similar length (`compute_detour_effort`). A class without a path,
-    such as one that an obstacle closes on the way, stays as it is. obstacles: grown by the radius of the hand.
+    such as one that an obstacle closes on the way, stays as it is. in_the_way: the obstacles on the way to each goal, grown by
+    the radius of the hand.
     """
     solved = [each for each in candidates if each.has_likelihood]
     return [
         _estimate(each, find_similar(each.candidate.goal, _measure(each.candidate), solved))
-        if solved and each.status in FAILED and _has_path(each, obstacles)
+        if solved and each.status in FAILED and _has_path(each, in_the_way[each.candidate.goal])
         else each
         for each in candidates
     ]

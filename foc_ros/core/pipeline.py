@@ -161,11 +161,16 @@ class Pipeline:
         self.scene = self.scene.with_source(source, ObstacleSource(obstacles, stamp_ns or None, frame_id))
         return SampleStatus.ACCEPTED
 
-    def set_goals(self, goals: Array, frame_id: str, heights: Array | None = None) -> SampleStatus:
-        """Replace all goals, (g, 2) [m]; an empty array removes them. heights (g,): where they are known [m]."""
+    def set_goals(
+        self, goals: Array, frame_id: str, heights: Array | None = None, objects: Sequence[str | None] = ()
+    ) -> SampleStatus:
+        """Replace all goals, (g, 2) [m]; an empty array removes them.
+
+        heights (g,): where they are known [m]; objects: the id of the obstacle that each goal is, None where none is named.
+        """
         if not self._rejections.accept_frame('goals_wrong_frame', 'goals', frame_id, self.frame_id):
             return SampleStatus.WRONG_FRAME
-        self.scene = self.scene.with_goals(goals, frame_id, heights)
+        self.scene = self.scene.with_goals(goals, frame_id, heights, objects)
         return SampleStatus.ACCEPTED
 
     def predict(self, deadline: Deadline = NEVER) -> Prediction | None:
@@ -193,7 +198,7 @@ class Pipeline:
         self._is_new, self._predicted_ns = False, stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
         scene = self.hand_state, obstacles, self.scene.goals
-        knowledge = Knowledge(self._library, self.learnt.planning_spread)
+        knowledge = Knowledge(self._library, self.learnt.planning_spread, self.scene.goal_objects)
         tracks, heights = self._tracks, self.scene.goal_heights
         self._task = PredictionTask(self.adapted_config, *scene, tracks, knowledge, deadline, heights)
         return self._task
@@ -302,4 +307,4 @@ class Pipeline:
         for name, source in before.sources.items():
             self.set_obstacles(name, source.obstacles, source.stamp_ns, source.frame_id)
         if before.goals is not None:
-            self.set_goals(before.goals, before.goals_frame, before.goal_heights)
+            self.set_goals(before.goals, before.goals_frame, before.goal_heights, before.goal_objects)

@@ -14,16 +14,18 @@ from .classes import Search, Turn, find_path_sides, search
 from .classes.library import GuessTiming, recall_demonstrations
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
 from .deadline import NEVER, Deadline
+from .goals import compare_goals, find_other_share
 from .hand.duration import estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
 from .learning.dispersion import scale_covariance
 from .learning.learnt import NOTHING, Knowledge
 from .learning.recordings import Library, pool_recordings
 from .obstacles.clearance import cull_obstacles
+from .obstacles.geometry import find_holders
 from .obstacles.risk import RiskBound, count_events
 from .ocp.problem import Problem, rest_to_goal
 from .plant.covariance import SharedCovariances, scale_noise, widen_covariance
-from .plant.models import make_plant_model
+from .plant.models import TripleIntegratorModel, make_plant_model
 from .safety_preference import SafetyPreference
 from .scene import ReachingScene
 from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_rest
@@ -37,6 +39,7 @@ from .types import (
     PredictedCandidate,
     Prediction,
     Record,
+    Rest,
     Status,
     make_obstacles,
 )
@@ -74,8 +77,8 @@ def predict(
     tracks
         What the previous prediction returned, or `NO_TRACKS`.
     knowledge
-        Demonstrated paths, which become candidates where they fit the scene, recordings, which are evidence (`recordings`), and
-        the planning of the operator (`likelihood`).
+        Demonstrated paths, which become candidates where they fit the scene, recordings, which are evidence (`recordings`), the
+        planning of the operator (`likelihood`), and the obstacles that are goals by name.
     deadline
         When the prediction has to be ready. All classes are solved together; what is not settled then is compared by an estimate.
     goal_heights
@@ -88,8 +91,8 @@ def predict(
         wall times apart.
     """
     began, stamp_ns, known = time.perf_counter(), hand.stamp_ns, tracks.keep_goals(goals)
-    library, planning_spread = knowledge
-    scene = _prepare_scene(config, hand, obstacles, goals, goal_heights, known)
+    library, planning_spread, objects = knowledge
+    scene = _prepare_scene(config, hand, obstacles, goals, objects, goal_heights, known)
     found, candidates = _find_candidates(scene, config, known, library, deadline)
     matched = known.match(candidates, stamp_ns)
     reserve_s = (RESERVE_S + POOLING_S * bool(library.recordings)) * len(candidates)
@@ -97,14 +100,21 @@ def predict(
     held = [_hold_answer(*each, scene.hand) for each in zip(solved, matched, strict=True)]
     absent = known.find_absent(candidates, matched, stamp_ns)
     held += [each for track in absent if (each := _hold_absent(track, scene.hand)) is not None]
-    answered = estimate_unsolved(held, scene.near)
+    answered = estimate_unsolved(held, scene.in_the_way)
     others = estimate_unfollowed(found.unfollowed, answered, scene.durations_s)
-    all_ranked = rank_candidates([*answered, *others], config.likelihood, scene.near, scene.hand, goals, planning_spread)
+    compared = [*answered, *others]
+    if isinstance(make_plant_model(config.foc), TripleIntegratorModel):
+        compared = compare_goals(compared, scene.hand, goals, scene.durations_s, passing=is_passing(config.duration))
+    all_ranked = rank_candidates(compared, config.likelihood, scene.near, scene.hand, goals, planning_spread)
     ranked, unknown = split_unknown(all_ranked, {each.label for each in others})
     pooled = pool_recordings(ranked, library, hand, scene.blocking, goals)
-    smooth, unknown = known.smooth(
-        [replace(each, likelihood=(1.0 - unknown) * each.likelihood) for each in pooled], unknown, stamp_ns
-    )
+    rest = Rest(unknown)
+    if unknown < 1.0:
+        spread_m, prior = config.foc.endpoint_stddev, config.likelihood.other_goal
+        other = find_other_share(scene.hand, goals, scene.durations_s, prior, spread_m)
+        rest = Rest((1.0 - other) * unknown, other)
+    known_share = 1.0 - sum(rest)
+    smooth, rest = known.smooth([replace(each, likelihood=known_share * each.likelihood) for each in pooled], rest, stamp_ns)
     predicted, best = scene.heights.add_to(smooth), known.choose_most_likely(smooth)
     counts = {
         'merged': len(answered) - len(ranked),
@@ -126,14 +136,15 @@ def predict(
         obstacles=obstacles,
         goals=goals,
         cleared=tuple(scene.cleared.tolist()),
-        unknown=unknown,
+        unknown=rest.unknown,
+        other=rest.other,
     )
     following = Tracks(
         *known.follow(predicted, matched, solved, stamp_ns),
         stamp_ns,
         goals,
         dict(enumerate(scene.durations_s)),
-        unknown,
+        rest,
         None if best is None else best.way,
         max([known.next_number, *(each.number + 1 for each in matched)]),
         found.next_goal,
@@ -146,8 +157,10 @@ class _PredictionScene(Record):
     """What the candidates of one prediction are found and solved in.
 
     hand: the state that they start from; goals (g, 2) [m]; durations_s: time to go to each; blocking: obstacles that the hand
-    does not clear by its height, grown by its radius; near: those that are not culled; cleared (n,): whether the hand clears each
-    of all obstacles; heights: the prediction of the height; covariances: what all candidates share of theirs.
+    does not clear by its height, grown by its radius; near: those that are not culled; in_the_way: those of them that do not hold
+    the goal, for each goal; cleared (n,): whether the hand clears each of all obstacles; heights: the prediction of the height;
+    covariances: what all candidates share of theirs; objects: the id of the
+    obstacle that each goal is.
     """
 
     hand: HandState
@@ -155,13 +168,21 @@ class _PredictionScene(Record):
     durations_s: list[float]
     blocking: Obstacles
     near: Obstacles
+    in_the_way: list[Obstacles]
     cleared: NDArray[np.bool_]
     heights: HeightPredictor
     covariances: SharedCovariances
+    objects: Sequence[str | None]
 
 
 def _prepare_scene(
-    config: Config, estimated: HandState, obstacles: Obstacles, goals: Array, goal_heights: Array | None, known: Tracks
+    config: Config,
+    estimated: HandState,
+    obstacles: Obstacles,
+    goals: Array,
+    objects: Sequence[str | None],
+    goal_heights: Array | None,
+    known: Tracks,
 ) -> _PredictionScene:
     """Return the scene of a prediction: a start without noise, times to go, and the obstacles that are in the way."""
     hand = _simplify_start(estimated, config.estimator)
@@ -172,7 +193,8 @@ def _prepare_scene(
     cleared = heights.find_cleared(grown, goals, durations_s)
     blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
     near = cull_obstacles(blocking, hand.mean[:2], goals, max(durations_s), config.scene.max_obstacles)
-    return _PredictionScene(hand, goals, durations_s, blocking, near, cleared, heights, covariances)
+    in_the_way = take_in_the_way(near, goals, objects)
+    return _PredictionScene(hand, goals, durations_s, blocking, near, in_the_way, cleared, heights, covariances, objects)
 
 
 def _find_candidates(
@@ -180,7 +202,7 @@ def _find_candidates(
 ) -> tuple[Search, tuple[Candidate, ...]]:
     """Search for homotopy classes; return what was found, and the candidates with those that a library recalls."""
     timing = GuessTiming(scene.durations_s, config.foc.steps)
-    turn = Turn(deadline.take_share(SEARCH_SHARE), known.next_goal)
+    turn = Turn(deadline.take_share(SEARCH_SHARE), known.next_goal, scene.objects)
     found = search(scene.hand.mean, scene.goals, scene.near, config.homotopy, *timing, known.candidates, turn)
     where = scene.hand, scene.goals, scene.near, config.homotopy, timing
     return found, recall_demonstrations(library.demonstrations, *where, found.candidates, known.candidates)
@@ -190,8 +212,10 @@ def _solve(
     scene: _PredictionScene, config: Config, candidates: Sequence[Candidate], matched: Sequence[Track], deadline: Deadline
 ) -> list[PredictedCandidate]:
     """Solve the candidates, each from the solution of its track; return them with their numbers and predictive covariance."""
-    place = config, scene.hand, scene.near
-    by_goal = {row: build_problem(*place, scene.goals[row], scene.durations_s[row]) for row in {each.goal for each in candidates}}
+    place = scene.in_the_way, scene.goals, scene.durations_s
+    by_goal = {
+        row: build_problem(config, scene.hand, *(each[row] for each in place)) for row in {each.goal for each in candidates}
+    }
     earlier = [each.solution if each.solved_ns == each.seen_ns else None for each in matched]
     until = Deadline(whole=deadline, patience=PATIENCE)
     solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, until)
@@ -233,6 +257,12 @@ def _find_durations(hand: HandState, goals: Array, known: Tracks, config: Config
     """Return the time to go [s] to each goal, which for a goal that was there before changes only gradually."""
     durations, elapsed_s = estimate_times_to_go(hand, goals, config.duration), known.measure_time(hand.stamp_ns)
     return [limit_change(each, known.durations_s.get(goal, each), elapsed_s) for goal, each in enumerate(durations)]
+
+
+def take_in_the_way(obstacles: Obstacles, goals: Array, objects: Sequence[str | None] = ()) -> list[Obstacles]:
+    """Return for each of the goals (g, 2) [m] the obstacles on the way to it: all but those that hold it, or are its object."""
+    holds = find_holders(goals, obstacles, objects)
+    return [obstacles.take(np.flatnonzero(~each)) if each.any() else obstacles for each in holds]
 
 
 def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: Array, duration_s: float) -> Problem:
@@ -295,7 +325,11 @@ def _widen_covariance(
 def build_scene_problems(scene: ReachingScene) -> list[Problem]:
     """Return the problem of every goal. An uncertain start is as uncertain to the operator, so it counts in the constraint."""
     config = scene.config
-    problems = [build_problem(config, scene.hand, scene.avoided, goal, scene.duration_s) for goal in scene.goals]
+    in_the_way = take_in_the_way(scene.avoided, scene.goals)
+    problems = [
+        build_problem(config, scene.hand, around, goal, scene.duration_s)
+        for around, goal in zip(in_the_way, scene.goals, strict=True)
+    ]
     if scene.noise is not None:
         problems = [replace(problem, noise=scene.noise) for problem in problems]
     if not scene.hand.covariance.any():

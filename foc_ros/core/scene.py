@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,13 +30,15 @@ class ObstacleSource:
 class Scene(Record):
     """Obstacles by source, in order of arrival, and the goals (g, 2) [m], None until some were received.
 
-    goal_heights (g,): of the goals, along the plane's normal [m]; None where they are not known.
+    goal_heights (g,): of the goals, along the plane's normal [m]; None where they are not known. goal_objects: the id of the
+    obstacle that each goal is, None where it is none by name; empty if no goal has one.
     """
 
     sources: dict[str, ObstacleSource] = field(default_factory=dict)
     goals: Array | None = None
     goals_frame: str = ''
     goal_heights: Array | None = None
+    goal_objects: tuple[str | None, ...] = ()
 
     def with_source(self, name: str, source: ObstacleSource) -> Scene:
         """Return the scene with the obstacles of one source replaced; this source is now the latest."""
@@ -45,9 +48,10 @@ class Scene(Record):
         """Return the scene without the obstacles of one source."""
         return replace(self, sources={other: part for other, part in self.sources.items() if other != name})
 
-    def with_goals(self, goals: Array, frame_id: str, heights: Array | None = None) -> Scene:
+    def with_goals(self, goals: Array, frame_id: str, heights: Array | None = None, objects: Sequence[str | None] = ()) -> Scene:
         """Return the scene with all goals replaced."""
-        return replace(self, goals=np.array(goals, dtype=float).reshape(-1, 2), goals_frame=frame_id, goal_heights=heights)
+        places = np.array(goals, dtype=float).reshape(-1, 2)
+        return replace(self, goals=places, goals_frame=frame_id, goal_heights=heights, goal_objects=tuple(objects))
 
     def obstacles(self, stamp_ns: int) -> Obstacles:
         """Return all obstacles at a stamp [ns]: the union over the sources, in which the latest source of an id counts."""

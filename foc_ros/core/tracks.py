@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .plant.response import fall_as_minimum_jerk
-from .types import NANOSECONDS, Array, Candidate, PredictedCandidate, Record, Solution, as_readonly
+from .types import NANOSECONDS, Array, Candidate, PredictedCandidate, Record, Rest, Solution, as_readonly
 
 HOLD_S = 0.2
 """Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten
@@ -62,7 +62,7 @@ class Tracks(Record):
     """What one prediction passes to the next.
 
     followed: the tracks of its candidates; absent: those that were not seen for a short time; stamp_ns: of the prediction, None
-    if there was none; goals (g, 2) [m]; durations_s: time to go to each [s]; unknown: share of the likelihood that no candidate
+    if there was none; goals (g, 2) [m]; durations_s: time to go to each [s]; rest: shares of the likelihood that no candidate
     had; most_likely: number of the most likely class; next_number: of the next new class; next_goal: row of the goal at which the
     search begins.
     """
@@ -72,7 +72,7 @@ class Tracks(Record):
     stamp_ns: int | None = None
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
     durations_s: dict[int, float] = field(default_factory=dict)
-    unknown: float = 0.0
+    rest: Rest = field(default_factory=Rest)
     most_likely: int | None = None
     next_number: int = 0
     next_goal: int = 0
@@ -134,22 +134,20 @@ class Tracks(Record):
             and all(count_shared(each.candidate, other) is None for other in candidates)
         ]
 
-    def smooth(
-        self, predicted: Sequence[PredictedCandidate], unknown: float, stamp_ns: int
-    ) -> tuple[list[PredictedCandidate], float]:
-        """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and the unknown share likewise."""
+    def smooth(self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int) -> tuple[list[PredictedCandidate], Rest]:
+        """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and what none has likewise."""
         before = {each.number: each.likelihood for each in (*self.followed, *self.absent)}
         taking_part = [each for each in predicted if each.has_likelihood]
         gain = -math.expm1(-self.measure_time(stamp_ns) / SMOOTHING_S)
         if not any(each.way in before for each in taking_part):
             gain = 1.0
         weights = [(1.0 - gain) * before.get(each.way, 0.0) + gain * each.likelihood for each in taking_part]
-        left = (1.0 - gain) * self.unknown + gain * unknown
-        left = left if left >= LEAST_UNKNOWN else 0.0
-        total = sum(weights) + left or 1.0
+        mixed = [(1.0 - gain) * share + gain * now for share, now in zip(self.rest, rest, strict=True)]
+        left = [each if each >= LEAST_UNKNOWN else 0.0 for each in mixed]
+        total = sum(weights) + sum(left) or 1.0
         ranked = [replace(each, likelihood=weight / total) for each, weight in zip(taking_part, weights, strict=True)]
         ranked.sort(key=lambda each: (-each.likelihood, each.label))
-        return ranked + [each for each in predicted if not each.has_likelihood], left / total
+        return ranked + [each for each in predicted if not each.has_likelihood], Rest(*(each / total for each in left))
 
     def choose_most_likely(self, predicted: Sequence[PredictedCandidate]) -> PredictedCandidate | None:
         """Return the most likely of ranked candidates; the one of before stays until another leads by more than `LEAD`."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +61,13 @@ class HandSample(Record):
     position: Array
     height: float = 0.0
     frame_id: str = ''
+
+
+class Rest(NamedTuple):
+    """Shares of the likelihood that no candidate has: of classes that are unknown, and of a goal that nobody announced."""
+
+    unknown: float = 0.0
+    other: float = 0.0
 
 
 class SampleStatus(StrEnum):
@@ -222,6 +229,8 @@ class Goal(Record):
         In the task plane [m]; a third number is the height over it.
     name : str, optional
         What predictions call the goal; by default ``goal0`` and so on, by its place in the list of goals.
+    object : str, optional
+        Name of an obstacle that is this goal, even if it does not hold the position: it does not block the way to this goal.
 
     Raises
     ------
@@ -237,13 +246,15 @@ class Goal(Record):
 
     position: ArrayLike
     name: str | None = None
+    object: str | None = None
 
     def __post_init__(self) -> None:
         from .support import check_position  # it needs this module
 
         object.__setattr__(self, 'position', check_position('goal.position', self.position))
-        if self.name is not None and (not isinstance(self.name, str) or not self.name.strip()):
-            raise SceneError('goal.name', 'a text that is not empty', repr(self.name))
+        for field_name, text in (('name', self.name), ('object', self.object)):
+            if text is not None and (not isinstance(text, str) or not text.strip()):
+                raise SceneError(f'goal.{field_name}', 'a text that is not empty', repr(text))
         super().__post_init__()
 
     def __repr__(self) -> str:
@@ -423,10 +434,10 @@ class PredictedCandidate:
     """One candidate with its solution and likelihood.
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
-    by id. cost: effort to go times the length of a step [m^2/s^5]; likelihood in [0, 1]: 0 unless solved, compromised or
-    estimated. age_s: 0, or how long ago the solution was found, of which this is the rest, if it failed [s]. way: a number that
-    stays the same for as long as the class is followed, whatever its label and its rank are. height: the movement along the
-    normal of the plane, None where it is not predicted: the hand then stays at its height.
+    by id. cost: effort to go times the length of a step [m^2/s^5], comparable between goals; likelihood in [0, 1]: 0 unless
+    solved, compromised or estimated. age_s: 0, or how long ago the solution was found, of which this is the rest, if it failed
+    [s]. way: a number that stays the same for as long as the class is followed, whatever its label and its rank are. height: the
+    movement along the normal of the plane, None where it is not predicted: the hand then stays at its height.
     """
 
     candidate: Candidate
@@ -518,7 +529,8 @@ class Prediction(Record):
     most_likely: label after hysteresis, None where no candidate has a likelihood. notes: facts for diagnostics (relaxed margins,
     merged classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were
     given, at the stamp of the hand; goals (g, 2) [m]. cleared (n,): whether the predicted height clears each obstacle, which
-    therefore does not block. unknown: share of the likelihood that belongs to classes that are not among the candidates.
+    therefore does not block. unknown: share of the likelihood that belongs to classes that are not among the candidates; other:
+    that of a goal that nobody announced.
     """
 
     stamp_ns: int
@@ -532,6 +544,7 @@ class Prediction(Record):
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
     cleared: tuple[bool, ...] = ()
     unknown: float = 0.0
+    other: float = 0.0
 
     def __repr__(self) -> str:
         """Say time, number of candidates and the most likely one."""

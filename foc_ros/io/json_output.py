@@ -18,6 +18,7 @@ def encode_prediction(prediction: Prediction) -> dict[str, Any]:
         'stamp_ns': prediction.stamp_ns,
         'most_likely': prediction.most_likely,
         'unknown': prediction.unknown,
+        'other': prediction.other,
         'candidates': [encode_candidate(each) for each in candidates],
     }
 

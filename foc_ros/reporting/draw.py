@@ -306,7 +306,7 @@ def draw_movement(axes: Any, positions: Array, number: int) -> None:
 def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None:
     """Draw the likelihoods of the tracks that have a slot over time [s].
 
-    A track has a gap where it has no candidate. The share that is unknown is hatched.
+    A track has a gap where it has no candidate. The share that no candidate has is hatched.
     """
     times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
     drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
@@ -316,10 +316,10 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
         known = np.flatnonzero(np.isfinite(values))
         row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
         draw_tag(axes, (times[first + row], values[row]), get_letter(tracks.slots[track]), colour)
-    unknown = np.array([each.unknown_share for each in tracks.snapshots])
+    unknown = np.array([each.unknown_share + each.other_share for each in tracks.snapshots])
     if unknown.any():
         look = {'facecolor': 'none', 'edgecolor': '0.6', 'hatch': '////', 'linewidth': 0.0, 'step': 'mid'}
-        axes.fill_between(times, 1.0 - unknown, 1.0, label='share of what is unknown', **look)
+        axes.fill_between(times, 1.0 - unknown, 1.0, label='unknown, or another goal', **look)
         axes.legend(loc='lower left', fontsize=7)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)

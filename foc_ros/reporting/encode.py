@@ -32,9 +32,9 @@ DRAWN_PERCENTILES = (0.5, 99.5)
 def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence[Span], bounds: Bounds) -> dict[str, Any]:
     """Return everything that the page of a report draws, of at most MOST_BYTES; spans: of the movements.
 
-    count: of the predictions; times [s] after the first hand sample, solve_ms and unknown share of those that are drawn; tracks:
-    for each its slot, the row of its first prediction and its likelihoods from there on; frames: the predictions at which the
-    slider stops. Obstacles, goals and labels are stored once and referred to by their row.
+    count: of the predictions; times [s] after the first hand sample, solve_ms, and unknown, the share that no candidate has, of
+    those that are drawn; tracks: for each its slot, the row of its first prediction and its likelihoods from there on; frames:
+    the predictions at which the slider stops. Obstacles, goals and labels are stored once and referred to by their row.
     """
     count, most = len(tracks.snapshots), MOST_FRAMES
     kept = select_evenly(count, MOST_TIMES).tolist() if count else []
@@ -72,7 +72,7 @@ class _ReportData:
                 {'slot': self._tracks.slots.get(track), 'first': first, 'share': [round_number(value) for value in values]}
                 for track, (first, values) in self._tracks.likelihoods().items()
             ],
-            'unknown': [round(each.unknown_share, 3) for each in snapshots],
+            'unknown': [round(each.unknown_share + each.other_share, 3) for each in snapshots],
             'movements': [[self._seconds(stamp) for stamp in span] for span in spans],
             'hand': {
                 't': _quantise_differences(hand.seconds_after(self._origin_ns)[samples], TIME),

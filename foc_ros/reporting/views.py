@@ -25,7 +25,7 @@ from foc_ros.core.types import (
     describe_class,
 )
 from foc_ros.ros.messages.decode_poses import decode_stamp
-from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, STAMP, UNKNOWN
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STAMP, UNKNOWN
 from foc_ros.ros.messages.plane import project
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, order_candidates
 
@@ -109,7 +109,8 @@ class Snapshot(Record):
 
     candidates: those with a likelihood, most likely first; most_likely: label, None if no candidate has one; unsolved: the other
     candidates; solve_s: wall time [s], None if it is unknown; hand (2,): position of the hand [m], None if it is unknown;
-    cleared: names of the obstacles that the hand passes above or below; unknown_share: of the likelihood, which no candidate has.
+    cleared: names of the obstacles that the hand passes above or below; unknown_share, other_share: of the
+    likelihood, which no candidate has.
     """
 
     stamp_ns: int
@@ -122,6 +123,7 @@ class Snapshot(Record):
     hand: Array | None = None
     cleared: Collection[str] = ()
     unknown_share: float = 0.0
+    other_share: float = 0.0
 
     def begin_at(self, hand: Array) -> Snapshot:
         """Return the snapshot with paths that begin at the hand (2,) [m].
@@ -291,6 +293,7 @@ def build_snapshot(prediction: Prediction) -> Snapshot:
         next((each.candidate.guess[0] for each in sorted(prediction.candidates, key=lambda each: each.age_s)), None),
         tuple(name for name, is_cleared in zip(prediction.obstacles.ids, prediction.cleared, strict=False) if is_cleared),
         prediction.unknown,
+        prediction.other,
     )
 
 
@@ -309,9 +312,9 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
         raise MessageError('likelihoods', 'those of the prediction', 'those of another prediction')
     rows, columns = _read_cloud(cloud), np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
     labels = likelihoods.layout.dim[0].label.split(';') if len(columns) else []
-    unknown = 0.0 if labels else 1.0
-    if labels and labels[-1] == UNKNOWN:
-        unknown, labels, columns = float(columns[-1, 0]), labels[:-1], columns[:-1]
+    shares = {UNKNOWN: 0.0 if labels else 1.0, OTHER: 0.0}
+    while labels and labels[-1] in shares:
+        shares[labels[-1]], labels, columns = float(columns[-1, 0]), labels[:-1], columns[:-1]
     candidates = []
     for number, (label, values) in enumerate(zip(labels, columns, strict=True)):
         name = label, _describe_label(label, obstacles.ids, len(goals))
@@ -323,7 +326,14 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
         cleared = [name for name, is_out in zip(obstacles.ids, is_cleared, strict=True) if is_out]
     most_likely = candidates[0].label if candidates else None
     return Snapshot(
-        decode_stamp(cloud.header), obstacles, goals, tuple(candidates), most_likely, cleared=cleared, unknown_share=unknown
+        decode_stamp(cloud.header),
+        obstacles,
+        goals,
+        tuple(candidates),
+        most_likely,
+        cleared=cleared,
+        unknown_share=shares[UNKNOWN],
+        other_share=shares[OTHER],
     )
 
 

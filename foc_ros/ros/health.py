@@ -277,6 +277,7 @@ def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:
     candidates = {f'candidate {outcome.candidate.label}': _describe_candidate(outcome) for outcome in prediction.candidates}
     notes = {f'note {name}': str(count) for name, count in sorted(prediction.notes.items())}
     known = {'most likely': prediction.most_likely or 'none', 'unknown': f'{prediction.unknown:.3f}'}
+    known['other goal'] = f'{prediction.other:.3f}'
     return {**known, **candidates, **notes}
 
 

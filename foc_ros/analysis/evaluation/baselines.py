@@ -138,6 +138,12 @@ def forecast_shares(
     return Forecast.from_shares(shares(observation, setting), question)
 
 
+def forecast_published(observation: Observation, question: Question, _: None) -> Forecast:
+    """Forecast by the shares that the node publishes; those of ways and gaps are given that the goal was announced."""
+    announced = 1.0 if question.name == GOAL else 1.0 - observation.other
+    return Forecast.from_shares(published_shares(observation) / announced, question)
+
+
 def forecast_uniform(_: Observation, question: Question, __: None) -> Forecast:
     """Give all possible answers the same probability."""
     return Forecast.uniform(question)
@@ -194,7 +200,7 @@ def _answer_of_line(observation: Observation, question: Question, velocity: Arra
     return tuple(np.where(is_left, LEFT, RIGHT).tolist())
 
 
-register_baseline(PUBLISHED, partial(forecast_shares, published_shares))
+register_baseline(PUBLISHED, forecast_published)
 register_baseline(REFITTED, partial(forecast_shares, power_rule_shares), make_power_rules)
 register_baseline(PLAIN, partial(forecast_shares, power_rule_shares), make_plain_rules)
 register_baseline(UNIFORM, forecast_uniform)

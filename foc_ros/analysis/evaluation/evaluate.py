@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from foc_ros.analysis.box_scenes import read_picked
 from foc_ros.analysis.parallel import collect_all
 from foc_ros.analysis.recordings import LABELS, TRIALS
 from foc_ros.core.config import Config, flatten
-from foc_ros.core.types import LEFT, Array
+from foc_ros.core.types import LEFT, NANOSECONDS, Array
 from foc_ros.io.csv_tables import read_rows
 
 from .baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
@@ -47,10 +48,11 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config, executor: 
         name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], recordings, name) for each in baselines}
         for name in asked
     }
+    left_s = {name: _find_times_left(recordings, name) for name in asked}
     answer = {
         'recordings': len(recordings),
         'predictions': sum(len(recording.observations) for recording in recordings),
-        'questions': {name: {other: summarise(each) for other, each in scores[name].items()} for name in asked},
+        'questions': {name: {other: summarise(each, left_s[name]) for other, each in scores[name].items()} for name in asked},
         'comparisons': {
             name: {
                 other: compare_scores(scores[name][PUBLISHED], each, is_share=name == GAP)
@@ -68,6 +70,11 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config, executor: 
         'parameters': flatten(config),
     }
     return answer | {'verdict': make_verdict(answer)}
+
+
+def _find_times_left(recordings: Sequence[ObservedRecording], name: str) -> Array:
+    """Return the time [s] to the end of the movement from each observation to which a question is put, (m,)."""
+    return np.array([(each.path.end_ns - seen.stamp_ns) / NANOSECONDS for each in recordings for seen, _ in ask_all(each, name)])
 
 
 def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> Table:
@@ -99,8 +106,11 @@ def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -
     """Return both texts for each recording whose label is not the path class that was taken; none where there are no labels.
 
     The columns of labels.csv after the first are the gaps taken, row by row, counted from low x. The column `sides` of trials.csv
-    has the side of each box by the end of its name. Raises RecordingError for a table that cannot be read.
+    has the side of each box by the end of its name; where it says which object was picked up instead, that is the truth already.
+    Raises RecordingError for a table that cannot be read.
     """
+    if (data / TRIALS).exists() and read_picked(data / TRIALS):
+        return {}
     if (data / TRIALS).exists():
         return _find_side_mismatches(data / TRIALS, recordings)
     if not (data / LABELS).exists():

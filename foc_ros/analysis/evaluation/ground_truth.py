@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.analysis.csv_recordings import NO_GOAL
 from foc_ros.core.classes import compute_swept_angles
 from foc_ros.core.classes.rows import WALL, Rows, locate_rows
 from foc_ros.core.learning.movements import find_reached_goal
@@ -31,13 +32,18 @@ Sides = NDArray[np.int8]
 class RecordedPath:
     """A recorded path, whose movement ends where it is nearest to the goal that it reached.
 
-    Attributes: stamps_ns (m,), positions (m, 2) [m], goals (g, 2) [m]; goal: row of the goal reached, None where none was;
-    end_ns: when the movement ends; travelled (m,): distance travelled so far [m]; progress (m,): its share of the movement.
+    goal: row of the one that was reached, or `NO_GOAL`; None to find it. Attributes: stamps_ns (m,), positions (m, 2) [m], goals
+    (g, 2) [m]; goal: row of the goal reached, None where none was; end_ns: when the movement ends; travelled (m,): distance
+    travelled so far [m]; progress (m,): its share of the movement.
     """
 
-    def __init__(self, stamps_ns: NDArray[np.int64], positions: Array, goals: Array) -> None:
+    def __init__(self, stamps_ns: NDArray[np.int64], positions: Array, goals: Array, goal: int | None = None) -> None:
         self.stamps_ns, self.positions, self.goals = stamps_ns, positions, goals
-        self.goal, end = find_reached_goal(positions, goals)
+        if goal == NO_GOAL:
+            self.goal, end = None, len(positions) - 1
+        else:
+            reached, end = find_reached_goal(positions, goals if goal is None else goals[[goal]])
+            self.goal = reached if goal is None else goal
         self.end_ns = int(stamps_ns[end])
         self.travelled = _compute_travelled(positions)
         whole = self.travelled[end]

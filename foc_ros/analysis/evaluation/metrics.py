@@ -58,13 +58,18 @@ def compute_brier_score(forecast: Forecast, question: Question) -> float:
     return float(((forecast.probability - truth) ** 2).sum() + question.unlisted * forecast.each_other**2)
 
 
-def summarise(scores: Scores) -> dict[str, Any]:
-    """Return all scores as plain values: means over the predictions and by tenths, reliability, and the final lead."""
+def summarise(scores: Scores, left_s: Array) -> dict[str, Any]:
+    """Return all scores as plain values: means over the predictions and by tenths, reliability, and the final lead.
+
+    left_s (m,): time from each forecast to the end of its movement [s].
+    """
+    leads = find_final_leads(scores)
     return {
         **_compute_means(scores, np.ones(len(scores.recording), dtype=bool)),
         'expected_calibration_error': compute_calibration_error(scores),
         'right_from_half_way': _mean(scores.correct[scores.progress >= 0.5]),
-        'leads_for_good_from': _mean(np.array(list(find_final_leads(scores).values()))),
+        'leads_for_good_from': _mean(np.array([1.0 if row is None else scores.progress[row] for row in leads.values()])),
+        'leads_for_good_before_s': _mean(np.array([0.0 if row is None else left_s[row] for row in leads.values()])),
         'by_tenth': [_compute_means(scores, find_tenths(scores.progress) == number) for number in range(TENTHS)],
         'reliability': compute_reliability(scores),
     }
@@ -102,14 +107,14 @@ def compute_calibration_error(scores: Scores) -> float:
     return float(sum(each['count'] * abs(each['confidence'] - each['right']) for each in bins) / len(scores.confidence))
 
 
-def find_final_leads(scores: Scores) -> dict[int, float]:
-    """Return, for each recording, the progress after which the likeliest answer stays correct to the end; 1 if it never does."""
-    found = {}
+def find_final_leads(scores: Scores) -> dict[int, int | None]:
+    """Return, for each recording, the forecast (row) from which on the likeliest answer is correct to the end, None if none."""
+    found: dict[int, int | None] = {}
     for recording in np.unique(scores.recording).astype(int).tolist():
         rows = np.flatnonzero(scores.recording == recording)
         wrong = np.flatnonzero(scores.correct[rows] < 1.0)
         first = int(wrong[-1]) + 1 if len(wrong) else 0
-        found[recording] = float(scores.progress[rows[first]]) if first < len(rows) else 1.0
+        found[recording] = int(rows[first]) if first < len(rows) else None
     return found
 
 

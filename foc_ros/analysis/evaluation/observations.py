@@ -43,12 +43,12 @@ class CandidateTable(Record):
     """The k candidates of one prediction, about n obstacles.
 
     labels; goal (k,): row of the goals; has_likelihood (k,): whether each takes part; cost_to_go (k,) [m^2/s^5]: integral of the
-    squared control; safety_shortfall (k,): by how much the safety factor is below the wanted one; likelihood (k,): as published;
-    length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; is_named (k, n): whether the obstacle is in
-    the label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean (k, h, 2) [m] and covariance (k, h,
-    2, 2) [m^2]: of the position at `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much the position lags behind for each
-    share of the time to go that the movement takes longer; branch_times: when the candidates part; decisions: of those that take
-    part.
+    squared control, comparable between goals; safety_shortfall (k,): by how much the safety factor is below the wanted one;
+    likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; is_named
+    (k, n): whether the obstacle is in the label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
+    (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much
+    the position lags behind for each share of the time to go that the movement takes longer; branch_times: when the candidates
+    part; decisions: of those that take part.
     """
 
     labels: tuple[str, ...]
@@ -83,7 +83,8 @@ class Observation(Record):
 
     ids, centre (n, 2) [m]: of the obstacles at that stamp; row (n,): the row of each obstacle, 0 first, -1 for a wall; gaps: for
     each row the sides (k, n) on which paths through its open gaps pass its obstacles; direction (2,): the unit vector along which
-    rows are ordered; goals (g, 2) [m]; candidates; most_likely: the leading label after hysteresis; truth.
+    rows are ordered; goals (g, 2) [m]; candidates; most_likely: the leading label after hysteresis; truth;
+    other: share of a goal that nobody announced.
     """
 
     stamp_ns: int
@@ -98,6 +99,7 @@ class Observation(Record):
     candidates: CandidateTable
     most_likely: str | None
     truth: GroundTruth
+    other: float = 0.0
 
     @property
     def left(self) -> Array:
@@ -141,7 +143,7 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
         warn(losses)
     goals = made[-1][0].scene.goals
     assert goals is not None
-    path = RecordedPath(np.array(stamps), np.array(positions), goals)
+    path = RecordedPath(np.array(stamps), np.array(positions), goals, recording.goal)
     found = [make_observation(step, hand, path, adapted) for step, hand, adapted in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
@@ -200,6 +202,7 @@ def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Co
         candidates=_tabulate_candidates(prediction, obstacles, hand, goals, config),
         most_likely=prediction.most_likely,
         truth=find_ground_truth(prediction.stamp_ns, path, obstacles, row, direction, goals),
+        other=prediction.other,
     )
 
 
@@ -216,7 +219,7 @@ def _tabulate_candidates(
         labels=tuple(each.candidate.label for each in predicted),
         goal=goal,
         has_likelihood=has_likelihood,
-        cost_to_go=np.array([each.effort * each.dt for each in solutions]),
+        cost_to_go=np.array([each.cost for each in predicted]),
         safety_shortfall=np.array([each.safety_shortfall for each in solutions]),
         likelihood=np.array([each.likelihood for each in predicted]),
         length=np.array([each.candidate.length for each in predicted]),

@@ -15,7 +15,7 @@ GAIN_TITLES = {
     PATH_CLASS: 'Homotopy class: log-likelihood above uniform [nat]',
     GOAL: 'Goal: log-likelihood above uniform [nat]',
 }
-TOTALS = ('', 'gain', 'ECE', 'Brier', 'correct [%]', 'leads from [%]')
+TOTALS = ('', 'gain', 'ECE', 'Brier', 'correct [%]', 'leads from [%]', 'leads for [s]')
 GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
 REGIONS = {
     'inside': 'ellipse of the most likely candidate',
@@ -50,7 +50,8 @@ def _format_tenths(predictor: str, scores: Mapping[str, Any], score: str) -> tup
 
 def _format_totals(predictor: str, scores: Mapping[str, Any]) -> tuple[str, ...]:
     numbers = [_number(scores[name], 3) for name in ('gain', 'expected_calibration_error', 'brier')]
-    return (predictor, *numbers, _percent(scores['right']), _percent(scores['leads_for_good_from']))
+    leads = _percent(scores['leads_for_good_from']), _number(scores['leads_for_good_before_s'], 2)
+    return (predictor, *numbers, _percent(scores['right']), *leads)
 
 
 def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:

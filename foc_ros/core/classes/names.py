@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from foc_ros.core.obstacles.clearance import cull_obstacles
-from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.geometry import find_holders, measure_offsets
 from foc_ros.core.types import LEFT, Array, Candidate, Obstacles
 
 from .graph import Rows
@@ -38,7 +38,7 @@ class Names:
 
     radius (n,): of each with the clearance [m], less where a gap is kept open. holds_hand (n,), holds_goal (g, n): whether an
     obstacle of this size holds the hand or the goal; blocks (g, n): false for an obstacle, without the clearance, that holds the
-    goal. is_named (g, n): whether the names of the paths to a goal contain an obstacle.
+    goal, or is it. is_named (g, n): whether the names of the paths to a goal contain an obstacle.
     """
 
     radius: Array
@@ -84,8 +84,15 @@ def take_near(obstacles: Obstacles, hand: Array, goals: Array) -> Obstacles:
     return cull_obstacles(obstacles, hand, goals, 0.0, MOST)
 
 
-def find_names(hand: Array, goals: Array, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]) -> Names:
-    """Find out which obstacles the names contain; arguments as in `named_obstacles`.
+def find_names(
+    hand: Array,
+    goals: Array,
+    obstacles: Obstacles,
+    clearance: float,
+    previous: Sequence[Candidate],
+    objects: Sequence[str | None] = (),
+) -> Names:
+    """Find out which obstacles the names contain; arguments as in `named_obstacles`, and the obstacle that each goal is.
 
     An obstacle is named if the foot of some point of its polygon lies between hand and goal, and it either blocks the straight
     line or a path round its far side is short enough. As no other obstacle has an influence, a name stays the same if other
@@ -94,7 +101,7 @@ def find_names(hand: Array, goals: Array, obstacles: Obstacles, clearance: float
     sides = _tabulate_sides(obstacles, previous)
     radius = _keep_gaps_open(obstacles, np.maximum(obstacles.radius + clearance, MIN_SIZE), clearance, sides)
     _, distance = measure_offsets(np.vstack([hand, goals]), obstacles)
-    blocks = distance[1:] >= obstacles.radius
+    blocks = ~find_holders(goals, obstacles, objects)
     slack = np.zeros((len(goals), len(obstacles)))
     goal_of = np.array([candidate.goal for candidate in previous], dtype=np.intp)
     for goal in {candidate.goal for candidate in previous if candidate.goal < len(goals)}:

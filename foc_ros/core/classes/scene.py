@@ -71,7 +71,13 @@ class SearchScene:
     """
 
     def __init__(
-        self, hand_mean: Array, goals: Array, obstacles: Obstacles, config: HomotopyConfig, previous: Sequence[Candidate]
+        self,
+        hand_mean: Array,
+        goals: Array,
+        obstacles: Obstacles,
+        config: HomotopyConfig,
+        previous: Sequence[Candidate],
+        objects: Sequence[str | None] = (),
     ) -> None:
         self._hand, self._velocity = hand_mean[:4].astype(float).reshape(2, 2)
         is_on_hand = np.hypot(*(goals - self._hand).T) < OFF_HAND
@@ -80,7 +86,7 @@ class SearchScene:
         kept = {*self._near.ids}
         self._others = obstacles.take([row for row, name in enumerate(obstacles.ids) if name not in kept])
         self._clearance, self._max_states = config.clearance, STATES + STATES_PER_CANDIDATE * config.max_candidates
-        self.names = find_names(self._hand, self._goals, self._near, config.clearance, previous)
+        self.names = find_names(self._hand, self._goals, self._near, config.clearance, previous, objects)
         ids, fitting = {*obstacles.ids}, [each for each in previous if each.goal < len(goals)]
         known = [PathClass(each.length, each.label, each.goal, each.sides, each.guess, each) for each in fitting]
         self.known = sorted([each for each in known if each.named <= ids], key=lambda each: each[:2])

@@ -26,10 +26,14 @@ STAY = 0.95
 
 
 class Turn(NamedTuple):
-    """How long a search may take, and the goal (row) at which it begins, so that all goals have their turn if time is short."""
+    """How long a search may take, and the goal (row) at which it begins, so that all goals have their turn if time is short.
+
+    objects: for each goal the id of the obstacle that it is, whether it holds the goal or not; None, or no entry, if it is none.
+    """
 
     deadline: Deadline = NEVER
     first_goal: int = 0
+    objects: Sequence[str | None] = ()
 
 
 ALL = Turn()
@@ -94,7 +98,7 @@ def search(
         search, they are returned as they are.
     turn : Turn, optional
         The deadline, and the goal at which the search begins. The first class to this goal, and to each goal without a previous
-        candidate, is searched whatever the time.
+        candidate, is searched whatever the time. Its objects do not block the ways to their goals.
 
     Returns
     -------
@@ -112,7 +116,7 @@ def search(
         raise SceneError('duration_s', f'one for each of the {len(goals)} goals', len(duration_s))
     if not len(goals):
         return Search(())
-    scene = SearchScene(hand_mean, goals, obstacles, config, previous)
+    scene = SearchScene(hand_mean, goals, obstacles, config, previous, turn.objects)
     ranking = _Ranking(scene, {each.label for each in previous}, turn.deadline)
     next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < turn.first_goal, goal)))
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))

@@ -257,8 +257,8 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
         stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
     errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
-    unknown = 0.0 if followed.prediction is None else followed.prediction.unknown
-    weights = weigh_candidates(paths.likelihoods, unknown)
+    shares = () if followed.prediction is None else (followed.prediction.unknown, followed.prediction.other)
+    weights = weigh_candidates(paths.likelihoods, *shares)
     force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0], find_crossing(need, errors))
     force = yield_to_hand(force, given.acceleration, YIELD_ACCELERATION)
     heading, line = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
@@ -295,16 +295,16 @@ def _find_bound(settings: GuidanceConfig, seen: SeenMargins, energy: float, forc
     return max(min(find_largest_force(settings), by_tank, slew * (distance - NEAR_M) / speed), 0.0)
 
 
-def weigh_candidates(likelihoods: Array, unknown: float) -> Array:
-    """Return the weights w_i (c,) of candidates with likelihoods p_i, where a share u is unknown.
+def weigh_candidates(likelihoods: Array, unknown: float = 0.0, other: float = 0.0) -> Array:
+    """Return the weights w_i (c,) of candidates with likelihoods p_i, where a share u is unknown, and o that of another goal.
 
-    What is unknown takes part without a force of its own, so that the force of the others does not grow by it. With the exponent
-    g of `SHARPNESS`,
+    Both take part without a force of their own, so that the force of the others does not grow by them. With the exponent g of
+    `SHARPNESS`,
 
-        w_i = p_i^g / (sum_i p_i^g + u^g).
+        w_i = p_i^g / (sum_i p_i^g + u^g + o^g).
     """
     powers = likelihoods**SHARPNESS
-    total = float(powers.sum()) + unknown**SHARPNESS
+    total = float(powers.sum()) + unknown**SHARPNESS + other**SHARPNESS
     weights: Array = powers / total if total > 0.0 else np.zeros(len(powers))
     return weights
 

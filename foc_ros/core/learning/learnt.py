@@ -27,11 +27,13 @@ DISPERSED_BY = ('foc', 'duration', 'covariance', 'estimator')
 class Knowledge(NamedTuple):
     """What a prediction is made with besides parameters and scene.
 
-    library: recorded paths; planning_spread: standard deviation of the logarithm of the operator's planning horizon.
+    library: recorded paths; planning_spread: standard deviation of the logarithm of the operator's planning horizon; objects: for
+    each goal the id of the obstacle that it is, None, or no entry, where none is named.
     """
 
     library: Library = NO_LIBRARY
     planning_spread: float = BETWEEN_OPERATORS
+    objects: tuple[str | None, ...] = ()
 
 
 NOTHING = Knowledge()

@@ -7,6 +7,7 @@ inside it, and n = d / D points away from the obstacle. Where q is a vertex n tu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,6 +117,15 @@ def measure_offsets(points: Array, obstacles: Obstacles, centres: Array | None =
     found = find_offset(relative[..., 0], relative[..., 1], tabulate_edges(obstacles.vertices, obstacles.corners))
     offsets = np.stack((found.normal_x, found.normal_y), axis=-1) * found.distance[..., None]
     return offsets, found.distance
+
+
+def find_holders(goals: Array, obstacles: Obstacles, objects: Sequence[str | None] = ()) -> NDArray[np.bool_]:
+    """Tell which of n obstacles are goals (g, 2) [m], (g, n): those that hold a goal, or are named as the object of it."""
+    is_held: NDArray[np.bool_] = measure_offsets(goals, obstacles)[1] < obstacles.radius
+    for row, name in enumerate(objects):
+        if name is not None:
+            is_held[row] |= np.array([each == name for each in obstacles.ids], dtype=bool)
+    return is_held
 
 
 TURN = 2.0 * np.pi

@@ -24,7 +24,7 @@ const toScene = (event) => scene.toScene(event);
 const hand = new Hand(canvas, toScene, (time) => moveHand(time, EVENT_MS));
 let isSceneChanged = false;
 const arranging = new Arranging(canvas, toScene, () => { isSceneChanged = true; });
-const view = { unknown: 0, scene: arranging.scene, selected: null, goal: null, phase: 'none', candidates: [], hand, hidden: false, touchedMs: -Infinity };
+const view = { unknown: 0, other: 0, scene: arranging.scene, selected: null, goal: null, phase: 'none', candidates: [], hand, hidden: false, touchedMs: -Infinity };
 // What the page measures: frames per second, the median time from an input to the drawn prediction that was made from it [ms], and
 // how many predictions were drawn.
 const measured = { fps: 0, delayMs: null, predictions: 0, delays: [] };
@@ -143,8 +143,8 @@ const handlers = {
   status({ level, text }) {
     showStatus(level, text);
   },
-  prediction({ event, candidates, unknown }) {
-    view.unknown = unknown;
+  prediction({ event, candidates, unknown, other }) {
+    [view.unknown, view.other] = [unknown, other];
     view.candidates = candidates.map(decode);
     predictedMs = performance.now();
     measured.predictions += 1;
@@ -232,7 +232,7 @@ let shownWays = '';
 // Writes the table of candidates, with bars in the colours of their paths, if it has changed.
 function showWays() {
   const rows = view.hidden ? [] : view.candidates.filter(({ likelihood }) => likelihood !== null);
-  if (rows.length && view.unknown >= 0.005) rows.push({ slot: null, likelihood: view.unknown, words: 'no likelihood is known', ghost: '' });
+  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
   const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost }) => [slot, Math.round(100 * likelihood), words, ghost]));
   if (key === shownWays) return;
   shownWays = key;

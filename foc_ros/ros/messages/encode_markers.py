@@ -114,11 +114,11 @@ class _MarkerEncoder:
             yield self.encode(name, 1000 * index + i, CYLINDER, faint, (*diameters[i], float(thick[i])), centre, angles[i])
 
     def encode_legend(self) -> Iterator[Any]:
-        """Yield the legend of the ellipses, below the hand, if any are drawn, and the share that is unknown, if there is one."""
+        """Yield the legend of the ellipses, below the hand, if any are drawn, and the shares that no candidate has."""
         for outcome in self.prediction.candidates_with_likelihood[:1]:
             (place,) = self._lift(outcome.solution.path[:1] - [0.0, LEGEND_BELOW_M])
-            share = self.prediction.unknown
-            text = f'{LEGEND}\n{100 * share:.0f} % unknown' if share > 0.0 else LEGEND
+            shares = (self.prediction.unknown, 'unknown'), (self.prediction.other, 'another goal')
+            text = '\n'.join([LEGEND, *(f'{100 * share:.0f} % {name}' for share, name in shares if share > 0.0)])
             yield self.encode('legend', 0, TEXT, GREY, (0, 0, TEXT_HEIGHT), place, text=text)
 
     def encode_obstacles(self, obstacles: Obstacles) -> Iterator[Any]:

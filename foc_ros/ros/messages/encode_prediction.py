@@ -39,8 +39,8 @@ CLOUD_ROW = np.dtype(
 of the class."""
 STAMP = 'stamp_ns:'
 """Beginning of the label with the stamp [ns] of a table of likelihoods, whose message has no header."""
-UNKNOWN = 'unknown'
-"""Label of the share that no candidate has."""
+UNKNOWN, OTHER = 'unknown', 'other'
+"""Labels of the shares that no candidate has: of classes that are unknown, and of a goal that nobody announced."""
 LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
 
 
@@ -88,15 +88,17 @@ def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     """Encode one row per candidate with a likelihood, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
 
     The first dimension's label joins the labels of the candidates by ';', and that of the third one, of size 1, has the stamp.
-    effort: the remaining one [m^2/s^6]. Where a share is unknown, a last row `UNKNOWN` has it, without the other numbers.
+    effort: the remaining one [m^2/s^6]. Shares that no candidate has come last, without the other numbers: rows `UNKNOWN` and
+    `OTHER`, each only if its share is above 0.
     """
     outcomes = order_candidates(prediction)
     ratios = compute_cost_ratios(outcomes)
     rows = [(o.likelihood, o.solution.effort, ratio, o.solution.eta) for o, ratio in zip(outcomes, ratios, strict=True)]
     names, width = [outcome.candidate.label for outcome in outcomes], len(LIKELIHOOD_COLUMNS)
-    if prediction.unknown > 0.0:
-        rows.append((prediction.unknown, math.nan, math.nan, math.nan))
-        names.append(UNKNOWN)
+    for name, share in ((UNKNOWN, prediction.unknown), (OTHER, prediction.other)):
+        if share > 0.0:
+            rows.append((share, math.nan, math.nan, math.nan))
+            names.append(name)
     labels = ';'.join(names)
     dimensions = [
         types.make('std_msgs/msg/MultiArrayDimension', label=label, size=size, stride=stride)

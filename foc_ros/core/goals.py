@@ -1,0 +1,105 @@
+"""How candidates to different goals are compared: by what it takes to be there in the same time.
+
+The effort of a movement falls with the fifth power of its duration, and a farther goal is given more time. By the efforts alone,
+a hand that moves fast would seem to go to the farthest goal. With T_i the time to go to goal i and v the speed of the hand, the
+goals are therefore compared for the common time
+
+    T = max(`LEAST_COMMON_S`, min_i min(T_i, `HALF_WAY` D_i / v)),
+
+with the distance D_i of the goal: the second term is what a hand half way of a minimum-jerk movement has left. M_i(T) is the
+least integral of squared jerk that brings the hand to rest at goal i at T, obstacles disregarded, and F_i that of a movement with
+T_i that arrives as the candidates do. Obstacles cost what the best candidate to the goal, of cost J_i, has beyond F_i, and this
+extra falls with the fifth power of time likewise. All candidates to a goal get the factor
+
+    (M_i(T) + max(J_i - F_i, 0) (T_i / T)^5) / J_i,
+
+so that ratios between candidates to one goal stay as they are.
+
+The hand may also go to a goal that nobody announced. Without obstacles, M_i(T) = 720 / T^5 (|g_i - e|^2 + (v T)^2 / 60), with e =
+x + v T / 2 the goal that takes least effort. As a density of the goal, M^-2 is a bivariate t distribution about e,
+
+    k(g) = s^2 / (pi (|g - e|^2 + s^2)^2),   s^2 = (v T)^2 / 60 + `foc.endpoint_stddev`^2.
+
+Announced goals are points, of which each is as likely as another; other goals are anywhere within A, the circle about the onset
+that is by `BEYOND` larger than the distance of the farthest goal. The odds of an other goal grow from those of
+`likelihood.other_goal` by the factor
+
+    (A mean_i k(g_i))^-c,   c = min(1, 2 distance from the onset / least distance of a goal from there):
+
+what a hand has done says all from half of the way on, and little as long as it has hardly moved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .hand.straight import compute_passing_effort, compute_straight_effort
+from .safety_preference import COST_FLOOR
+from .types import Array, HandState, PredictedCandidate
+
+LEAST_COMMON_S = 0.5
+"""Least common time: a hand that is at one goal may still go to another, and this takes a movement [s]."""
+HALF_WAY = 1.875
+"""Time left half way of a minimum-jerk movement, relative to remaining distance over speed there."""
+LEAST_SPREAD_M = 1e-3
+"""Least spread of end points, and least distance, with which probabilities of goals are computed [m]."""
+BEYOND = 1.5
+"""Farthest goal that nobody announced, relative to the farthest one that was."""
+
+
+def compare_goals(
+    candidates: Sequence[PredictedCandidate], hand: HandState, goals: Array, durations_s: Sequence[float], *, passing: bool
+) -> list[PredictedCandidate]:
+    """Return candidates of a hand that is moved by jerk, with costs that are comparable between goals.
+
+    goals (g, 2) [m], with the times to go [s]; passing: whether the hand passes its goal at any velocity.
+    """
+    best: dict[int, PredictedCandidate] = {}
+    for each in candidates:
+        goal = each.candidate.goal
+        if each.has_likelihood and (goal not in best or each.cost < best[goal].cost):
+            best[goal] = each
+    if len(best) < 2:
+        return list(candidates)
+    common_s, factors = find_common_time(hand, goals, durations_s), dict[int, float]()
+    state = hand.mean.reshape(3, 2)
+    for goal, each in best.items():
+        time_s, place = float(each.solution.times[-1]), goals[[goal]]
+        free = (compute_passing_effort if passing else compute_straight_effort)(state, place, np.array([time_s]))
+        least = compute_straight_effort(state, place, np.array([common_s]))
+        extra = max(each.cost - float(free[0]), 0.0) * (time_s / common_s) ** 5
+        factors[goal] = (float(least[0]) + extra + COST_FLOOR) / max(each.cost, COST_FLOOR)
+    return [
+        replace(each, cost=factors[each.candidate.goal] * max(each.cost, COST_FLOOR)) if each.candidate.goal in factors else each
+        for each in candidates
+    ]
+
+
+def find_common_time(hand: HandState, goals: Array, durations_s: Sequence[float]) -> float:
+    """Return the time to go for which goals (g, 2) [m] with times to go [s] are compared [s]."""
+    speed, nearest = math.hypot(*hand.mean[2:4]), float(np.hypot(*(goals - hand.mean[:2]).T).min())
+    shortest = min(durations_s)
+    return max(LEAST_COMMON_S, min(shortest, HALF_WAY * nearest / speed) if speed > 0.0 else shortest)
+
+
+def find_other_share(hand: HandState, goals: Array, durations_s: Sequence[float], prior: float, spread_m: float) -> float:
+    """Return the probability that the hand goes to none of the goals (g, 2) [m], with times to go [s].
+
+    prior: `likelihood.other_goal`, which holds at rest; spread_m: standard deviation of end points about their goal [m].
+    """
+    if hand.onset_position is None or prior == 0.0:
+        return prior
+    position, velocity = hand.mean[:2], hand.mean[2:4]
+    common_s = find_common_time(hand, goals, durations_s)
+    square = float(velocity @ velocity) * common_s**2 / 60.0 + max(spread_m, LEAST_SPREAD_M) ** 2
+    away = ((goals - position - velocity * (common_s / 2.0)) ** 2).sum(axis=1)
+    distances = np.hypot(*(goals - hand.onset_position).T)
+    density = float(np.mean(square / (np.pi * (away + square) ** 2)))
+    area = np.pi * (BEYOND * max(float(distances.max()), LEAST_SPREAD_M)) ** 2
+    moved = 2.0 * math.dist(position, hand.onset_position) / max(float(distances.min()), LEAST_SPREAD_M)
+    odds = prior / (1.0 - prior) * (area * density) ** -min(1.0, moved)
+    return odds / (1.0 + odds)
