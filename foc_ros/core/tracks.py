@@ -10,7 +10,10 @@ duration T over [a, T], resampled at N steps of (T - a) / N, that begins where t
 
 Likelihoods change gradually: with p_i of this prediction, l_i before (0 for a new class), and the time h between both,
 
-    l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`).
+    l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`),
+
+with the shares of the goals, and of a goal that nobody announced, as they are now: these follow from the movement of the hand,
+which is smooth, and not from what solver and search have found.
 """
 
 from __future__ import annotations
@@ -142,12 +145,14 @@ class Tracks(Record):
         if not any(each.way in before for each in taking_part):
             gain = 1.0
         weights = [(1.0 - gain) * before.get(each.way, 0.0) + gain * each.likelihood for each in taking_part]
-        mixed = [(1.0 - gain) * share + gain * now for share, now in zip(self.rest, rest, strict=True)]
-        left = [each if each >= LEAST_UNKNOWN else 0.0 for each in mixed]
-        total = sum(weights) + sum(left) or 1.0
-        ranked = [replace(each, likelihood=weight / total) for each, weight in zip(taking_part, weights, strict=True)]
+        weights = share_among_goals(weights, taking_part)
+        unknown = (1.0 - gain) * self.rest.unknown + gain * rest.unknown
+        unknown = unknown if unknown >= LEAST_UNKNOWN else 0.0
+        total = sum(weights) + unknown
+        factor = (1.0 - rest.other) / total if total else 1.0
+        ranked = [replace(each, likelihood=factor * weight) for each, weight in zip(taking_part, weights, strict=True)]
         ranked.sort(key=lambda each: (-each.likelihood, each.label))
-        return ranked + [each for each in predicted if not each.has_likelihood], Rest(*(each / total for each in left))
+        return ranked + [each for each in predicted if not each.has_likelihood], Rest(factor * unknown, rest.other)
 
     def choose_most_likely(self, predicted: Sequence[PredictedCandidate]) -> PredictedCandidate | None:
         """Return the most likely of ranked candidates; the one of before stays until another leads by more than `LEAD`."""
@@ -184,6 +189,16 @@ class Tracks(Record):
 
 
 NO_TRACKS = Tracks()
+
+
+def share_among_goals(weights: Sequence[float], candidates: Sequence[PredictedCandidate]) -> list[float]:
+    """Return weights with the same sum, of which each goal has the share that it has of the likelihoods of its candidates."""
+    goal = [each.candidate.goal for each in candidates]
+    if len(set(goal)) < 2:
+        return list(weights)
+    now, mixed = (np.bincount(goal, each) for each in ([each.likelihood for each in candidates], weights))
+    factors = now / np.where(mixed > 0.0, mixed, 1.0) * (mixed.sum() / (now.sum() or 1.0))
+    return [weight * float(factors[row]) for weight, row in zip(weights, goal, strict=True)]
 
 
 def count_shared(before: Candidate, now: Candidate) -> int | None:

@@ -7,7 +7,7 @@ bounds the outer gaps of the rows.
 An obstacle is open if some classes pass it on the left and others on the right. The next row is the first row of open obstacles
 that is still ahead of the hand. Where no row is ahead, the next decision is that between the goals. A class weaves through a row
 if it passes one obstacle on its right side, and another one, farther to the right, on its left side: it goes through several
-gaps of this row.
+gaps of this row. A row within which the goal of the class lies, or beyond it, is not gone through.
 """
 
 from __future__ import annotations
@@ -116,7 +116,10 @@ def find_decisions(
     row, is_left = row[order], is_left[:, order]
     turns_back = np.zeros_like(is_left)
     turns_back[:, 1:] = (is_left[:, 1:] > is_left[:, :-1]) & (row[1:] == row[:-1])
-    woven = np.logical_or.reduceat(turns_back, np.flatnonzero(np.diff(row, prepend=WALL)), axis=1).sum(axis=1)
+    begins = np.flatnonzero(np.diff(row, prepend=WALL))
+    far_end = np.maximum.reduceat(_find_extents(obstacles.take(order), direction)[1], begins)
+    is_passed = (goals @ direction)[goal][:, None] >= far_end
+    woven = (np.logical_or.reduceat(turns_back, begins, axis=1) & is_passed).sum(axis=1)
     is_next = row == row[0]
     return Decisions(_number_rows(is_left[:, is_next]), _number_rows(is_left), woven, open_obstacles[order[is_next]])
 
