@@ -38,7 +38,7 @@ BUSY_S = 0.5
 """Time that a prediction is computed after which the node is reported as busy [s]."""
 THROTTLE_S = 5.0
 """Shortest time between two log lines of one kind [s]."""
-REPORTED_NOTES = ('goal_inside', 'hand_inside', 'no_way')
+REPORTED_NOTES = ('hand_inside', 'no_way')
 """Notes of an incomplete prediction, each counted as `scene_` and its name."""
 
 
