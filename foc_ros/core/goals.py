@@ -101,5 +101,5 @@ def find_other_share(hand: HandState, goals: Array, durations_s: Sequence[float]
     density = float(np.mean(square / (np.pi * (away + square) ** 2)))
     area = np.pi * (BEYOND * max(float(distances.max()), LEAST_SPREAD_M)) ** 2
     moved = 2.0 * math.dist(position, hand.onset_position) / max(float(distances.min()), LEAST_SPREAD_M)
-    odds = prior / (1.0 - prior) * (area * density) ** -min(1.0, moved)
+    odds: float = prior / (1.0 - prior) * (area * density) ** -min(1.0, moved)
     return odds / (1.0 + odds)

@@ -212,9 +212,9 @@ def _solve(
     scene: _PredictionScene, config: Config, candidates: Sequence[Candidate], matched: Sequence[Track], deadline: Deadline
 ) -> list[PredictedCandidate]:
     """Solve the candidates, each from the solution of its track; return them with their numbers and predictive covariance."""
-    place = scene.in_the_way, scene.goals, scene.durations_s
     by_goal = {
-        row: build_problem(config, scene.hand, *(each[row] for each in place)) for row in {each.goal for each in candidates}
+        row: build_problem(config, scene.hand, scene.in_the_way[row], scene.goals[row], scene.durations_s[row])
+        for row in {each.goal for each in candidates}
     }
     earlier = [each.solution if each.solved_ns == each.seen_ns else None for each in matched]
     until = Deadline(whole=deadline, patience=PATIENCE)

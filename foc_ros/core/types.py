@@ -252,7 +252,8 @@ class Goal(Record):
         from .support import check_position  # it needs this module
 
         object.__setattr__(self, 'position', check_position('goal.position', self.position))
-        for field_name, text in (('name', self.name), ('object', self.object)):
+        texts: dict[str, Any] = {'name': self.name, 'object': self.object}
+        for field_name, text in texts.items():
             if text is not None and (not isinstance(text, str) or not text.strip()):
                 raise SceneError(f'goal.{field_name}', 'a text that is not empty', repr(text))
         super().__post_init__()

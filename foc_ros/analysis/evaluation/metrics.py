@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,10 +58,10 @@ def compute_brier_score(forecast: Forecast, question: Question) -> float:
     return float(((forecast.probability - truth) ** 2).sum() + question.unlisted * forecast.each_other**2)
 
 
-def summarise(scores: Scores, left_s: Array) -> dict[str, Any]:
+def summarise(scores: Scores, left_s: Array | None = None) -> dict[str, Any]:
     """Return all scores as plain values: means over the predictions and by tenths, reliability, and the final lead.
 
-    left_s (m,): time from each forecast to the end of its movement [s].
+    left_s (m,): time from each forecast to the end of its movement [s], without which the time of the lead is not known.
     """
     leads = find_final_leads(scores)
     return {
@@ -69,10 +69,15 @@ def summarise(scores: Scores, left_s: Array) -> dict[str, Any]:
         'expected_calibration_error': compute_calibration_error(scores),
         'right_from_half_way': _mean(scores.correct[scores.progress >= 0.5]),
         'leads_for_good_from': _mean(np.array([1.0 if row is None else scores.progress[row] for row in leads.values()])),
-        'leads_for_good_before_s': _mean(np.array([0.0 if row is None else left_s[row] for row in leads.values()])),
+        'leads_for_good_before_s': None if left_s is None else _mean(find_lead_times(leads, left_s)),
         'by_tenth': [_compute_means(scores, find_tenths(scores.progress) == number) for number in range(TENTHS)],
         'reliability': compute_reliability(scores),
     }
+
+
+def find_lead_times(leads: Mapping[int, int | None], left_s: Array) -> Array:
+    """Return the time before the end at which the right answer leads for good, for each recording [s]; 0 if it never does."""
+    return np.array([0.0 if row is None else left_s[row] for row in leads.values()])
 
 
 def find_tenths(progress: Array) -> NDArray[np.int64]:
