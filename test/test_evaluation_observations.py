@@ -30,7 +30,7 @@ from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes
 
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 24}
-PLAIN = replace_values(Config(), FAST | {'likelihood.planning_horizon_s': 1000.0})
+PLAIN = replace_values(Config(), FAST | {'likelihood.planning_horizon_s': 1000.0, 'likelihood.other_goal': 0.0})
 AHEAD = replace_values(PLAIN, {'likelihood.beta': 3.0, 'likelihood.planning_horizon_s': 0.0, 'likelihood.lookahead_s': 0.4})
 OBSTACLES = [(0.12, 0.0, 0.02), (0.22, 0.03, 0.02)]
 GOALS = [(0.32, 0.05), (0.32, -0.05)]
@@ -101,7 +101,7 @@ def test_the_same_recording_gives_the_same_observations(data: Path) -> None:
 
 def test_no_goal_is_true_for_predictions_with_other_goals(data: Path) -> None:
     class Changing:
-        name = 'changing'
+        name, goal = 'changing', None
 
         def items(self):
             """Yield three goals half way; the two earlier ones return with the next message of the tables."""
