@@ -1,7 +1,7 @@
 """Encoding of a prediction as a MarkerArray: paths, ellipses and labels of all candidates, and the uncertain obstacles.
 
-Each candidate has two ellipses of one standard deviation at a place: an inner one of the motor noise, which eta is about, and an
-outer one of the total uncertainty. The names of their namespaces and a legend say so. Where the height is predicted, they are
+Each candidate has ellipses of one standard deviation of the motor noise, which eta is about, and the most likely one also has those of
+the total uncertainty: of all candidates together they would cover the scene. The names of their namespaces and a legend say so. Where the height is predicted, they are
 cylinders of one standard deviation of it up and down.
 
 Every array first deletes the markers of the one before, and all markers expire after LIFETIME_S, so that the drawing of a
@@ -86,7 +86,7 @@ class _MarkerEncoder:
             colour, text = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
             found = 'estimated' if outcome.is_estimated else 'compromised'
             text += '' if outcome.is_solved else f', {found}: eta {outcome.eta:.3f}'
-            for name in ELLIPSE_STYLES:
+            for name in ELLIPSE_STYLES if index == 0 else (MOTOR,):
                 yield from self._encode_ellipses(name, index, outcome, colour)
         else:
             colour, text = GREY, outcome.reason
