@@ -1,8 +1,8 @@
 """Encoding of a prediction as a MarkerArray: paths, ellipses and labels of all candidates, and the uncertain obstacles.
 
-Each candidate has ellipses of one standard deviation of the motor noise, which eta is about. The most likely one also has outer ones
-of the total uncertainty; those of all candidates would cover the scene. The names of their namespaces and a legend say so. Where the
-height is predicted, they are cylinders of one standard deviation of it up and down.
+Each candidate has ellipses of one standard deviation of the motor noise, which eta is about. The most likely one also has outer
+ones of the total uncertainty; those of all candidates would cover the scene. The names of their namespaces and a legend say so.
+Where the height is predicted, they are cylinders of one standard deviation of it up and down.
 
 Every array first deletes the markers of the one before, and all markers expire after LIFETIME_S, so that the drawing of a
 prediction that is not renewed disappears.
