@@ -67,7 +67,7 @@ def draw_markers(axes: Any, array: Any, points_per_m: float) -> None:
                 axes.add_patch(Polygon(corners, color=colour, linewidth=0))
         elif marker.type == TEXT:
             size = marker.scale.z * points_per_m
-            axes.text(centre.x, centre.y, marker.text, color=colour, size=size, ha='center', va='center', clip_on=True)
+            axes.text(centre.x, centre.y, marker.text, color=colour, size=size, ha='center', va='center', clip_on=True, zorder=5)
 
 
 def draw_cloud(axes: Any, display: dict[str, Any], cloud: Any, points_per_m: float) -> None:
@@ -85,7 +85,7 @@ def draw_poses(axes: Any, display: dict[str, Any], poses: list[Any]) -> None:
     """Draw poses as arrows along their first axis, or as their first two axes in red and green."""
     for pose in poses:
         angle = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
-        length = display.get('Axes Length', display.get('Arrow Length'))
+        length = float(display.get('Axes Length') or display['Arrow Length'])
         arms = ((0.0, 'red'), (math.pi / 2, 'lime')) if display['Shape'] == 'Axes' else ((0.0, '#ff1900'),)
         for turn, colour in arms:
             end = (pose.position.x + length * math.cos(angle + turn), pose.position.y + length * math.sin(angle + turn))

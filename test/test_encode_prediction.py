@@ -186,6 +186,8 @@ def test_a_compromised_candidate_takes_part_and_says_so() -> None:
     assert made('likelihoods', ways).layout.dim[0].label == 'a;b'
     texts = [each.text for each in made('markers', ways).markers if each.ns == 'label']
     assert texts[1].endswith('30 %, compromised: eta 0.620')
+    unlikely = made('markers', prediction(outcome('a', 0.995), outcome('b', 0.005))).markers
+    assert [sum(each.ns == name for each in unlikely) for name in ('path', 'label')] == [2, 1]
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])

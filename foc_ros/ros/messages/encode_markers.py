@@ -36,7 +36,9 @@ MAX_DRAWN = 128
 """Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
 ARC_POINTS = 32
 """Points on a full circle of an outline."""
-THICKNESS, TEXT_HEIGHT = 0.002, 0.012
+THICKNESS, TEXT_HEIGHT = 0.002, 0.008
+LABELLED = 0.01
+"""Least likelihood of a candidate with a label: those of less likely ones would cover the others."""
 MOTOR, TOTAL = 'motor_noise', 'total_uncertainty'
 """Namespaces of the two ellipses."""
 ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
@@ -93,8 +95,10 @@ class _MarkerEncoder:
         points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[self._encode_point(*p) for p in points])
+        if outcome.has_likelihood and likelihood < LABELLED:
+            return
         label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goals))}) {text}'
-        yield self.encode('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
+        yield self.encode('label', index, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
 
     def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
         """Yield ellipses of one standard deviation about the mean, spread over the path."""
@@ -119,7 +123,7 @@ class _MarkerEncoder:
             (place,) = self._lift(outcome.solution.path[:1] - [0.0, LEGEND_BELOW_M])
             share = self.prediction.unknown
             text = f'{LEGEND}\n{100 * share:.0f} % unknown' if share > 0.0 else LEGEND
-            yield self.encode('legend', 0, TEXT, GREY, (0, 0, TEXT_HEIGHT), place, text=text)
+            yield self.encode('legend', 0, TEXT, (*GREY[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
 
     def encode_obstacles(self, obstacles: Obstacles) -> Iterator[Any]:
         near = self._find_nearest(obstacles)
