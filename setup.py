@@ -33,7 +33,6 @@ setup(
         'Development Status :: 4 - Beta',
         'Intended Audience :: Developers',
         'Intended Audience :: Science/Research',
-        'License :: OSI Approved :: Apache Software License',
         'Operating System :: POSIX :: Linux',
         'Programming Language :: Python :: 3 :: Only',
         *(f'Programming Language :: Python :: {version}' for version in ('3.11', '3.12', '3.13', '3.14')),
