@@ -71,7 +71,7 @@ endif
 
 $(STAMP): setup.py setup.cfg pyproject.toml
 	@$(CHECK_PYTHON)
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: foc_ros needs Python 3.11 or 3.12, and $(PYTHON) is $$($(PYTHON) -V); choose another, as in make setup PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: foc_ros needs Python 3.11 to 3.14, and $(PYTHON) is $$($(PYTHON) -V); choose another, as in make setup PYTHON=python3.12" >&2; exit 1; }
 	@echo "setup: creating .venv with $$($(PYTHON) -V)"
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 	@echo 'setup: installing foc_ros[$(EXTRAS)], some minutes'

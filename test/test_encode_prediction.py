@@ -147,6 +147,9 @@ def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
         by_name.setdefault(each.ns, []).append(each)
     assert sorted(by_name) == ['label', 'legend', 'motor_noise', 'obstacle', 'obstacle_deviation', 'path', 'total_uncertainty']
     assert all(len({each.id for each in group}) == len(group) for group in by_name.values())
+    assert len(by_name['motor_noise']) == 2 * len(by_name['total_uncertainty']), (
+        'the total uncertainty is that of the most likely path'
+    )
     assert [each.text for each in by_name['label']] == [
         'goal0:+l1 (left of 1) 70 %',
         'goal0:-l1 (right of 1) 30 %',
@@ -183,6 +186,8 @@ def test_a_compromised_candidate_takes_part_and_says_so() -> None:
     assert made('likelihoods', ways).layout.dim[0].label == 'a;b'
     texts = [each.text for each in made('markers', ways).markers if each.ns == 'label']
     assert texts[1].endswith('30 %, compromised: eta 0.620')
+    unlikely = made('markers', prediction(outcome('a', 0.995), outcome('b', 0.005))).markers
+    assert [sum(each.ns == name for each in unlikely) for name in ('path', 'label')] == [2, 1]
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
