@@ -10,17 +10,18 @@ from evaluation_samples import TWO_CLASSES, make_candidates, observation, record
 
 from foc_ros.analysis.evaluation.baselines import (
     BASELINES,
+    boltzmann_shares,
+    compute_straight_costs,
+    compute_straight_positions,
     forecast_straight_minimum_jerk,
     guess_constant_velocity,
     guess_nearest_gap,
     guess_shortest_path,
     make_baselines,
+    power_rule_shares,
 )
-from foc_ros.analysis.evaluation.cross_validation import compute_log_likelihoods
-from foc_ros.analysis.evaluation.forecasts import boltzmann_shares, power_rule_shares
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S
-from foc_ros.analysis.evaluation.minimum_jerk import compute_straight_costs, compute_straight_positions
-from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask, ask_main
+from foc_ros.analysis.evaluation.observations import GOAL, PATH_CLASS, TIMES_S, ask, ask_main
+from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT
 

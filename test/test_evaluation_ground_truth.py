@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foc_ros.analysis.evaluation.ground_truth import (
+from foc_ros.analysis.evaluation.observations import (
     RecordedPath,
     find_open_gaps,
     find_rows_ahead,

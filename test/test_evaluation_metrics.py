@@ -6,21 +6,19 @@ import numpy as np
 import pytest
 from evaluation_samples import TWO_CLASSES, make_candidates, observation, recorded
 
-from foc_ros.analysis.evaluation.cross_validation import choose_held_out
-from foc_ros.analysis.evaluation.forecasts import UNCERTAINTY, Forecast, power_rule_shares, published_shares
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S
-from foc_ros.analysis.evaluation.metrics import (
+from foc_ros.analysis.evaluation.baselines import UNCERTAINTY, Forecast, power_rule_shares, published_shares
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, TIMES_S, ask, find_relevant_obstacles
+from foc_ros.analysis.evaluation.report import compare_scores, make_verdict
+from foc_ros.analysis.evaluation.scores import (
     Scores,
-    compute_calibration_error,
+    choose_held_out,
+    compute_position_scores,
     compute_reliability,
     find_final_leads,
     find_tenths,
     score_forecasts,
     summarise,
 )
-from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
-from foc_ros.analysis.evaluation.verdict import compare_scores, make_verdict
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT
 
@@ -126,9 +124,9 @@ def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness() -
 
 def test_the_calibration_error_is_the_distance_of_confidence_and_share_correct() -> None:
     found = make_scores([0.95, 0.95, 0.95, 0.95, 0.55, 0.55], [1, 1, 1, 0, 0, 0])
-    assert compute_calibration_error(found) == pytest.approx((4 * 0.2 + 2 * 0.55) / 6)
+    assert summarise(found)['expected_calibration_error'] == pytest.approx((4 * 0.2 + 2 * 0.55) / 6)
     assert [each['count'] for each in compute_reliability(found)] == [0, 0, 0, 0, 0, 2, 0, 0, 0, 4]
-    assert compute_calibration_error(make_scores([0.75] * 4, [1, 1, 1, 0])) == pytest.approx(0.0)
+    assert summarise(make_scores([0.75] * 4, [1, 1, 1, 0]))['expected_calibration_error'] == pytest.approx(0.0)
 
 
 def test_the_interval_of_a_bin_is_that_of_a_bootstrap_over_recordings() -> None:

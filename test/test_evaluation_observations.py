@@ -10,16 +10,20 @@ import pytest
 from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.csv_recordings import EPOCH_NS, read_movements, read_scenes, write_movement
-from foc_ros.analysis.evaluation.forecasts import power_rule_shares
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S
+from foc_ros.analysis.evaluation.baselines import power_rule_shares
 from foc_ros.analysis.evaluation.observations import (
+    GAP,
+    GOAL,
+    PATH_CLASS,
+    TIMES_S,
     ObservedRecording,
+    ask,
+    find_relevant_obstacles,
     interpolate_path,
     interpolate_steps,
     observe,
     observe_in_order,
 )
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.recordings import BagRecording, find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core import tracks

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from evaluation_samples import H, make_candidates, observation, recorded
 
-from foc_ros.analysis.evaluation.position_metrics import compute_position_scores, find_denser_share
+from foc_ros.analysis.evaluation.scores import compute_position_scores, find_denser_share
 from foc_ros.core.types import LEFT, RIGHT
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
-from foc_ros.analysis.evaluation.singer import SETTINGS, _discretise, forecast_singer
+from foc_ros.analysis.evaluation.baselines import SINGER_SETTINGS, _discretise, forecast_singer
+from foc_ros.analysis.evaluation.observations import HORIZONS_S
 
 AHEAD = np.array(HORIZONS_S)
 
@@ -12,7 +12,7 @@ AHEAD = np.array(HORIZONS_S)
 @pytest.mark.parametrize('dt', [1e-3, 0.07, 1.0])
 def test_transition_and_added_covariance_are_the_closed_forms(dt: float) -> None:
     transition, added = _discretise(dt)
-    for row, (stddev, _, tau) in enumerate(SETTINGS):
+    for row, (stddev, _, tau) in enumerate(SINGER_SETTINGS):
         decay = np.exp(-dt / tau)
         expected = [[1.0, dt, tau**2 * (dt / tau - 1.0 + decay)], [0.0, 1.0, tau * (1.0 - decay)], [0.0, 0.0, decay]]
         np.testing.assert_allclose(transition[row], expected, rtol=1e-6, atol=1e-12)
@@ -25,8 +25,8 @@ def test_a_steady_motion_is_continued_and_an_uncertain_one_has_its_error() -> No
     positions = np.outer(stamps_ns / 1e9, [0.3, -0.1])
     mean, variance = forecast_singer(stamps_ns, positions, stamps_ns[[20, 99]], AHEAD)
     expected = positions[99] + AHEAD[:, None] * [0.3, -0.1]
-    np.testing.assert_allclose(mean[1], np.tile(expected, (len(SETTINGS), 1, 1)), atol=2e-3)
-    assert mean.shape == (2, len(SETTINGS), 3, 2) and (np.diff(variance, axis=2) > 0.0).all()
+    np.testing.assert_allclose(mean[1], np.tile(expected, (len(SINGER_SETTINGS), 1, 1)), atol=2e-3)
+    assert mean.shape == (2, len(SINGER_SETTINGS), 3, 2) and (np.diff(variance, axis=2) > 0.0).all()
 
 
 def test_a_forecast_knows_nothing_of_later_samples() -> None:

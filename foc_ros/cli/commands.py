@@ -166,10 +166,9 @@ def replay(
     check_bag(bag)
     if output is not None:
         check_new_bag(output)
-    from foc_ros.analysis import replay_files as files
-    from foc_ros.analysis.replay import Replay
-    from foc_ros.analysis.replay_guidance import GuidanceReplay
-    from foc_ros.analysis.replay_summary import Summary, facts
+    from foc_ros.analysis import replay_output as files
+    from foc_ros.analysis.replay import GuidanceReplay, Replay
+    from foc_ros.analysis.replay_output import Summary, facts
     from foc_ros.io.bags import BagReader
     from foc_ros.io.class_library import extend_library
     from foc_ros.io.terminal import show_address, show_table
