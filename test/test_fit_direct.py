@@ -43,30 +43,30 @@ GIVEN = {'likelihood.beta': 2.0, 'likelihood.weaving': 4.0}
 
 
 def test_a_sharp_peak_determines_both_parameters() -> None:
-    found = _make_table(lambda beta, weaving: -10.0 * ((beta - 6.0) ** 2 + (weaving - 2.0) ** 2)).estimate(GIVEN, 'how')
+    found = _make_table(lambda beta, weaving: -10.0 * ((beta - 6.0) ** 2 + (weaving - 2.0) ** 2)).estimate(GIVEN, 'how')[0]
     assert found.values == {'likelihood.beta': 6.0, 'likelihood.weaving': 2.0} and found.undetermined == {}
 
 
 def test_a_flat_profile_determines_nothing() -> None:
-    found = _make_table(lambda beta, weaving: -0.01 * ((beta - 6.0) ** 2 + (weaving - 2.0) ** 2)).estimate(GIVEN, 'how')
+    found = _make_table(lambda beta, weaving: -0.01 * ((beta - 6.0) ** 2 + (weaving - 2.0) ** 2)).estimate(GIVEN, 'how')[0]
     assert found.estimates == {} and set(found.undetermined) == set(GIVEN)
     assert found.undetermined['likelihood.beta'] == 'all values tried, 1 to 8, explain the recordings within 2 nat'
 
 
 def test_a_best_value_at_the_end_of_those_tried_determines_nothing() -> None:
-    found = _make_table(lambda beta, weaving: 10.0 * beta - 10.0 * (weaving - 2.0) ** 2).estimate(GIVEN, 'how')
+    found = _make_table(lambda beta, weaving: 10.0 * beta - 10.0 * (weaving - 2.0) ** 2).estimate(GIVEN, 'how')[0]
     assert found.values == {'likelihood.weaving': 2.0}
     assert found.undetermined == {'likelihood.beta': '8, the end of the values tried, explains the recordings best'}
 
 
 def test_the_bound_of_a_parameter_is_no_end_of_what_was_tried() -> None:
     values = np.append(0.0, VALUES)
-    found = _make_table(lambda beta, weaving: -10.0 * beta - 10.0 * (weaving - 2.0) ** 2, values).estimate(GIVEN, 'how')
+    found = _make_table(lambda beta, weaving: -10.0 * beta - 10.0 * (weaving - 2.0) ** 2, values).estimate(GIVEN, 'how')[0]
     assert found.values == {'likelihood.beta': 0.0, 'likelihood.weaving': 2.0}
 
 
 def test_where_only_a_sum_is_determined_one_part_is_kept_and_the_other_follows() -> None:
-    found = _make_table(lambda beta, weaving: -10.0 * (beta + weaving - 7.0) ** 2).estimate(GIVEN, 'how')
+    found = _make_table(lambda beta, weaving: -10.0 * (beta + weaving - 7.0) ** 2).estimate(GIVEN, 'how')[0]
     (name,), (kept,) = found.estimates, found.undetermined
     assert found.estimates[name].value == 7.0 - GIVEN[kept]
 
@@ -75,7 +75,7 @@ def test_resamples_scatter_as_the_mean_of_a_sample_does() -> None:
     data, tried = np.random.default_rng(6).normal(2.0, 0.5, 400), np.linspace(1.5, 2.5, 501)
     values = -0.5 * ((data[:, None] - tried) / 0.5) ** 2
     table = SettingTable(values, tuple({'likelihood.beta': each} for each in tried.tolist()))
-    found = table.estimate({'likelihood.beta': 2.0}, 'how').estimates['likelihood.beta']
+    found = table.estimate({'likelihood.beta': 2.0}, 'how')[0].estimates['likelihood.beta']
     assert [found.low, found.high] == pytest.approx(data.mean() + 1.96 * data.std() / 20 * np.array([-1, 1]), abs=0.008)
 
 

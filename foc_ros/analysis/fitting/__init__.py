@@ -133,9 +133,11 @@ class SettingTable:
             return variation, f'{best:.3g}, the end of the values tried, explains the recordings best'
         return variation, ''
 
-    def estimate(self, given: Setting, how: str) -> Findings:
-        """Return the values that are best for all recordings, with their intervals, and what is undetermined."""
+    def estimate(self, given: Setting, how: str) -> tuple[Findings, NDArray[np.intp]]:
+        """Return the values that are best for all recordings, with intervals, and what is undetermined; and the columns left."""
         columns, undetermined = self.determine(given)
+        if len(undetermined) == len(given):
+            return Findings(undetermined=undetermined), columns
         best = self.settings[self.find_best(columns)]
         values = np.nan_to_num(self.values[:, columns])
         drawn = resample(lambda rows: int(values[rows].sum(axis=0).argmax()), len(values)).astype(int)
@@ -145,4 +147,4 @@ class SettingTable:
             for name in given
             if name not in undetermined
         }
-        return Findings(estimates, undetermined=undetermined)
+        return Findings(estimates, undetermined=undetermined), columns

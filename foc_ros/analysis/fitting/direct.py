@@ -194,7 +194,7 @@ def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> Findings:
         for name in given
     }
     fine = innovations.tabulate(*finer.values())
-    return SettingTable(np.hstack([coarse.values, fine.values]), coarse.settings + fine.settings).estimate(given, how)
+    return SettingTable(np.hstack([coarse.values, fine.values]), coarse.settings + fine.settings).estimate(given, how)[0]
 
 
 def fit_fading(hands: Sequence[RecordedHand], config: Config) -> Findings:
@@ -202,13 +202,8 @@ def fit_fading(hands: Sequence[RecordedHand], config: Config) -> Findings:
     errors = [each for hand in hands if (each := _compute_fading_errors(hand, config)) is not None]
     if not errors:
         return Findings(undetermined={FADING: f'no movement lasts for {min(HORIZONS_S):g} s'})
-    given = config.estimator.acceleration_time_s
-    settings = [{FADING: time_s} for time_s in FADING_TIMES_S]
-    table = SettingTable.from_errors(np.array(errors), settings)
-    _, undetermined = table.determine({FADING: given})
-    return (
-        Findings(undetermined=undetermined) if undetermined else table.estimate({FADING: given}, 'velocities after accelerations')
-    )
+    table = SettingTable.from_errors(np.array(errors), [{FADING: time_s} for time_s in FADING_TIMES_S])
+    return table.estimate({FADING: config.estimator.acceleration_time_s}, 'velocities after accelerations')[0]
 
 
 def _compute_fading_errors(hand: RecordedHand, config: Config) -> Array | None:

@@ -264,7 +264,7 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> 
             continue
         share = float(np.mean([each[name] == value for each in drawn]))
         if value == before[name] and share < CONFIDENT:
-            found.undetermined[name] = f'no other value tried is better by more than chance ({100 * share:.0f} % of resamples)'
+            found.undetermined[name] = 'no other value tried is better by more than chance'
         elif isinstance(value, str):
             found.chosen |= {name: value} if value != before[name] else {}
         else:
@@ -345,7 +345,7 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> t
     rule = Baseline('foc', partial(forecast_shares, power_rule_shares), tuple(rules))
     rows = collect_all(partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], 'likelihood')
     table = SettingTable(np.array(rows), settings)
-    found, (columns, _) = table.estimate(given, 'likelihood of the classes taken'), table.determine(given)
+    found, columns = table.estimate(given, 'likelihood of the classes taken')
     missed = float(np.mean([question.truth not in question.given for each in questions for _, question in each]))
     if missed > MISSED:
         words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
@@ -397,7 +397,7 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> tup
         known = [each for each in densities if each is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(settings), np.nan))
     table, n = SettingTable(np.array(rows), settings), len(recordings)
-    found, (columns, _) = table.estimate(given, 'density of true positions'), table.determine(given)
+    found, columns = table.estimate(given, 'density of true positions')
     chosen = {'motor noise alone': np.zeros(n, dtype=np.intp), 'as given': np.full(n, settings.index(given))}
     chosen['fitted'] = np.full(n, table.find_best(columns))
     if is_cross_validated(recordings):
