@@ -30,7 +30,7 @@ from foc_ros.io.csv_tables import read_rows
 
 FITTED_TO = {PATH_CLASS: PATH_CLASS, GAP: PATH_CLASS, GOAL: GOAL}
 """The question by whose answers the settings of a predictor are chosen, for each question that it is scored by."""
-Table = dict[tuple[str, str], Array]
+LogLikelihoods = dict[tuple[str, str], Array]
 """Log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor."""
 SUBJECTS = {PATH_CLASS: 'Homotopy classes', GAP: 'Next gaps', GOAL: 'Goals'}
 OURS = 'likelihood-weighted'
@@ -94,7 +94,7 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
     return answer | {'verdict': make_verdict(answer)}
 
 
-def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> Table:
+def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> LogLikelihoods:
     recording, baselines = item
     questions = {name: ask_all(recording, name) for name in (PATH_CLASS, GOAL)}
     return {(name, each.name): compute_log_likelihoods(questions[name], each) for name in questions for each in baselines}

@@ -17,7 +17,7 @@ with motor noise alone, by the density of the true positions under the mixture o
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
 from typing import Any
@@ -257,10 +257,11 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> 
     if given in finalists and not is_better(scores[:, best], scores[:, finalists.index(given)]):
         best = finalists.index(given)
     before, after = flatten(given), flatten(finalists[best])
+    others = {name for model, names in CONSTANTS.items() for name in names if model != after['duration.model']}
     drawn, found = [flatten(finalists[each]) for each in winners], Findings()
     tried = [flatten(each) for each in settings]
     for name, value in after.items():
-        if all(each[name] == before[name] for each in tried):
+        if name in others or all(each[name] == before[name] for each in tried):
             continue
         share = float(np.mean([each[name] == value for each in drawn]))
         if value == before[name] and share < CONFIDENT:
@@ -269,8 +270,8 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> 
             found.chosen |= {name: value} if value != before[name] else {}
         else:
             # of another model of duration, a constant has no other values
-            values = [each[name] for each in drawn if each['duration.model'] == after['duration.model']] or [value]
-            found.estimates[name] = Estimate.from_resamples(name, value, values, 'predicted positions and classes')
+            values = [float(each[name]) for each in drawn if each['duration.model'] == after['duration.model']] or [float(value)]
+            found.estimates[name] = Estimate.from_resamples(name, float(value), values, 'predicted positions and classes')
         if value != before[name] and share < CONFIDENT:
             found.warnings.append(f'{name}: {value} is the best, but only in {100 * share:.0f} % of the resamples')
     positions = first_scores[1].mean(axis=1)
@@ -341,7 +342,7 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> t
         return Findings(undetermined=dict.fromkeys(LIKELIHOODS, reason)), {}
     given = {name: float(getattr(config.likelihood, name.partition('.')[2])) for name in LIKELIHOODS}
     settings = _list_likelihoods(given)
-    rules = [replace(config.likelihood, **{name.partition('.')[2]: value for name, value in each.items()}) for each in settings]
+    rules = [replace_values(config, each).likelihood for each in settings]
     rule = Baseline('foc', partial(forecast_shares, power_rule_shares), tuple(rules))
     rows = collect_all(partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], 'likelihood')
     table = SettingTable(np.array(rows), settings)
