@@ -94,6 +94,27 @@ def test_without_obstacles_goals_are_distinguished_and_margins_are_kept(
     assert answer['scores']['ways']['fitted'] > answer['scores']['ways']['uniform'] + 0.1
 
 
+def test_two_recordings_do_not_determine_the_likelihood(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer, config = _fit(write_tables(tmp_path / 'data', count=2), capsys)
+    kept = {
+        'likelihood.beta',
+        'likelihood.planning_horizon_s',
+        'likelihood.lookahead_s',
+        'likelihood.weaving',
+        'duration.arrival',
+    }
+    assert kept <= set(answer['undetermined'])
+    given = flatten(Config())
+    assert {name: flatten(config)[name] for name in kept} == {name: given[name] for name in kept}
+    assert answer['undetermined']['likelihood.beta'] == {
+        'given': given['likelihood.beta'],
+        'why': 'all values tried, 0.5 to 16, explain the recordings within 2 nat',
+    }
+    assert 'estimator.position_stddev' in answer['parameters']
+    shown = {row[0]: row[2] for row in fitting.format_parameters(answer)}
+    assert shown['likelihood.beta'] == 'kept'
+
+
 def test_strategy_fixed_keeps_its_tau_and_lambda_and_says_so(past_an_obstacle: Path, capsys: pytest.CaptureFixture[str]) -> None:
     answer, config = _fit(past_an_obstacle, capsys, **{'foc.strategy': 'fixed', 'foc.tau': 1e-4})
     assert not {'foc.tau', 'foc.lam', 'foc.eta'} & set(answer['parameters'])

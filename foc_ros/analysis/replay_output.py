@@ -12,7 +12,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from foc_ros.analysis.replay import GuidanceReplay, GuidanceStep, Replay, Step
+from foc_ros.analysis.replay import GuidanceReplay, Replay, Step
 from foc_ros.core.types import Status
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.json_output import encode_guidance, encode_prediction
@@ -24,81 +24,48 @@ from foc_ros.ros.messages.types import RosbagsTypes
 
 NODE = '/foc'
 """Name of the node in the topics of the output bag."""
-Consumer = Callable[[Step], object]
-"""Function that receives every step of a replay."""
-GuidanceConsumer = Callable[[Step, GuidanceStep], None]
-"""Function that receives every update of guidance, with the step before which it happens."""
 FAILED = 'candidate_'
 """The pipeline counts a candidate that was not solved under this prefix and its status."""
 
 
-def write_steps(reader: BagReader, writer: BagWriter, plane: str) -> Consumer:
-    """Return a consumer that copies the inputs to a bag and writes what a node would publish for each hand pose."""
-    types = RosbagsTypes(TYPESTORE)
+def replay_to(
+    reader: BagReader,
+    replay: Replay,
+    consumers: Sequence[Callable[[Step], object]],
+    guidance: GuidanceReplay | None = None,
+    output: Path | None = None,
+    predictions: TextIO | None = None,
+    updates: TextIO | None = None,
+) -> None:
+    """Pass every step of a recording to consumers, and write what was predicted.
 
-    def write(step: Step) -> None:
-        writer.copy(step.item, reader)
-        if step.prediction is not None:
-            for name, message in encode_outputs(step.prediction, step.prediction.obstacles, plane, types).items():
-                writer.write(f'{NODE}/{name}', message, step.item.log_ns)
-
-    return write
-
-
-def write_guidance(writer: BagWriter) -> GuidanceConsumer:
-    """Return a consumer that writes to a bag what a node would publish for each update of guidance."""
-    types = RosbagsTypes(TYPESTORE)
-
-    def write(step: Step, update: GuidanceStep) -> None:
-        for name, (_, encode) in GUIDANCE_OUTPUTS.items():
-            writer.write(f'{NODE}/{name}', encode(update.output, update.place, types), step.item.log_ns)
-
-    return write
-
-
-def list_steps(file: TextIO) -> Consumer:
-    """Return a consumer that writes the predictions as the elements of a JSON list."""
-
-    def write(step: Step) -> None:
-        if step.prediction is not None:
-            _write_element(file, encode_prediction(step.prediction))
-
-    return write
-
-
-def list_guidance(file: TextIO) -> GuidanceConsumer:
-    """Return a consumer that writes the updates of guidance as the elements of a JSON list."""
-
-    def write(_: Step, update: GuidanceStep) -> None:
-        _write_element(file, encode_guidance(update.stamp_ns, update.output))
-
-    return write
+    guidance: is updated between the steps; output: new bag for the inputs and what a node would publish; predictions, updates:
+    files for the elements of JSON lists of the predictions and of the updates of guidance.
+    """
+    types, plane = RosbagsTypes(TYPESTORE), replay.pipeline.config.plane
+    with ExitStack() as stack:
+        writer = None if output is None else stack.enter_context(BagWriter(output))
+        for step in replay.steps(show_progress(reader, 'replay', reader.message_count)):
+            for update in guidance.add(step) if guidance is not None else ():
+                if updates is not None:
+                    _write_element(updates, encode_guidance(update.stamp_ns, update.output))
+                for name, (_, encode) in GUIDANCE_OUTPUTS.items() if writer is not None else ():
+                    writer.write(f'{NODE}/{name}', encode(update.output, update.place, types), step.item.log_ns)
+            for consume in consumers:
+                consume(step)
+            if writer is not None:
+                writer.copy(step.item, reader)
+            if step.prediction is None:
+                continue
+            if predictions is not None:
+                _write_element(predictions, encode_prediction(step.prediction))
+            if writer is not None:
+                for name, message in encode_outputs(step.prediction, step.prediction.obstacles, plane, types).items():
+                    writer.write(f'{NODE}/{name}', message, step.item.log_ns)
 
 
 def _write_element(file: TextIO, element: object) -> None:
     file.write((',\n' if file.tell() else '\n') + json.dumps(element, allow_nan=False))
-
-
-def replay_to(
-    output: Path | None,
-    reader: BagReader,
-    replay: Replay,
-    guidance: GuidanceReplay | None,
-    consumers: Sequence[Consumer],
-    guided: Sequence[GuidanceConsumer],
-) -> None:
-    """Pass every step and every update of guidance to the consumers, and to the output bag if there is to be one."""
-    with ExitStack() as stack:
-        if output is not None:
-            writer = stack.enter_context(BagWriter(output))
-            consumers = [*consumers, write_steps(reader, writer, replay.pipeline.config.plane)]
-            guided = [*guided, write_guidance(writer)]
-        for step in replay.steps(show_progress(reader, 'replay', reader.message_count)):
-            for update in guidance.add(step) if guidance is not None else ():
-                for take in guided:
-                    take(step, update)
-            for consume in consumers:
-                consume(step)
 
 
 @dataclass

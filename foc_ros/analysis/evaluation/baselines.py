@@ -277,22 +277,16 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: Sequence[
     InputError
         If the name is taken or empty.
     """
-    BASELINES.register(name, partial(_make_baseline, name, forecast, settings))
+    BASELINES.register(name, (forecast, settings))
 
 
 def make_baselines(recordings: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[Baseline, ...]:
     """Return all registered predictors; published: the parameters that the recordings were replayed with."""
-    return tuple(BASELINES.get(name)(recordings, published) for name in BASELINES)
-
-
-def _make_baseline(
-    name: str,
-    forecast: ForecastFunction,
-    settings: Sequence[Any] | SettingsFunction,
-    recordings: Sequence[ObservedRecording],
-    published: LikelihoodConfig,
-) -> Baseline:
-    return Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings))
+    found = []
+    for name in BASELINES:
+        forecast, settings = BASELINES.get(name)
+        found.append(Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings)))
+    return tuple(found)
 
 
 def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
