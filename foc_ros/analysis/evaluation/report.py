@@ -57,10 +57,10 @@ REGIONS = {
 def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[str, Any]:
     """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON.
 
-    What is fitted is scored on recordings that it was not fitted to. `questions`: values of `metrics.summarise` by question and
+    What is fitted is scored on recordings that it was not fitted to. `questions`: values of `scores.summarise` by question and
     predictor; for `gap`, tenths and `right_from_half_way` count from row to row, else over the whole movement. `settings`: by
     question and predictor, the best for all recordings. `comparisons`: of the published predictions with each baseline, by
-    question. `positions`: values of `position_metrics.compute_position_scores`. `verdict`: sentences.
+    question. `positions`: values of `scores.compute_position_scores`. `verdict`: sentences.
     """
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
