@@ -49,8 +49,9 @@ def replay_to(
             for update in guidance.add(step) if guidance is not None else ():
                 if updates is not None:
                     _write_element(updates, encode_guidance(update.stamp_ns, update.output))
-                for name, (_, encode) in GUIDANCE_OUTPUTS.items() if writer is not None else ():
-                    writer.write(f'{NODE}/{name}', encode(update.output, update.place, types), step.item.log_ns)
+                if writer is not None:
+                    for name, (_, encode) in GUIDANCE_OUTPUTS.items():
+                        writer.write(f'{NODE}/{name}', encode(update.output, update.place, types), step.item.log_ns)
             for consume in consumers:
                 consume(step)
             if writer is not None:
