@@ -21,7 +21,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
-from scipy.stats import bootstrap
 
 from foc_ros.analysis.evaluation.baselines import (
     SINGER_SETTINGS,
@@ -63,16 +62,19 @@ NEGLIGIBLE = 1e-4
 """Likelihood below which a candidate is left out."""
 
 
-def _resampling() -> dict[str, Any]:
-    """Return how SciPy resamples: equal data give equal intervals."""
-    return {'n_resamples': RESAMPLES, 'method': 'percentile', 'random_state': np.random.default_rng(SEED)}
+def _bootstrap(data: tuple[NDArray[Any], ...], statistic: Callable[..., Any], **options: Any) -> Any:
+    """Resample by SciPy; equal data give equal intervals."""
+    from scipy.stats import bootstrap  # not before: worker processes do without its 30 MB
+
+    draws = np.random.default_rng(SEED)
+    return bootstrap(data, statistic, n_resamples=RESAMPLES, method='percentile', random_state=draws, **options)
 
 
 def resample(statistic: Callable[[NDArray[np.intp]], float], n: int) -> Array:
     """Return a statistic of the rows of the recordings, out of n, that are drawn in each resample, (RESAMPLES,)."""
     if n == 1:
         return np.full(RESAMPLES, float(statistic(np.zeros(1, dtype=np.intp))))
-    drawn = bootstrap((np.arange(n),), lambda rows: float(statistic(rows)), vectorized=False, **_resampling())
+    drawn = _bootstrap((np.arange(n),), lambda rows: float(statistic(rows)), vectorized=False)
     return np.asarray(drawn.bootstrap_distribution)
 
 
@@ -82,7 +84,7 @@ def compute_mean_interval(values: Array, recording: Array) -> list[float]:
     sums, counts = np.bincount(number, values), np.bincount(number)
     if len(sums) == 1:
         return [float(values.mean())] * 2
-    found = bootstrap((sums, counts), _divide_sums, paired=True, vectorized=True, **_resampling())
+    found = _bootstrap((sums, counts), _divide_sums, paired=True, vectorized=True)
     return [float(end) for end in found.confidence_interval]
 
 

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from foc_ros.analysis.evaluation.baselines import (
     Baseline,
@@ -327,7 +327,7 @@ def is_better(scores: Array, given: Array) -> bool:
     if n < 2:
         return False
     error = difference.std(axis=1, ddof=1) / np.sqrt(n)
-    return bool((difference.mean(axis=1) > student.ppf(CONFIDENT, n - 1) * error).any())
+    return bool((difference.mean(axis=1) > stdtrit(n - 1, CONFIDENT) * error).any())
 
 
 def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> tuple[Findings, dict[str, Any]]:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import bootstrap
 
 from foc_ros.analysis.parallel import collect_all
 from foc_ros.analysis.simulation import FOC, HUMAN_PATHS, NONE, OPERATORS
@@ -308,6 +307,8 @@ def estimate_mean(values: Array, seed: int) -> tuple[float | None, list[float] |
     finite = values[np.isfinite(values)]
     if not len(finite):
         return None, None
+    from scipy.stats import bootstrap  # not before: worker processes do without it
+
     mean = float(finite.mean())
     if len(finite) == 1:
         return mean, [mean, mean]
