@@ -58,15 +58,15 @@ setup(
     python_requires='>=3.11',
     install_requires=[
         'cyclopts>=5.1',
+        'joblib>=1.4',
         'mcap>=1.1',
         'numpy>=1.23',
-        'pebble>=5',
         'piqp>=0.6',
         'qpsolvers>=4.3',
         'PyYAML>=6.0',
         'rich>=13.0',
         'rosbags>=0.10',
-        'scipy>=1.9',
+        'scipy>=1.10',
     ],
     extras_require={
         # rclpy with Fast DDS and the common interfaces as wheels, for machines without a ROS installation
@@ -103,7 +103,7 @@ setup(
             'pytest-timeout>=2.2',
             'pytest-xdist>=3.3',
             'quadprog>=0.1.11',
-            'scipy>=1.9',
+            'scipy>=1.10',
             'selenium>=4.11',
             'setuptools>=70.1',
         ],

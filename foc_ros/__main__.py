@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 
-COMMANDS_NEED = ('cyclopts', 'mcap', 'pebble', 'rich', 'rosbags')
+COMMANDS_NEED = ('cyclopts', 'joblib', 'mcap', 'rich', 'rosbags')
 """Packages of the commands that the node does without."""
 
 

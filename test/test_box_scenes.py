@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.evaluation.evaluate import find_label_mismatches
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
-from foc_ros.analysis.evaluation.questions import GAP, PATH_CLASS, ask_all
+from foc_ros.analysis.evaluation.observations import GAP, PATH_CLASS, ObservedRecording, ask_all, observe
+from foc_ros.analysis.evaluation.report import find_label_mismatches
 from foc_ros.analysis.recordings import TableRecording, find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
@@ -78,11 +76,8 @@ def test_bags_of_the_folder_hold_cubes_that_are_read_back(folder: Path, tmp_path
     assert main(arguments) == 0
 
 
-def test_evaluate_and_its_report_take_the_folder(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr('foc_ros.analysis.parallel.open_executor', lambda *_: ThreadPoolExecutor(1))
-    assert main(['evaluate', str(folder), '--params', str(folder / 'parameters.yaml'), '--json']) == 0
+def test_evaluate_and_its_report_take_the_folder(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['evaluate', str(folder), '--params', str(folder / 'parameters.yaml'), '--workers', '1', '--json']) == 0
     answer = json.loads(capsys.readouterr().out)
     assert (answer['recordings'], answer['failed'], answer['labels_not_taken']) == (2, {}, {})
 

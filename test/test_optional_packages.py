@@ -16,7 +16,7 @@ import ros_helpers
 from ros_helpers import Graph
 
 ROOT = Path(__file__).parents[1]
-OPTIONAL = ('cyclopts', 'distributed', 'jinja2', 'matplotlib', 'mcap', 'pebble', 'pydantic', 'rich', 'rosbags', 'tornado')
+OPTIONAL = ('cyclopts', 'distributed', 'jinja2', 'joblib', 'matplotlib', 'mcap', 'pydantic', 'rich', 'rosbags', 'tornado')
 """Packages that are blocked below: as where only package.xml was installed."""
 BLOCK = f"""
 import sys
@@ -86,7 +86,7 @@ def test_the_blocked_packages_cannot_be_imported(package: str) -> None:
 def test_a_command_names_the_packages_that_it_needs() -> None:
     result = run("from foc_ros.__main__ import main\nsys.exit(main(['solve', 'scene.yaml']))")
     assert result.returncode == 2
-    names = 'cyclopts mcap pebble rich rosbags'
+    names = 'cyclopts joblib mcap rich rosbags'
     assert result.stderr == f'foc_ros: this command needs packages that are not installed: pip install {names}\n'
 
 

@@ -1,4 +1,8 @@
-"""Displacement errors and densities of predicted positions, and the coverage of predicted ellipses and regions.
+"""Scores of forecasts and of predicted positions against the truth, with intervals, and what is chosen by held-out scores.
+
+Intervals are bootstrap intervals over recordings (Efron 1979, doi:10.1214/aos/1176344552), because predictions within one are not
+independent. Every setting is tried on every recording once, and each recording is scored with the setting best for the others, so
+that what it says about itself never helps it.
 
 The ellipse of a candidate says where the hand is if it follows this candidate. The whole prediction is the mixture of all
 candidates, each with its likelihood. Its smallest region of probability p is where the density f is above a level (Hyndman 1996,
@@ -11,21 +15,37 @@ This is summed over the same points of every candidate: rings of equal probabili
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from foc_ros.analysis.evaluation.baselines import (
+    SINGER_SETTINGS,
+    Baseline,
+    Forecast,
+    compute_straight_costs,
+    compute_straight_positions,
+    forecast_singer,
+)
+from foc_ros.analysis.evaluation.observations import (
+    HORIZONS_S,
+    TIMES_S,
+    Observation,
+    ObservedRecording,
+    Question,
+    Questions,
+    ask_main,
+)
 from foc_ros.core.types import Array
 
-from .cross_validation import choose_held_out
-from .ground_truth import HORIZONS_S, TIMES_S
-from .minimum_jerk import compute_straight_costs, compute_straight_positions
-from .observations import Observation, ObservedRecording
-from .questions import ask_main
-from .singer import SETTINGS, forecast_singer
-
+RESAMPLES = 1000
+SEED = 1
+CENTRAL = (2.5, 97.5)
+"""Percentiles of an interval of 95 %."""
+TENTHS, BINS = 10, 10
 LEVELS = (0.5, 0.9)
 """Probabilities of the ellipses and regions."""
 TIMES = np.array(TIMES_S)
@@ -40,6 +60,169 @@ GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 """Angle from ring to ring [rad], so that no two have their points in the same directions."""
 NEGLIGIBLE = 1e-4
 """Likelihood below which a candidate is left out."""
+
+
+def _bootstrap(data: tuple[NDArray[Any], ...], statistic: Callable[..., Any], **options: Any) -> Any:
+    """Resample by SciPy; equal data give equal intervals."""
+    from scipy.stats import bootstrap  # not before: worker processes do without its 30 MB
+
+    draws = np.random.default_rng(SEED)
+    return bootstrap(data, statistic, n_resamples=RESAMPLES, method='percentile', random_state=draws, **options)
+
+
+def resample(statistic: Callable[[NDArray[np.intp]], float], n: int) -> Array:
+    """Return a statistic of the rows of the recordings, out of n, that are drawn in each resample, (RESAMPLES,)."""
+    if n == 1:
+        return np.full(RESAMPLES, float(statistic(np.zeros(1, dtype=np.intp))))
+    drawn = _bootstrap((np.arange(n),), lambda rows: float(statistic(rows)), vectorized=False)
+    return np.asarray(drawn.bootstrap_distribution)
+
+
+def compute_mean_interval(values: Array, recording: Array) -> list[float]:
+    """Return the interval of 95 % [low, high] of the mean of values (m,), at least one, from recordings (m,)."""
+    _, number = np.unique(recording, return_inverse=True)
+    sums, counts = np.bincount(number, values), np.bincount(number)
+    if len(sums) == 1:
+        return [float(values.mean())] * 2
+    found = _bootstrap((sums, counts), _divide_sums, paired=True, vectorized=True)
+    return [float(end) for end in found.confidence_interval]
+
+
+def _divide_sums(sums: Array, counts: Array, axis: int) -> Array:
+    return np.asarray(sums.sum(axis=axis) / counts.sum(axis=axis))
+
+
+def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
+    """Return the sum of the log-likelihoods of the true answers under each setting of a predictor, (s,)."""
+    return np.array(
+        [
+            sum(np.log([baseline.forecast(*each, setting).true_probability(each[1]) for each in questions]))
+            for setting in baseline.settings
+        ]
+    )
+
+
+def choose_held_out(table: Array, groups: Sequence[Hashable]) -> NDArray[np.intp]:
+    """Choose for each recording the setting (r,) that is best for the recordings of all other groups, the first of equal ones.
+
+    table (r, s): log-likelihoods of recordings under settings; groups: the group of each recording. Where each is its own group,
+    this is leave-one-out cross-validation. A single group has no others, and all recordings are used.
+    """
+    rows = {group: [row for row, each in enumerate(groups) if each == group] for group in groups}
+    total = table.sum(axis=0)
+    best = {group: int((total - table[own].sum(axis=0) if len(rows) > 1 else total).argmax()) for group, own in rows.items()}
+    return np.array([best[group] for group in groups], dtype=np.intp)
+
+
+class Scores(NamedTuple):
+    """The m forecasts of one predictor for one question.
+
+    recording (m,): its number; progress (m,) in [0, 1]; possible (m,): number of possible answers; log_likelihood (m,): of the
+    true answer; confidence (m,): probability of the likeliest answer; correct (m,): whether that is the true one, a part of 1
+    if one of several; brier (m,).
+    """
+
+    recording: Array
+    progress: Array
+    possible: Array
+    log_likelihood: Array
+    confidence: Array
+    correct: Array
+    brier: Array
+
+
+def score_forecasts(rows: Iterable[tuple[int, float, Question, Forecast]]) -> Scores:
+    """Score forecasts, at least one, given with the number of the recording, progress and question."""
+    scored = [
+        (
+            number,
+            progress,
+            question.possible,
+            np.log(forecast.true_probability(question)),
+            forecast.confidence(),
+            forecast.correctness(question),
+            compute_brier_score(forecast, question),
+        )
+        for number, progress, question, forecast in rows
+    ]
+    return Scores(*np.array(scored, dtype=float).T)
+
+
+def compute_brier_score(forecast: Forecast, question: Question) -> float:
+    """Return the squared error of the probabilities, summed over all possible answers (Brier 1950)."""
+    truth = np.zeros(len(question.answers))
+    truth[question.truth] = 1.0
+    return float(((forecast.probability - truth) ** 2).sum() + question.unlisted * forecast.each_other**2)
+
+
+def summarise(scores: Scores) -> dict[str, Any]:
+    """Return all scores as plain values: means over the predictions and by tenths, reliability, and the final lead.
+
+    The expected calibration error is the mean distance of confidence and share correct over the bins (Naeini et al. 2015).
+    """
+    reliability, n = compute_reliability(scores), len(scores.confidence)
+    bins = [each for each in reliability if each['count']]
+    return {
+        **_compute_means(scores, np.ones(len(scores.recording), dtype=bool)),
+        'expected_calibration_error': sum(each['count'] * abs(each['confidence'] - each['right']) for each in bins) / n,
+        'right_from_half_way': _mean(scores.correct[scores.progress >= 0.5]),
+        'leads_for_good_from': _mean(np.array(list(find_final_leads(scores).values()))),
+        'by_tenth': [_compute_means(scores, find_tenths(scores.progress) == number) for number in range(TENTHS)],
+        'reliability': reliability,
+    }
+
+
+def find_tenths(progress: Array) -> NDArray[np.int64]:
+    """Return the tenth, 0 to 9, in which each share lies."""
+    # 0.7 / 0.1 falls short of 7
+    return np.clip(np.floor(progress * TENTHS + 1e-9), 0, TENTHS - 1).astype(np.int64)
+
+
+def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
+    """Return count, mean confidence and share of correct answers for each bin of the confidence in the likeliest answer.
+
+    interval: of the share, 95 % by bootstrap over the recordings; None without a prediction.
+    """
+    number = np.minimum((scores.confidence * BINS).astype(int), BINS - 1)
+    return [
+        {
+            'from': each / BINS,
+            'to': (each + 1) / BINS,
+            'count': int(inside.sum()),
+            'confidence': _mean(scores.confidence[inside]),
+            'right': _mean(scores.correct[inside]),
+            'interval': compute_mean_interval(scores.correct[inside], scores.recording[inside]) if inside.any() else None,
+        }
+        for each in range(BINS)
+        for inside in [number == each]
+    ]
+
+
+def find_final_leads(scores: Scores) -> dict[int, float]:
+    """Return, for each recording, the progress after which the likeliest answer stays correct to the end; 1 if it never does."""
+    found = {}
+    for recording in np.unique(scores.recording).astype(int).tolist():
+        rows = np.flatnonzero(scores.recording == recording)
+        wrong = np.flatnonzero(scores.correct[rows] < 1.0)
+        first = int(wrong[-1]) + 1 if len(wrong) else 0
+        found[recording] = float(scores.progress[rows[first]]) if first < len(rows) else 1.0
+    return found
+
+
+def _compute_means(scores: Scores, chosen: NDArray[np.bool_]) -> dict[str, Any]:
+    uniform = -np.log(scores.possible)
+    return {
+        'predictions': int(chosen.sum()),
+        'log_likelihood': _mean(scores.log_likelihood[chosen]),
+        'uniform': _mean(uniform[chosen]),
+        'gain': _mean((scores.log_likelihood - uniform)[chosen]),
+        'brier': _mean(scores.brier[chosen]),
+        'right': _mean(scores.correct[chosen]),
+    }
+
+
+def _mean(values: Array) -> float | None:
+    return float(values.mean()) if len(values) else None
 
 
 def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str, Any]:
@@ -111,7 +294,7 @@ def _tabulate_singer(recording: ObservedRecording) -> Array:
     mean, variance = forecast_singer(path.stamps_ns, path.positions, stamps_ns, TIMES[HORIZONS])
     true = np.array([each.truth.positions[HORIZONS] for each in observations])
     squared = ((true[:, None] - mean) ** 2).sum(axis=-1)
-    found = np.full((len(observations), len(SETTINGS), len(TIMES)), np.nan)
+    found = np.full((len(observations), len(SINGER_SETTINGS), len(TIMES)), np.nan)
     found[:, :, HORIZONS] = np.log(2.0 * np.pi * variance) + squared / (2.0 * variance)
     return found
 

@@ -1,21 +1,72 @@
-"""The summary of a replay: counts of predictions, rejections and failures, and computing times."""
+"""What a replay leaves: predictions and guidance as JSON, an output bag, and a summary of counts and computing times."""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, TextIO
 
 import numpy as np
 
+from foc_ros.analysis.replay import GuidanceReplay, Replay, Step
 from foc_ros.core.types import Status
+from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
+from foc_ros.io.json_output import encode_guidance, encode_prediction
+from foc_ros.io.terminal import show_progress
 from foc_ros.io.topics import HAND
+from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS
+from foc_ros.ros.messages.encode_prediction import encode_outputs
+from foc_ros.ros.messages.types import RosbagsTypes
 
-from .replay import Step
-
+NODE = '/foc'
+"""Name of the node in the topics of the output bag."""
 FAILED = 'candidate_'
 """The pipeline counts a candidate that was not solved under this prefix and its status."""
+
+
+def replay_to(
+    reader: BagReader,
+    replay: Replay,
+    consumers: Sequence[Callable[[Step], object]],
+    guidance: GuidanceReplay | None = None,
+    output: Path | None = None,
+    predictions: TextIO | None = None,
+    updates: TextIO | None = None,
+) -> None:
+    """Pass every step of a recording to consumers, and write what was predicted.
+
+    guidance: is updated between the steps; output: new bag for the inputs and what a node would publish; predictions, updates:
+    files for the elements of JSON lists of the predictions and of the updates of guidance.
+    """
+    types, plane = RosbagsTypes(TYPESTORE), replay.pipeline.config.plane
+    with ExitStack() as stack:
+        writer = None if output is None else stack.enter_context(BagWriter(output))
+        for step in replay.steps(show_progress(reader, 'replay', reader.message_count)):
+            for update in guidance.add(step) if guidance is not None else ():
+                if updates is not None:
+                    _write_element(updates, encode_guidance(update.stamp_ns, update.output))
+                if writer is not None:
+                    for name, (_, encode) in GUIDANCE_OUTPUTS.items():
+                        writer.write(f'{NODE}/{name}', encode(update.output, update.place, types), step.item.log_ns)
+            for consume in consumers:
+                consume(step)
+            if writer is not None:
+                writer.copy(step.item, reader)
+            if step.prediction is None:
+                continue
+            if predictions is not None:
+                _write_element(predictions, encode_prediction(step.prediction))
+            if writer is not None:
+                for name, message in encode_outputs(step.prediction, step.prediction.obstacles, plane, types).items():
+                    writer.write(f'{NODE}/{name}', message, step.item.log_ns)
+
+
+def _write_element(file: TextIO, element: object) -> None:
+    file.write((',\n' if file.tell() else '\n') + json.dumps(element, allow_nan=False))
 
 
 @dataclass

@@ -1,26 +1,27 @@
-"""Forecasts and their scores, against values computed by hand."""
+"""Forecasts, their scores and the regions of positions, against values computed by hand."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from evaluation_samples import TWO_CLASSES, make_candidates, observation, recorded
+from evaluation_samples import TWO_CLASSES, H, make_candidates, observation, recorded
 
-from foc_ros.analysis.evaluation.cross_validation import choose_held_out
-from foc_ros.analysis.evaluation.forecasts import UNCERTAINTY, Forecast, power_rule_shares, published_shares
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S
-from foc_ros.analysis.evaluation.metrics import (
+from foc_ros.analysis.evaluation.baselines import UNCERTAINTY, Forecast, power_rule_shares, published_shares
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, TIMES_S, ask, find_relevant_obstacles
+from foc_ros.analysis.evaluation.report import compare_scores, make_verdict
+from foc_ros.analysis.evaluation.scores import (
     Scores,
-    compute_calibration_error,
+    choose_held_out,
+    compute_position_scores,
     compute_reliability,
+    find_denser_share,
     find_final_leads,
     find_tenths,
     score_forecasts,
     summarise,
 )
-from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
-from foc_ros.analysis.evaluation.verdict import compare_scores, make_verdict
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT
 
@@ -126,9 +127,9 @@ def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness() -
 
 def test_the_calibration_error_is_the_distance_of_confidence_and_share_correct() -> None:
     found = make_scores([0.95, 0.95, 0.95, 0.95, 0.55, 0.55], [1, 1, 1, 0, 0, 0])
-    assert compute_calibration_error(found) == pytest.approx((4 * 0.2 + 2 * 0.55) / 6)
+    assert summarise(found)['expected_calibration_error'] == pytest.approx((4 * 0.2 + 2 * 0.55) / 6)
     assert [each['count'] for each in compute_reliability(found)] == [0, 0, 0, 0, 0, 2, 0, 0, 0, 4]
-    assert compute_calibration_error(make_scores([0.75] * 4, [1, 1, 1, 0])) == pytest.approx(0.0)
+    assert summarise(make_scores([0.75] * 4, [1, 1, 1, 0]))['expected_calibration_error'] == pytest.approx(0.0)
 
 
 def test_the_interval_of_a_bin_is_that_of_a_bootstrap_over_recordings() -> None:
@@ -214,3 +215,54 @@ def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is
     flat = np.log(2 * np.pi)
     assert scores['nlpd']['foc'] == {'0.25': pytest.approx(flat + 2.0), '0.5': pytest.approx(flat + 8.0), '1': None}
     assert scores['nlpd']['Singer Kalman']['0.5'] > 0.0
+
+
+def test_the_region_of_one_gaussian_is_its_ellipse() -> None:
+    covariance = np.array([[4.0, 1.0], [1.0, 2.0]])
+    root = np.linalg.cholesky(covariance)
+    for level in (0.5, 0.9):
+        border = root @ np.array([0.6, 0.8]) * np.sqrt(-2.0 * np.log(1.0 - level))
+        positions = np.array([3.0, -1.0]) + np.array([0.99, 1.01])[:, None] * border
+        found = find_denser_share(np.ones(1), np.full((1, 2, 2), [3.0, -1.0]), np.tile(covariance, (1, 2, 1, 1)), positions)
+        assert found[0] < level < found[1]
+
+
+@pytest.mark.parametrize('apart', [0.0, 1.5, 10.0])
+def test_the_region_holds_its_share_of_samples(apart: float) -> None:
+    draws, count = np.random.default_rng(5), 4000
+    likelihood = np.array([0.6, 0.3, 0.1])
+    mean = apart * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    covariance = np.array([np.diag([1.0, 1.0]), [[2.0, 0.9], [0.9, 0.5]], np.diag([0.1, 0.1])])
+    component = draws.choice(3, count, p=likelihood)
+    positions = mean[component] + np.einsum(
+        'nij,nj->ni', np.linalg.cholesky(covariance)[component], draws.standard_normal((count, 2))
+    )
+    many = count, 1, 1
+    found = find_denser_share(
+        likelihood, np.tile(mean[:, None], (1, count, 1)), np.tile(covariance[:, None], (1, *many)), positions
+    )
+    for level in (0.5, 0.9):
+        assert np.mean(found < level) == pytest.approx(level, abs=0.03)
+
+
+def test_a_position_in_a_less_likely_class_is_in_the_region_and_not_in_the_ellipse_of_the_likeliest() -> None:
+    two = make_candidates([[LEFT], [RIGHT]], likelihood=[0.6, 0.4])
+    two = replace(two, mean=np.stack([np.zeros((H, 2)), np.full((H, 2), [10.0, 0.0])]))
+    true = np.full((H, 2), [11.6, 0.0])
+    true[-1] = np.nan
+    scores = compute_position_scores([recorded(observation(two, positions=true, true_sides=(RIGHT,)))])
+    assert scores['inside']['0.9'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
+    assert scores['inside_taken']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
+    assert scores['inside_all']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
+    assert scores['inside_all']['0.5'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
+
+
+def test_positions_are_scored_given_what_is_known() -> None:
+    """The unknown share has no path, and so no part in the density of positions."""
+    scores = []
+    for known in (1.0, 0.5):
+        two = make_candidates([[LEFT], [RIGHT]], likelihood=[0.6 * known, 0.4 * known])
+        two = replace(two, mean=np.stack([np.zeros((H, 2)), np.full((H, 2), [1.0, 0.0])]))
+        scores.append(compute_position_scores([recorded(observation(two, positions=np.full((H, 2), [0.5, 0.2])))]))
+    for name in ('nlpd', 'inside_all', 'displacement_m'):
+        assert str(scores[0][name]) == str(scores[1][name])
