@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from foc_ros.core.plant.models import PlantModel as PlantModel
     from foc_ros.core.plant.plants import Plant as Plant
     from foc_ros.core.types import Candidate as Candidate
+    from foc_ros.core.types import Goal as Goal
     from foc_ros.core.types import HandState as HandState
     from foc_ros.core.types import Obstacles as Obstacles
     from foc_ros.core.types import PredictedCandidate as PredictedCandidate
@@ -51,7 +52,7 @@ _MODULES = {
     'core.obstacles.shapes': 'Box Capsule Circle Hull',
     'core.ocp.monte_carlo': 'MonteCarlo',
     'core.ocp.strategies': 'StrategyResult',
-    'core.types': 'Candidate HandState Obstacles PredictedCandidate Status',
+    'core.types': 'Candidate Goal HandState Obstacles PredictedCandidate Status',
 }
 _MODULE_OF = {name: f'{__name__}.{module}' for module, names in _MODULES.items() for name in names.split()}
 

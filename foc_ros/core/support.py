@@ -37,6 +37,13 @@ def check_vector(field: str, value: ArrayLike, length: int) -> Array:
     return check_array(field, value, (length,))
 
 
+def check_position(field: str, value: ArrayLike) -> Array:
+    """Return a new array (2,) or (3,) of a position in the plane [m], with or without a height; raise SceneError otherwise."""
+    if find_shape(value) not in ((2,), (3,)):
+        raise SceneError(field, 'two numbers [m] in the task plane, or three with the height over it', repr(value))
+    return check_vector(field, value, find_shape(value)[0])
+
+
 def check_number(field: str, value: object, low: float = -FARTHEST, high: float = FARTHEST) -> float:
     """Return a finite number within bounds; raise SceneError otherwise."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):

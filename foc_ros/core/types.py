@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .errors import SceneError
+
 Array = NDArray[np.float64]
 
 NANOSECONDS = 1_000_000_000
@@ -208,6 +210,46 @@ def make_obstacles(
         corners,
         np.full((n, 2), heights, dtype=float),
     )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Goal(Record):
+    """A position to which the hand may be going.
+
+    Parameters
+    ----------
+    position : array_like of shape (2,) or (3,)
+        In the task plane [m]; a third number is the height over it.
+    name : str, optional
+        What predictions call the goal; by default ``goal0`` and so on, by its place in the list of goals.
+
+    Raises
+    ------
+    SceneError
+        For a wrong shape, a number that is not finite, or a name that is no text or empty.
+
+    Examples
+    --------
+    >>> import foc_ros
+    >>> foc_ros.Goal((0.3, 0.0), name='bowl')
+    <Goal bowl at (0.3, 0) m>
+    """
+
+    position: ArrayLike
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        from .support import check_position  # it needs this module
+
+        object.__setattr__(self, 'position', check_position('goal.position', self.position))
+        if self.name is not None and (not isinstance(self.name, str) or not self.name.strip()):
+            raise SceneError('goal.name', 'a text that is not empty', repr(self.name))
+        super().__post_init__()
+
+    def __repr__(self) -> str:
+        """Say name and position."""
+        numbers = ', '.join(f'{each:g}' for each in np.asarray(self.position).tolist())
+        return f'<Goal {self.name + " " if self.name else ""}at ({numbers}) m>'
 
 
 def describe_class(sides: Iterable[tuple[str, int]], goal: str = '') -> str:
