@@ -250,6 +250,9 @@ class GuidanceConfig(Group):
     max_speed: float = _p(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
     hold_s: float = _p(0.25, 'age of the newest pose or prediction after which the force is released', 's', 0.001, 10.0)
     ramp_s: float = _p(0.1, 'time within which a released force becomes zero', 's', 0.001, 10.0)
+    unstamped: bool = _p(
+        False, 'whether the force is also published without a stamp, on `~/guidance/wrench_unstamped`', read_only=True
+    )
     authority: float = _p(0.5, 'largest share of guidance in `~/guidance/twist`', '', 0.0, 1.0)
 
 
