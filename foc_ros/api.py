@@ -307,7 +307,7 @@ class Predictor:
         pipeline, before = self._pipeline, self._pipeline.hand_state
         goals, heights = pipeline.scene.goals, pipeline.scene.goal_heights
         if heights is not None and find_shape(position) != (SPACE,):
-            raise InputError('position', 'x, y and the height, because the goals have heights', repr(position))
+            raise SceneError('position', 'x, y and the height, because the goals have heights', repr(position))
         point = check_vector('position', position, PLANE if heights is None else SPACE)
         if goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
