@@ -71,7 +71,8 @@ def test_a_prediction_is_the_sequence_of_its_candidates(predicted: foc_ros.Predi
     assert len(predicted) == len(predicted.candidates) == 4
     nothing = prediction()
     assert len(nothing) == 0 and nothing, 'a prediction without candidates is one all the same'
-    assert len(repr(predicted)) < 100
+    first = predicted.candidates[0]
+    assert all(len(repr(each)) < 100 for each in (predicted, first, first.candidate, first.solution, *predicted.goals))
 
 
 def test_positions_between_the_steps_are_on_the_mean_path(predicted: foc_ros.Prediction) -> None:

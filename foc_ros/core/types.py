@@ -266,7 +266,7 @@ def describe_class(sides: Iterable[tuple[str, int]], goal: str = '') -> str:
     return f'{goal}: {words}' if goal else words
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Candidate(Record):
     """A homotopy class towards one goal that is followed, with a timed guess of a path inside it.
 
@@ -281,6 +281,10 @@ class Candidate(Record):
     guess: Array
     length: float
     goal_name: str = ''
+
+    def __repr__(self) -> str:
+        """Say label and length."""
+        return f'<Candidate {self.label}, {self.length:.3g} m>'
 
     @property
     def description(self) -> str:

@@ -11,14 +11,13 @@ distribution, which does not depend on how long the hand has waited already.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize
 
 from foc_ros.analysis.evaluation.bootstrap import CENTRAL, RESAMPLES, SEED, draw_resamples
 from foc_ros.analysis.evaluation.ground_truth import RecordedPath
-from foc_ros.core.config import Config, DurationConfig, replace_values
+from foc_ros.core.config import Config, DurationConfig, clip_values, replace_values
 from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.hand.duration import estimate_times_to_go
 from foc_ros.core.learning.movements import has_covered_distance
@@ -85,7 +84,7 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> tuple[Estimat
 
     def compute_errors(values: Array) -> Array:
         leaves = [name.partition('.')[2] for name in names]
-        return times.compute_errors(replace(config.duration, **dict(zip(leaves, values.tolist(), strict=True))))
+        return times.compute_errors(clip_values(config.duration, dict(zip(leaves, values.tolist(), strict=True))))
 
     errors = np.array([compute_errors(given * factor**powers) for factor in FACTORS])
     best, warnings = _find_best_factor(errors), []
