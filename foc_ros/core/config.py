@@ -390,11 +390,12 @@ def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     return config
 
 
-def _check_fields(group: object, prefix: str = '') -> dict[str, float | int | str | bool]:
+def _check_fields(group: Group | Config, prefix: str = '') -> dict[str, float | int | str | bool]:
     """Return the values besides the defaults of a group, in the types of these; an error names all that are wrong."""
     errors: list[ParameterError] = []
     values = {}
-    for name, default, bound in _list_fields(type(group)):
+    kind: Any = type(group)
+    for name, default, bound in _list_fields(kind):
         value = getattr(group, name)
         if value is default:
             continue

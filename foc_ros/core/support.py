@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from numbers import Number
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -62,9 +62,8 @@ def collect_goals(field: str, goals: ArrayLike | Goal | Iterable[Goal | ArrayLik
     """
     if not isinstance(goals, (Goal, Iterable)) or isinstance(goals, (str, Mapping)):
         raise SceneError(field, 'positions or Goals', repr(goals))
-    if isinstance(goals, Goal) or _is_position(goals):
-        rows = [(field, goals)]
-    else:
+    rows: list[tuple[str, Any]] = [(field, goals)]
+    if not isinstance(goals, Goal) and not _is_position(goals):
         rows = [(f'{field}[{row}]', each) for row, each in enumerate(goals)]
     given = [each if isinstance(each, Goal) else Goal(check_position(name, each)) for name, each in rows]
     if not given:
@@ -81,10 +80,10 @@ def collect_goals(field: str, goals: ArrayLike | Goal | Iterable[Goal | ArrayLik
     return GoalTable(points[:, :2], points[:, 2] if sizes == {3} else None, names if has_names else ())
 
 
-def _is_position(goals: object) -> bool:
+def _is_position(goals: Any) -> bool:
     """Return whether something is one position rather than a list of them: numbers alone."""
     shape = find_shape(goals)
-    return len(shape) == 1 and shape[0] > 0 and all(isinstance(each, Number) for each in goals)  # type: ignore[attr-defined]
+    return len(shape) == 1 and shape[0] > 0 and all(isinstance(each, Number) for each in goals)
 
 
 def check_number(field: str, value: object, low: float = -FARTHEST, high: float = FARTHEST) -> float:

