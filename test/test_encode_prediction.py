@@ -16,7 +16,7 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
-from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_outputs
+from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_goal_likelihoods, encode_outputs
 from foc_ros.ros.messages.plane import lift, project
 from foc_ros.ros.messages.ranking import MAX_RATIO
 from foc_ros.ros.messages.types import MessageTypes
@@ -86,6 +86,21 @@ def test_the_likelihoods_are_a_table_with_labels(types: MessageTypes) -> None:
     assert (columns_.label, columns_.size, columns_.stride) == ('likelihood,effort,cost_ratio,eta', 4, 4)
     table = np.array(message.data).reshape(rows.size, columns_.size)
     np.testing.assert_allclose(table, [[0.7, 20.0, 1.0, 0.93], [0.3, 20.0, 2.5, 0.91]])
+
+
+@both_kinds
+def test_likelihoods_are_told_by_the_names_of_goals_and_classes(types: MessageTypes) -> None:
+    goals = np.array([[0.3, 0.0], [0.3, 0.1]])
+    made_of = replace(three_ways(), goal_positions=goals, unknown=0.0)
+    message = made('likelihoods_by_name', made_of, types)
+    assert (message.header.stamp.sec, message.header.frame_id) == (5, 'world')
+    by_name = {status.name: {each.key: float(each.value) for each in status.values} for status in message.status}
+    assert by_name == {'goals': {'goal0': 1.0}, 'classes': {'goal0:+l1': 0.7, 'goal0:-l1': 0.3}}, 'nothing is known of goal1'
+    likelihoods = encode_goal_likelihoods(made_of, types)
+    assert {row: each.data for row, each in likelihoods.items()} == {0: pytest.approx(1.0)}
+    half = made('likelihoods_by_name', replace(made_of, unknown=0.5), types)
+    assert all({each.key: each.value for each in status.values}['unknown'] == '0.5' for status in half.status)
+    assert encode_goal_likelihoods(prediction(goal_positions=goals), types) == {}
 
 
 @both_kinds

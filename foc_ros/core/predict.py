@@ -124,7 +124,7 @@ def predict(
         notes=dict(found.notes) | {name: count for name, count in counts.items() if count},
         solve_s=time.perf_counter() - began,
         obstacles=obstacles,
-        goals=goals,
+        goal_positions=goals,
         cleared=tuple(scene.cleared.tolist()),
         unknown=unknown,
     )

@@ -18,6 +18,9 @@ def encode_prediction(prediction: Prediction) -> dict[str, Any]:
         'stamp_ns': prediction.stamp_ns,
         'most_likely': prediction.most_likely,
         'unknown': prediction.unknown,
+        'goals': [
+            {'name': each.name, 'position': each.position.tolist(), 'likelihood': each.likelihood} for each in prediction.goals
+        ],
         'candidates': [encode_candidate(each) for each in candidates],
     }
 

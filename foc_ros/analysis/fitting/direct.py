@@ -26,7 +26,7 @@ distribution, which does not depend on how long the hand has waited already.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
@@ -39,7 +39,7 @@ from foc_ros.analysis.evaluation.scores import CENTRAL, resample
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.classes.rows import find_direction, find_rows, locate_rows
-from foc_ros.core.config import Config, DurationConfig, EstimatorConfig, flatten, replace_values
+from foc_ros.core.config import Config, DurationConfig, EstimatorConfig, clip_values, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.hand.duration import estimate_times_to_go
@@ -264,7 +264,7 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
 
     def compute_errors(values: Array) -> Array:
         leaves = [name.partition('.')[2] for name in names]
-        return times.compute_errors(replace(config.duration, **dict(zip(leaves, values.tolist(), strict=True))))
+        return times.compute_errors(clip_values(config.duration, dict(zip(leaves, values.tolist(), strict=True))))
 
     tried = [given * factor**exponents for factor in FACTORS]
     errors = np.array([compute_errors(each) for each in tried])

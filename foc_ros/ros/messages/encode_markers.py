@@ -97,7 +97,7 @@ class _MarkerEncoder:
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[self._encode_point(*p) for p in points])
         if outcome.has_likelihood and likelihood < LABELLED:
             return
-        label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goals))}) {text}'
+        label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goal_positions))}) {text}'
         yield self.encode('label', index, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
 
     def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
