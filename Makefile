@@ -27,6 +27,8 @@ BIN := $(VENV)/bin
 ROS ?= $(if $(wildcard $(VENV)/.setup-system),system,wheels)
 STAMP := $(VENV)/.setup-$(ROS)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
+# in the form that editors and mypy follow: the path of the checkout, not an import hook
+EDITABLE := --config-settings editable_mode=compat --editable
 WORKERS ?= auto
 
 export ROS_LOG_DIR := $(CURDIR)/build/ros_log
@@ -71,11 +73,11 @@ endif
 
 $(STAMP): setup.py setup.cfg pyproject.toml
 	@$(CHECK_PYTHON)
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: foc_ros needs Python 3.11 or 3.12, and $(PYTHON) is $$($(PYTHON) -V); choose another, as in make setup PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: foc_ros needs Python 3.11 to 3.14, and $(PYTHON) is $$($(PYTHON) -V); choose another, as in make setup PYTHON=python3.12" >&2; exit 1; }
 	@echo "setup: creating .venv with $$($(PYTHON) -V)"
 	@test -e $@ || $(PYTHON) -m venv --clear $(VENV_OPTIONS) $(VENV) || { echo 'make: no venv in $(PYTHON); on Debian and Ubuntu: apt install python3-venv' >&2; exit 1; }
 	@echo 'setup: installing foc_ros[$(EXTRAS)], some minutes'
-	@$(PIP) install --progress-bar off --editable '.[$(EXTRAS)]' | sed -un 's/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  installing them, one or two minutes/p'
+	@$(PIP) install --progress-bar off $(EDITABLE) '.[$(EXTRAS)]' | sed -un 's/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  installing them, one or two minutes/p'
 	@touch $@
 
 help:
@@ -101,7 +103,7 @@ lint: $(VENV)/.lint
 
 $(VENV)/.lint: $(STAMP)
 	@echo 'lint: installing the linters'
-	@$(PIP) install --quiet --editable '.[lint]'
+	@$(PIP) install --quiet $(EDITABLE) '.[lint]'
 	@touch $@
 
 colcon: $(STAMP)
@@ -112,7 +114,7 @@ dist: $(VENV)/.dist
 
 $(VENV)/.dist: $(STAMP)
 	@echo 'dist: installing build and twine'
-	@$(PIP) install --quiet --editable '.[dist]'
+	@$(PIP) install --quiet $(EDITABLE) '.[dist]'
 	@touch $@
 
 stress: $(STAMP)
@@ -124,7 +126,7 @@ doc: $(VENV)/.doc
 
 $(VENV)/.doc: $(STAMP)
 	@echo 'doc: installing Sphinx'
-	@$(PIP) install --quiet --editable '.[doc]'
+	@$(PIP) install --quiet $(EDITABLE) '.[doc]'
 	touch $@
 
 # the peers are large and are installed only for this
@@ -133,7 +135,7 @@ bench: $(VENV)/.bench
 
 $(VENV)/.bench: $(STAMP)
 	@echo 'bench: installing the peers'
-	@$(PIP) install --quiet --editable '.[bench]'
+	@$(PIP) install --quiet $(EDITABLE) '.[bench]'
 	touch $@
 
 people: $(STAMP)

@@ -7,6 +7,7 @@ from setuptools import find_packages, setup
 
 PACKAGE = 'foc_ros'
 PAGES = ('play/page', 'reporting/page')
+SITE = 'https://foc-ros.invalid'  # reserved by RFC 2606: replaced by the address at which the project is published
 REPORT = ['Jinja2>=3.1', 'matplotlib>=3.6']
 
 setup(
@@ -21,6 +22,24 @@ setup(
     maintainer='foc_ros developers',
     maintainer_email='developers@foc-ros.invalid',
     license='Apache-2.0',
+    url=SITE,
+    project_urls={
+        'Documentation': f'{SITE}/doc',
+        'Source': f'{SITE}/source',
+        'Issues': f'{SITE}/issues',
+        'Changelog': f'{SITE}/source/CHANGELOG.rst',
+    },
+    classifiers=[
+        'Development Status :: 4 - Beta',
+        'Intended Audience :: Developers',
+        'Intended Audience :: Science/Research',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3 :: Only',
+        *(f'Programming Language :: Python :: {version}' for version in ('3.11', '3.12', '3.13', '3.14')),
+        'Topic :: Scientific/Engineering :: Artificial Intelligence',
+        'Topic :: Scientific/Engineering :: Human Machine Interfaces',
+        'Typing :: Typed',
+    ],
     keywords=['ROS', 'teleoperation', 'motion prediction', 'stochastic optimal control', 'homotopy'],
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={
@@ -39,15 +58,15 @@ setup(
     python_requires='>=3.11',
     install_requires=[
         'cyclopts>=5.1',
+        'joblib>=1.4',
         'mcap>=1.1',
         'numpy>=1.23',
-        'pebble>=5',
         'piqp>=0.6',
         'qpsolvers>=4.3',
         'PyYAML>=6.0',
         'rich>=13.0',
         'rosbags>=0.10',
-        'scipy>=1.9',
+        'scipy>=1.10',
     ],
     extras_require={
         # rclpy with Fast DDS and the common interfaces as wheels, for machines without a ROS installation
@@ -84,7 +103,7 @@ setup(
             'pytest-timeout>=2.2',
             'pytest-xdist>=3.3',
             'quadprog>=0.1.11',
-            'scipy>=1.9',
+            'scipy>=1.10',
             'selenium>=4.11',
             'setuptools>=70.1',
         ],
@@ -92,7 +111,7 @@ setup(
     entry_points={
         'console_scripts': [
             'foc_node = foc_ros.ros.main:main',
-            'foc_ros = foc_ros.cli.main:main',
+            'foc_ros = foc_ros.__main__:main',
         ],
     },
 )

@@ -14,13 +14,11 @@ from pathlib import Path
 
 from assistance_rules import RIVALS
 
-from foc_ros.analysis.parallel import IsolatedProcessPool
+from foc_ros.analysis.parallel import open_workers
 from foc_ros.analysis.recordings import find_recordings
-from foc_ros.analysis.simulation.assistance import RULES
-from foc_ros.analysis.simulation.human_paths import read_tasks
-from foc_ros.analysis.simulation.names import HUMAN_PATHS, OPERATORS
-from foc_ros.analysis.simulation.study import make_pairs, simulate, summarise
-from foc_ros.analysis.simulation.tables import make_tables
+from foc_ros.analysis.simulation import HUMAN_PATHS, OPERATORS
+from foc_ros.analysis.simulation.operators import read_tasks
+from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, simulate, summarise
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError
 from foc_ros.io.terminal import show_table
@@ -50,9 +48,9 @@ def main() -> int:
     try:
         config = Config() if given.params is None else load_parameter_file(given.params)
         tasks = read_tasks(find_recordings(given.recordings).values(), config) if HUMAN_PATHS in operators else []
-        with IsolatedProcessPool(given.workers) as executor:
+        with open_workers(given.workers):
             pairs = make_pairs(operators, rules, given.trials, given.seed, tasks)
-            cells = summarise(simulate(pairs, config, executor, ALL), given.seed)
+            cells = summarise(simulate(pairs, config, ALL), given.seed)
     except FocError as error:
         parser.error(str(error))
     if given.json:

@@ -10,8 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from foc_ros.analysis.simulation.assistance import Assistance
 from foc_ros.analysis.simulation.operators import Task
+from foc_ros.analysis.simulation.study import Assistance
 from foc_ros.core.config import Config
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles

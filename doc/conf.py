@@ -1,9 +1,13 @@
 """Settings of the documentation web site, which `make doc` builds with Sphinx. The pages can also be read in the repository."""
 
+import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import mathjax  # the files of MathJax, from the package django-static-mathjax; Django is not needed
+from docutils import nodes
+from sphinx import addnodes
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -13,6 +17,7 @@ project = 'foc_ros'
 release = __version__
 author = 'the foc_ros developers'
 copyright = f'{author}, Apache-2.0'  # noqa: A001 (the name that Sphinx wants)
+description = 'Predicts where the hand of a teleoperator is going among obstacles, with uncertainty and likelihood'
 
 extensions = [
     'myst_parser',
@@ -21,7 +26,7 @@ extensions = [
     'sphinx.ext.mathjax',
     'sphinx_gallery.gen_gallery',
 ]
-exclude_patterns = ['examples', 'sg_execution_times.rst']
+exclude_patterns = ['examples', '**/sg_execution_times.rst', 'sg_execution_times.rst']
 
 # links to headings, as repositories make them; formulas between dollar signs
 myst_heading_anchors = 4
@@ -60,7 +65,12 @@ html_theme = 'furo'
 html_title = f'foc_ros {release}'
 html_logo = 'images/logo.svg'
 html_favicon = 'images/logo.svg'
-myst_html_meta = {'description': 'foc_ros predicts where the hand of a teleoperator is going, on ROS 2 and in Python'}
+html_context = {'description': description}
+myst_html_meta = {'description': f'foc_ros {release}: {description}'}
+templates_path = ['_templates']
+html_sidebars = {
+    '**': [f'sidebar/{part}.html' for part in ('scroll-start', 'brand', 'tagline', 'search', 'navigation', 'scroll-end')],
+}
 # One file holds the program and the fonts of MathJax. It becomes part of the site, so that formulas need no network.
 mathjax_path = 'tex-svg.js'
 html_static_path = ['_static', str(Path(mathjax.__path__[0]) / 'static' / 'mathjax' / 'es5' / mathjax_path)]
@@ -73,6 +83,39 @@ def escape_bars(*arguments: object) -> None:
     lines[:] = [line if '``' in line else line.replace('|', '\\|') for line in lines]
 
 
-def setup(app: object) -> None:
-    """Connect the function to Sphinx."""
-    app.connect('autodoc-process-docstring', escape_bars)  # type: ignore[attr-defined]
+LONG_TYPES = {
+    r'~?(numpy\.)?ndarray\[tuple\[(~typing\.)?Any, \.\.\.\], ~?(numpy\.)?dtype\[~?(numpy\.)?(\w+)\]\]': r'NDArray[\5]',
+    r"TypeAliasForwardRef\('(\w+)'\)": r'\1',
+    r'<factory>': '...',
+}
+"""Types as autodoc writes them, and as NumPy and the sources of foc_ros do; a default that is made for each object."""
+
+
+def shorten_types(text: str | None) -> str | None:
+    """Write the types of a signature as its source does."""
+    for long, short in LONG_TYPES.items():
+        text = text and re.sub(long, short, text)
+    return text
+
+
+def shorten_signature(*arguments: Any) -> tuple[str | None, str | None]:
+    """Write the types of arguments and result as their source does."""
+    signature, result = arguments[-2:]
+    return shorten_types(signature), shorten_types(result)
+
+
+def shorten_attributes(_app: object, _domain: str, _kind: str, content: Any) -> None:
+    """Write the types of attributes and properties as their source does."""
+    for signature in content.parent.findall(addnodes.desc_signature):
+        for node in signature.findall(addnodes.desc_annotation):
+            text = node.astext()
+            if shorten_types(text) != text:
+                node.clear()
+                node += nodes.Text(shorten_types(text))
+
+
+def setup(app: Any) -> None:
+    """Connect the functions to Sphinx."""
+    app.connect('autodoc-process-docstring', escape_bars)
+    app.connect('autodoc-process-signature', shorten_signature)
+    app.connect('object-description-transform', shorten_attributes)

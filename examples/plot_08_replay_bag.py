@@ -29,7 +29,7 @@ largest = [prediction.candidates[0].likelihood for prediction in solved]
 points = scene.scatter(*hand.T, c=largest, s=12, vmin=0.0, vmax=1.0)
 for centre, radius in zip(solved[0].obstacles.centre, solved[0].obstacles.radius, strict=True):
     scene.add_patch(plt.Circle(centre, radius, color='0.7'))
-scene.plot(*solved[0].goals.T, 'k*', markersize=10)
+scene.plot(*solved[0].goal_positions.T, 'k*', markersize=10)
 scene.set(xlabel='x [m]', ylabel='y [m]', aspect='equal')
 figure.colorbar(points, ax=scene, label='likelihood of the most likely candidate')
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from foc_ros.core.types import HandState as HandState
     from foc_ros.core.types import Obstacles as Obstacles
     from foc_ros.core.types import PredictedCandidate as PredictedCandidate
+    from foc_ros.core.types import PredictedGoal as PredictedGoal
     from foc_ros.core.types import Status as Status
     from foc_ros.extending import *  # noqa: F403
     from foc_ros.solving import *  # noqa: F403
@@ -52,7 +53,7 @@ _MODULES = {
     'core.obstacles.shapes': 'Box Capsule Circle Hull',
     'core.ocp.monte_carlo': 'MonteCarlo',
     'core.ocp.strategies': 'StrategyResult',
-    'core.types': 'Candidate Goal HandState Obstacles PredictedCandidate Status',
+    'core.types': 'Candidate Goal HandState Obstacles PredictedCandidate PredictedGoal Status',
 }
 _MODULE_OF = {name: f'{__name__}.{module}' for module, names in _MODULES.items() for name in names.split()}
 

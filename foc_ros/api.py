@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,15 +20,11 @@ from foc_ros.core.hand.kalman import describe_jump
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
-from foc_ros.core.support import check_array, check_config, check_number, check_vector, find_shape
-from foc_ros.core.types import (
-    NANOSECONDS,
-    HandSample,
-    Obstacles,
-    SampleStatus,
-    make_obstacles,
-)
+from foc_ros.core.support import check_config, check_number, check_vector, collect_goals, find_shape
+from foc_ros.core.types import NANOSECONDS, Goal, HandSample, Obstacles, SampleStatus, make_obstacles
 
+STEP_COLUMNS = ('ahead_s', 'x_m', 'y_m', 'vx_m_s', 'vy_m_s', 'xx_m2', 'xy_m2', 'yy_m2')
+"""Columns of the steps in `Prediction.to_records`."""
 LATEST_S = 9e9
 """Bound on a time [s]: stamps are 64-bit numbers of nanoseconds."""
 MOST_SAMPLES = 10_000_000
@@ -53,13 +50,57 @@ class Prediction(types.Prediction):
         Share of the likelihood of classes that the search has seen and that are no candidates.
     other : float
         Share of the likelihood of a goal that nobody announced; with both, likelihoods sum to one.
-    obstacles, goals : Obstacles, ndarray of shape (g, 2)
-        The scene at time `t`.
+    obstacles : Obstacles
+        The obstacles at time `t`.
+    goals : tuple of PredictedGoal
+        Name, position and likelihood of each goal, in their order; the likelihood is None where nothing is known of it.
+    goal_positions : ndarray of shape (g, 2)
+        The positions of the goals alone [m].
     cleared : tuple of bool
         For each obstacle, whether the hand is predicted to pass above or below it, so that it does not block.
     notes : dict
         Counts of events such as merged classes and culled obstacles.
+
+    `len` and iteration are those of the candidates.
     """
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the prediction as plain values, ready for `json.dumps`: null stands for what is not known.
+
+        Returns
+        -------
+        dict
+            `stamp_ns`, `most_likely`, `unknown`, `goals` with `name`, `position` and `likelihood`, and `candidates` with the keys
+            of ``foc_ros solve --json``.
+        """
+        from foc_ros.io.json_output import encode_prediction
+
+        return encode_prediction(self)
+
+    def to_records(self) -> list[dict[str, Any]]:
+        """Return a table of the candidates' paths, one row for each step: ``pandas.DataFrame(prediction.to_records())``.
+
+        Returns
+        -------
+        list of dict
+            Rows of `t_s` (of the hand sample), `label`, `way`, `goal`, `status`, `likelihood` (nan without one), `eta`, `ahead_s`
+            (from then on), `x_m`, `y_m`, `vx_m_s`, `vy_m_s`, and of the total covariance `xx_m2`, `xy_m2`, `yy_m2`.
+        """
+        names = [each.name for each in self.goals]
+        rows: list[dict[str, Any]] = []
+        for each in self.candidates:
+            known = {
+                't_s': self.t,
+                'label': each.label,
+                'way': each.way,
+                'goal': names[each.candidate.goal],
+                'status': each.status.value,
+                'likelihood': each.likelihood if each.has_likelihood else math.nan,
+                'eta': each.eta,
+            }
+            numbers = [each.times, *each.mean[:, :4].T, *(each.covariance[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1)))]
+            rows += [known | dict(zip(STEP_COLUMNS, row, strict=True)) for row in np.column_stack(numbers).tolist()]
+        return rows
 
     def plot(self, axes: Any = None) -> Any:
         """Draw the candidates in their scene, the thicker the more likely; those without a likelihood are grey.
@@ -200,6 +241,7 @@ class Predictor:
             warm_up(self.config)  # imports are no part of the time of the first update
         self._pipeline = Pipeline(self.config, tuple(source), is_timed=False)
         self._obstacles: Obstacles | None = make_obstacles()
+        self._goal_names: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Count goals and obstacles."""
@@ -214,28 +256,26 @@ class Predictor:
         """The parameters with which the next prediction is made: those given, adapted to the operator."""
         return self._pipeline.adapted_config
 
-    def set_goals(self, goals: ArrayLike) -> None:
+    def set_goals(self, goals: ArrayLike | Goal | Iterable[Goal | ArrayLike]) -> None:
         """Replace the goals.
 
         Parameters
         ----------
-        goals : array_like of shape (g, 2) or (g, 3)
+        goals : array_like of shape (g, 2) or (g, 3), or iterable of Goal and positions
             Positions [m], at least one, in the plane or also with the height over it. Labels number them in this order. If they
-            have heights, the height of the hand is predicted. `SceneError` is raised for anything else.
+            have heights, the height of the hand is predicted. One goal needs no list: three numbers are a position with a height.
+            `SceneError` is raised for anything else, for heights of some goals only, and for a name that occurs twice.
         """
-        has_heights = find_shape(goals)[1:] == (SPACE,)
-        points = check_array('goals', goals, (None, SPACE if has_heights else PLANE))
-        if not len(points):
-            raise SceneError('goals', 'at least one position', 'none')
-        heights = points[:, PLANE] if has_heights else None
-        self._pipeline.set_goals(points[:, :PLANE], self._pipeline.frame_id or '', heights)
+        table = collect_goals('goals', goals)
+        self._goal_names = table.names
+        self._pipeline.set_goals(table.positions, self._pipeline.frame_id or '', table.heights, table.objects)
 
-    def set_obstacles(self, obstacles: Iterable[Shape] | Obstacles) -> None:
+    def set_obstacles(self, obstacles: Iterable[Shape] | Shape | Obstacles) -> None:
         """Replace the obstacles. Their positions hold at the next update; from then on each moves on at its velocity.
 
         Parameters
         ----------
-        obstacles : iterable of Circle, Box, Capsule and Hull, or Obstacles
+        obstacles : iterable of Circle, Box, Capsule and Hull, or one of them, or Obstacles
             The obstacles, none for a free scene. `SceneError` is raised if a name occurs twice.
         """
         self._obstacles = collect_obstacles(obstacles)
@@ -268,6 +308,8 @@ class Predictor:
         stamp_ns = round(check_number('t', t, -LATEST_S, LATEST_S) * NANOSECONDS)
         pipeline, before = self._pipeline, self._pipeline.hand_state
         goals, heights = pipeline.scene.goals, pipeline.scene.goal_heights
+        if heights is not None and find_shape(position) != (SPACE,):
+            raise SceneError('position', 'x, y and the height, because the goals have heights', repr(position))
         point = check_vector('position', position, PLANE if heights is None else SPACE)
         if goals is None:
             raise SceneError('goals', 'at least one, by set_goals', 'none')
@@ -284,7 +326,8 @@ class Predictor:
         prediction = pipeline.predict(Deadline(self.config.budget_s or None))
         if prediction is None:
             raise FocError(str(pipeline.last_refusal))
-        return Prediction(**vars(prediction))
+        named = prediction.with_goal_names(self._goal_names) if self._goal_names else prediction
+        return Prediction(**vars(named))
 
     def reset(self) -> None:
         """Forget the movement and the operator; keep goals and obstacles. The next update may have any time."""

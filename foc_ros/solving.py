@@ -18,14 +18,8 @@ from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.scene import ReachingScene, check_outside
-from foc_ros.core.support import check_array, check_config, check_number, check_vector, find_shape
-from foc_ros.core.types import (
-    Candidate,
-    HandState,
-    Obstacles,
-    PredictedCandidate,
-    make_obstacles,
-)
+from foc_ros.core.support import GoalTable, check_array, check_config, check_number, check_vector, collect_goals, find_shape
+from foc_ros.core.types import Candidate, Goal, HandState, Obstacles, PredictedCandidate, make_obstacles
 
 MOST_SAMPLES = 10_000_000
 """Largest number of movements that are sampled."""
@@ -66,8 +60,8 @@ class Solution(types.Solution):
 
 def solve(
     start: ArrayLike,
-    goal: ArrayLike,
-    obstacles: Iterable[Shape] | Obstacles = (),
+    goal: ArrayLike | Goal,
+    obstacles: Iterable[Shape] | Shape | Obstacles = (),
     eta: float | None = None,
     strategy: str | None = None,
     duration_s: float = 1.0,
@@ -80,9 +74,9 @@ def solve(
     ----------
     start : array_like of shape (2,) or (6,)
         Position of a hand at rest [m], or its state x, y, vx, vy, ax, ay [m, m/s, m/s^2].
-    goal : array_like of shape (2,)
+    goal : array_like of shape (2,), or Goal
         Position at which the hand comes to rest [m].
-    obstacles : iterable of Circle, Box, Capsule and Hull, or Obstacles
+    obstacles : iterable of Circle, Box, Capsule and Hull, or one of them, or Obstacles
         The obstacles.
     eta : float, optional
         Wanted probability of avoiding each obstacle at each step; by default `foc.eta` of the config.
@@ -115,8 +109,11 @@ def solve(
     >>> solution.path.shape
     (51, 2)
     """
-    target, config = check_vector('goal', goal, 2), _fix_parameters(config, eta, strategy, duration_s)
-    scene = _build_scene(start, target[None], obstacles, config)
+    table, config = _collect_goals(goal), _fix_parameters(config, eta, strategy, duration_s)
+    if len(table.positions) > 1:
+        raise SceneError('goal', 'one goal; solve_classes takes several', repr(goal))
+    target = table.positions[0]
+    scene = _build_scene(start, table, obstacles, config)
     if guess is not None:
         from foc_ros.io.scene_file import guess_path
 
@@ -132,8 +129,8 @@ def solve(
 
 def solve_classes(
     start: ArrayLike,
-    goal: ArrayLike,
-    obstacles: Iterable[Shape] | Obstacles = (),
+    goal: ArrayLike | Goal | Iterable[Goal | ArrayLike],
+    obstacles: Iterable[Shape] | Shape | Obstacles = (),
     eta: float | None = None,
     strategy: str | None = None,
     duration_s: float = 1.0,
@@ -145,7 +142,7 @@ def solve_classes(
     ----------
     start, obstacles, eta, strategy, duration_s, config
         As for `solve`, which also lists the errors.
-    goal : array_like of shape (2,) or (g, 2)
+    goal : array_like of shape (2,) or (g, 2), Goal, or iterable of Goal and positions
         One goal or several [m].
 
     Returns
@@ -162,20 +159,30 @@ def solve_classes(
     <PredictedCandidate goal0:-0, solved, likelihood 0.66>
     <PredictedCandidate goal0:+0, solved, likelihood 0.34>
     """
-    goals = check_array('goal', np.atleast_2d(np.asarray(goal, dtype=object)).tolist(), (None, 2))
-    return _solve(_build_scene(start, goals, obstacles, _fix_parameters(config, eta, strategy, duration_s)))
+    table = _collect_goals(goal)
+    scene = _build_scene(start, table, obstacles, _fix_parameters(config, eta, strategy, duration_s))
+    return tuple(each.with_goal_name(table.names[each.candidate.goal]) if table.names else each for each in _solve(scene))
 
 
-def _build_scene(start: ArrayLike, goals: types.Array, obstacles: Iterable[Shape] | Obstacles, config: Config) -> ReachingScene:
+def _collect_goals(goal: ArrayLike | Goal | Iterable[Goal | ArrayLike]) -> GoalTable:
+    table = collect_goals('goal', goal)
+    if table.heights is not None:
+        raise SceneError('goal', 'two numbers [m] in the task plane: only a Predictor takes heights', repr(goal))
+    return table
+
+
+def _build_scene(
+    start: ArrayLike, table: GoalTable, shapes: Iterable[Shape] | Shape | Obstacles, config: Config
+) -> ReachingScene:
     expected = 'a position (2,) or a state (6,) x, y, vx, vy, ax, ay'
     size = find_shape(start)
     if size not in ((2,), (6,)):
         raise SceneError('start', expected, f'{start!r} of shape {size}')
-    state, table = np.zeros(6), collect_obstacles(obstacles)
+    state, obstacles = np.zeros(6), collect_obstacles(shapes)
     state[: size[0]] = check_vector('start', start, size[0])
-    for name, point in (('start', state[:2]), *(('goal', goal) for goal in goals)):
-        check_outside(name, point, table.grow(config.scene.hand_radius))
-    return ReachingScene(HandState(0, state, np.zeros((6, 6))), goals, table, None, None, config)
+    for name, point in (('start', state[:2]), *(('goal', goal) for goal in table.positions)):
+        check_outside(name, point, obstacles.grow(config.scene.hand_radius))
+    return ReachingScene(HandState(0, state, np.zeros((6, 6))), table.positions, obstacles, None, None, config)
 
 
 def _fix_parameters(config: Config | None, eta: float | None, strategy: str | None, duration_s: float) -> Config:
@@ -247,5 +254,5 @@ def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) 
         raise InputError('candidates', 'results of foc_ros.solve_classes', repr(candidates))
     by_number = {each.candidate.goal: problem.goal[:2] for each, problem in zip(candidates, problems, strict=True)}
     goals = np.array([by_number[number] for number in sorted(by_number)])
-    shown = Prediction(0, '', 0.0, tuple(candidates), candidates[0].label, obstacles=solutions[0].obstacles, goals=goals)
+    shown = Prediction(0, '', 0.0, tuple(candidates), candidates[0].label, obstacles=solutions[0].obstacles, goal_positions=goals)
     return shown.plot(axes)

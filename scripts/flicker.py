@@ -146,7 +146,7 @@ def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> 
 def _is_same_scene(before: Prediction, now: Prediction) -> bool:
     return (
         now.t - before.t <= LONGEST_S
-        and np.array_equal(before.goals, now.goals)
+        and np.array_equal(before.goal_positions, now.goal_positions)
         and before.obstacles.ids == now.obstacles.ids
         and np.array_equal(before.obstacles.centre, now.obstacles.centre)
     )

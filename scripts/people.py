@@ -14,14 +14,10 @@ from pathlib import Path
 
 from page import ROOT, SHARED, format_table, write_blocks
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares
-from foc_ros.analysis.evaluation.forecasts import published_shares
-from foc_ros.analysis.evaluation.ground_truth import HORIZONS_S
-from foc_ros.analysis.evaluation.metrics import score_forecasts, summarise
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe_in_order
-from foc_ros.analysis.evaluation.position_metrics import compute_position_scores
-from foc_ros.analysis.evaluation.questions import PATH_CLASS, ask_all
-from foc_ros.analysis.parallel import collect_all, open_executor
+from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, published_shares
+from foc_ros.analysis.evaluation.observations import HORIZONS_S, PATH_CLASS, ObservedRecording, ask_all, observe_in_order
+from foc_ros.analysis.evaluation.scores import compute_position_scores, score_forecasts, summarise
+from foc_ros.analysis.parallel import collect_all, open_workers
 from foc_ros.analysis.recordings import Recording, find_recordings, group_by_operator
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
@@ -90,10 +86,10 @@ def main() -> None:
     parser.add_argument('--workers', type=int, default=len(os.sched_getaffinity(0)), metavar='N', help='worker processes')
     arguments = parser.parse_args()
     ways, positions = [], []
-    with open_executor(arguments.workers) as executor:
+    with open_workers(arguments.workers):
         for (data, setting), config in SETTINGS.items():
             items = [(person, found[:: arguments.every]) for person, found in find_persons(SHARED / data).items()]
-            observed = collect_all(partial(observe_in_order, config=config), items, executor, f'{data}: {setting}')
+            observed = collect_all(partial(observe_in_order, config=config), items, f'{data}: {setting}')
             recordings = [recording for each, _ in observed for recording in each]
             for name, reason in [failure for _, failed in observed for failure in failed.items()]:
                 raise RecordingError(f'{name}: {reason}')

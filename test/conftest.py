@@ -67,3 +67,17 @@ def ros() -> Iterator[Graph]:
 def types(request: pytest.FixtureRequest) -> MessageTypes:
     """Return the message classes of the kind that the test is parametrised with (`message_helpers.both_kinds`)."""
     return message_types(request.param)
+
+
+@pytest.fixture(scope='module')
+def cluster_address() -> Iterator[str]:
+    """Yield the address of a Dask cluster of two worker processes on this machine."""
+    dask = pytest.importorskip('dask', reason='the extra cluster is not installed')
+    distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
+    # a task is given up after its second death, not its fourth: the test is shorter
+    settings = {'distributed.scheduler.allowed-failures': 1, 'distributed.worker.multiprocessing-method': 'spawn'}
+    with (
+        dask.config.set(settings),
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=':0') as cluster,
+    ):
+        yield cluster.scheduler_address

@@ -6,8 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S, GroundTruth, RecordedPath, find_open_gaps
-from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
+from foc_ros.analysis.evaluation.observations import (
+    TIMES_S,
+    CandidateTable,
+    GroundTruth,
+    Observation,
+    ObservedRecording,
+    RecordedPath,
+    find_open_gaps,
+)
 from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.fitting.recorded_hand import RecordedHand
+from foc_ros.analysis.fitting.direct import RecordedHand
 from foc_ros.core.types import Obstacles
 
 OBSTACLE = (0.15, 0.0, 0.03)

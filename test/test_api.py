@@ -65,7 +65,7 @@ def test_a_prediction_knows_its_scene_and_its_candidates():
     prediction = predictor_of_one_cup().update(t=1.5, position=[0.0, 0.0])
     assert prediction.t == 1.5
     assert prediction.obstacles.ids == ('cup',)
-    np.testing.assert_array_equal(prediction.goals, [[0.3, 0.0]])
+    np.testing.assert_array_equal(prediction.goal_positions, [[0.3, 0.0]])
     assert {each.label for each in prediction.candidates} == {'goal0:+cup', 'goal0:-cup'}
     best = prediction.candidates[0]
     assert best.likelihood == max(each.likelihood for each in prediction.candidates)

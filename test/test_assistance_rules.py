@@ -22,10 +22,9 @@ from assistance_rules import (
 )
 from test_simulation import GOALS, QUICK, cross
 
-from foc_ros.analysis.simulation.intended_path import DT
-from foc_ros.analysis.simulation.names import NOISY
-from foc_ros.analysis.simulation.operators import draw_task
-from foc_ros.analysis.simulation.trial import run_trial
+from foc_ros.analysis.simulation import NOISY
+from foc_ros.analysis.simulation.operators import DT, draw_task
+from foc_ros.analysis.simulation.study import run_trial
 from foc_ros.core.types import make_obstacles
 
 STUDY = Path(__file__).parents[1] / 'benchmarks' / 'assistance.py'

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.evaluation.evaluate import find_label_mismatches
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ObservedRecording, ask_all, observe
 from foc_ros.analysis.evaluation.other_goal import leave_goals_out
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask_all
+from foc_ros.analysis.evaluation.report import find_label_mismatches
 from foc_ros.analysis.recordings import TableRecording, find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
@@ -80,11 +78,8 @@ def test_bags_of_the_folder_hold_cubes_that_are_read_back(folder: Path, tmp_path
     assert main(arguments) == 0
 
 
-def test_evaluate_and_its_report_take_the_folder(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr('foc_ros.analysis.parallel.open_executor', lambda *_: ThreadPoolExecutor(1))
-    assert main(['evaluate', str(folder), '--params', str(folder / 'parameters.yaml'), '--json']) == 0
+def test_evaluate_and_its_report_take_the_folder(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['evaluate', str(folder), '--params', str(folder / 'parameters.yaml'), '--workers', '1', '--json']) == 0
     answer = json.loads(capsys.readouterr().out)
     assert (answer['recordings'], answer['failed'], answer['labels_not_taken']) == (2, {}, {})
 
@@ -128,12 +123,10 @@ def test_objects_that_are_picked_up_are_goals_and_obstacles(picks: Path) -> None
     assert (question.possible, question.truth) == (2, 0)
 
 
-def test_the_share_of_another_goal_is_judged_with_the_goal_left_out(
-    picks: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_share_of_another_goal_is_judged_with_the_goal_left_out(picks: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert {name: len(each.scene.goals) for name, each in leave_goals_out(find_recordings(picks)).items()} == {'a': 1}
-    monkeypatch.setattr('foc_ros.analysis.parallel.open_executor', lambda *_: ThreadPoolExecutor(1))
-    assert main(['evaluate', str(picks), '--params', str(picks / 'parameters.yaml'), '--unannounced', '--json']) == 0
+    arguments = ['evaluate', str(picks), '--params', str(picks / 'parameters.yaml'), '--unannounced', '--workers', '1', '--json']
+    assert main(arguments) == 0
     answer = json.loads(capsys.readouterr().out)
     found = answer['other_goal']
     assert 0.0 < found['share'] < found['share_left_out'] and found['area_under_curve'] > 0.5

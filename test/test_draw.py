@@ -106,7 +106,7 @@ def test_a_scene_holds_every_obstacle_goal_and_candidate() -> None:
     radii = sorted(patch.radius for patch in axes.patches if isinstance(patch, Circle))
     np.testing.assert_allclose(radii, [0.02, 0.03, 0.033], err_msg='a ring where the radius is uncertain only')
     drawn = [line.get_xydata() for line in axes.lines]
-    for points in (*(each.curve for each in build_snapshot(made).candidates), *made.goals[:, None]):
+    for points in (*(each.curve for each in build_snapshot(made).candidates), *made.goal_positions[:, None]):
         assert any(np.array_equal(line, points) for line in drawn)
 
 

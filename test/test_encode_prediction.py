@@ -16,7 +16,7 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
-from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_outputs
+from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_goal_likelihoods, encode_outputs
 from foc_ros.ros.messages.plane import lift, project
 from foc_ros.ros.messages.ranking import MAX_RATIO
 from foc_ros.ros.messages.types import MessageTypes
@@ -89,6 +89,21 @@ def test_the_likelihoods_are_a_table_with_labels(types: MessageTypes) -> None:
 
 
 @both_kinds
+def test_likelihoods_are_told_by_the_names_of_goals_and_classes(types: MessageTypes) -> None:
+    goals = np.array([[0.3, 0.0], [0.3, 0.1]])
+    made_of = replace(three_ways(), goal_positions=goals, unknown=0.0)
+    message = made('likelihoods_by_name', made_of, types)
+    assert (message.header.stamp.sec, message.header.frame_id) == (5, 'world')
+    by_name = {status.name: {each.key: float(each.value) for each in status.values} for status in message.status}
+    assert by_name == {'goals': {'goal0': 1.0}, 'classes': {'goal0:+l1': 0.7, 'goal0:-l1': 0.3}}, 'nothing is known of goal1'
+    likelihoods = encode_goal_likelihoods(made_of, types)
+    assert {row: each.data for row, each in likelihoods.items()} == {0: pytest.approx(1.0)}
+    half = made('likelihoods_by_name', replace(made_of, unknown=0.5), types)
+    assert all({each.key: each.value for each in status.values}['unknown'] == '0.5' for status in half.status)
+    assert encode_goal_likelihoods(prediction(goal_positions=goals), types) == {}
+
+
+@both_kinds
 def test_the_path_is_the_most_likely_one_with_stamps_in_the_future(types: MessageTypes) -> None:
     ways = three_ways()
     message = made('path', ways, types, 'xz')
@@ -147,6 +162,9 @@ def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
         by_name.setdefault(each.ns, []).append(each)
     assert sorted(by_name) == ['label', 'legend', 'motor_noise', 'obstacle', 'obstacle_deviation', 'path', 'total_uncertainty']
     assert all(len({each.id for each in group}) == len(group) for group in by_name.values())
+    assert len(by_name['motor_noise']) == 2 * len(by_name['total_uncertainty']), (
+        'the total uncertainty is that of the most likely path'
+    )
     assert [each.text for each in by_name['label']] == [
         'goal0:+l1 (left of 1) 70 %',
         'goal0:-l1 (right of 1) 30 %',
@@ -183,6 +201,8 @@ def test_a_compromised_candidate_takes_part_and_says_so() -> None:
     assert made('likelihoods', ways).layout.dim[0].label == 'a;b'
     texts = [each.text for each in made('markers', ways).markers if each.ns == 'label']
     assert texts[1].endswith('30 %, compromised: eta 0.620')
+    unlikely = made('markers', prediction(outcome('a', 0.995), outcome('b', 0.005))).markers
+    assert [sum(each.ns == name for each in unlikely) for name in ('path', 'label')] == [2, 1]
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])

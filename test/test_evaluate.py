@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +20,6 @@ OBSTACLE = [(0.15, 0.0, 0.03)]
 GOAL = [(0.3, 0.0)]
 
 
-@pytest.fixture(autouse=True)
-def use_one_thread(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compute in this process, unless a test is about processes, because starting one takes a second."""
-    if 'workers' not in request.fixturenames:
-        monkeypatch.setattr('foc_ros.analysis.parallel.open_executor', lambda *_: ThreadPoolExecutor(1))
-
-
 @pytest.fixture
 def tables(tmp_path: Path) -> Path:
     """Write three reaches past one obstacle."""
@@ -35,7 +27,8 @@ def tables(tmp_path: Path) -> Path:
 
 
 def run(data: Path, *options: str, workers: str = '1') -> int:
-    return main(['evaluate', str(data), '--params', str(data / 'parameters.yaml'), '--workers', workers, *options])
+    chosen = [workers] if workers.startswith('--') else ['--workers', workers]
+    return main(['evaluate', str(data), '--params', str(data / 'parameters.yaml'), *chosen, *options])
 
 
 def answer(data: Path, capsys: pytest.CaptureFixture[str], *options: str, code: int = 0, workers: str = '1') -> dict:
@@ -100,9 +93,12 @@ def test_reaches_without_obstacles_are_scored_by_goal(tmp_path: Path, capsys: py
     assert goal['by_tenth'][9]['right'] == 1.0 and goal['gain'] > 0.2
 
 
-@pytest.mark.parametrize('workers', ['2'])
-def test_the_number_of_workers_does_not_matter(tables: Path, capsys: pytest.CaptureFixture[str], workers: str) -> None:
-    assert answer(tables, capsys) == answer(tables, capsys, workers=workers)
+def test_workers_do_not_matter_nor_whether_they_are_those_of_a_cluster(
+    tables: Path, capsys: pytest.CaptureFixture[str], cluster_address: str
+) -> None:
+    alone = answer(tables, capsys)
+    assert answer(tables, capsys, workers='2') == alone
+    assert answer(tables, capsys, workers=f'--scheduler={cluster_address}') == alone
 
 
 def test_bags_are_scored_as_their_tables(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Baselines, against closed forms and plain geometry."""
+"""Baselines and the Singer model, against closed forms and plain geometry."""
 
 from __future__ import annotations
 
@@ -10,17 +10,21 @@ from evaluation_samples import TWO_CLASSES, make_candidates, observation, record
 
 from foc_ros.analysis.evaluation.baselines import (
     BASELINES,
+    SINGER_SETTINGS,
+    _discretise,
+    boltzmann_shares,
+    compute_straight_costs,
+    compute_straight_positions,
+    forecast_singer,
     forecast_straight_minimum_jerk,
     guess_constant_velocity,
     guess_nearest_gap,
     guess_shortest_path,
     make_baselines,
+    power_rule_shares,
 )
-from foc_ros.analysis.evaluation.cross_validation import compute_log_likelihoods
-from foc_ros.analysis.evaluation.forecasts import boltzmann_shares, power_rule_shares
-from foc_ros.analysis.evaluation.ground_truth import TIMES_S
-from foc_ros.analysis.evaluation.minimum_jerk import compute_straight_costs, compute_straight_positions
-from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask, ask_main
+from foc_ros.analysis.evaluation.observations import GOAL, HORIZONS_S, PATH_CLASS, TIMES_S, ask, ask_main
+from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT
 
@@ -117,3 +121,34 @@ def test_every_baseline_forecasts_every_setting() -> None:
 
 def test_the_horizons_are_among_the_times() -> None:
     assert {0.25, 0.5, 1.0} <= set(TIMES_S)
+
+
+AHEAD = np.array(HORIZONS_S)
+
+
+@pytest.mark.parametrize('dt', [1e-3, 0.07, 1.0])
+def test_transition_and_added_covariance_are_the_closed_forms(dt: float) -> None:
+    transition, added = _discretise(dt)
+    for row, (stddev, _, tau) in enumerate(SINGER_SETTINGS):
+        decay = np.exp(-dt / tau)
+        expected = [[1.0, dt, tau**2 * (dt / tau - 1.0 + decay)], [0.0, 1.0, tau * (1.0 - decay)], [0.0, 0.0, decay]]
+        np.testing.assert_allclose(transition[row], expected, rtol=1e-6, atol=1e-12)
+        assert added[row, 2, 2] == pytest.approx(stddev**2 * (1.0 - decay**2))
+        np.testing.assert_allclose(added[row], added[row].T, rtol=1e-9, atol=1e-15)
+
+
+def test_a_steady_motion_is_continued_and_an_uncertain_one_has_its_error() -> None:
+    stamps_ns = np.arange(0, 2_000_000_000, 20_000_000)
+    positions = np.outer(stamps_ns / 1e9, [0.3, -0.1])
+    mean, variance = forecast_singer(stamps_ns, positions, stamps_ns[[20, 99]], AHEAD)
+    expected = positions[99] + AHEAD[:, None] * [0.3, -0.1]
+    np.testing.assert_allclose(mean[1], np.tile(expected, (len(SINGER_SETTINGS), 1, 1)), atol=2e-3)
+    assert mean.shape == (2, len(SINGER_SETTINGS), 3, 2) and (np.diff(variance, axis=2) > 0.0).all()
+
+
+def test_a_forecast_knows_nothing_of_later_samples() -> None:
+    draws = np.random.default_rng(0)
+    stamps_ns, positions = np.arange(0, 10**9, 5 * 10**7), np.cumsum(draws.normal(0.0, 0.01, (20, 2)), axis=0)
+    other = np.where(np.arange(20)[:, None] > 10, 1.0, positions)
+    for one, two in zip(*(forecast_singer(stamps_ns, each, stamps_ns[:11], AHEAD) for each in (positions, other)), strict=True):
+        np.testing.assert_array_equal(one, two)

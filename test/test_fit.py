@@ -15,7 +15,7 @@ from bag_helpers import write_bag
 from fit_recordings import write_tables
 
 from foc_ros.analysis.fitting import fit as fitting
-from foc_ros.analysis.fitting import predictor_settings
+from foc_ros.analysis.fitting import search
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
@@ -27,7 +27,7 @@ QUICK = {'foc.steps': 15, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.
 def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fitting, 'PREDICTIONS', 3)
     for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
-        monkeypatch.setattr(predictor_settings, name, few)
+        monkeypatch.setattr(search, name, few)
 
 
 def _fit(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: str, **parameters: Any) -> tuple[dict[str, Any], Config]:
@@ -50,8 +50,10 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle: Path, c
     assert answer['recordings'] == 6 and answer['failed'] == {}
     values = flatten(config)
     fitted = {'estimator.position_stddev', 'estimator.jerk_density', 'duration.fitts_a_s', 'duration.fitts_b_s'}
-    fitted |= {'foc.noise_x', 'foc.noise_y', 'foc.eta', 'foc.process_noise', 'likelihood.beta', 'likelihood.lookahead_s'}
+    kept = {'foc.noise_x', 'foc.noise_y', 'foc.eta', 'foc.process_noise', 'likelihood.beta', 'likelihood.lookahead_s'}
     assert fitted <= set(answer['parameters'])
+    assert kept <= set(answer['parameters']) | set(answer['undetermined'])
+    assert not set(answer['parameters'] | answer['chosen']) & set(answer['undetermined'])
     for name, each in answer['parameters'].items():
         assert values[name] == each['value']
         if None not in each['interval']:  # the constant of another model of duration has none
@@ -85,8 +87,32 @@ def test_without_obstacles_goals_are_distinguished_and_margins_are_kept(
     answer, config = _fit(write_tables(tmp_path / 'data', obstacle=False), capsys, **{'homotopy.max_candidates': 3})
     assert not {'foc.eta', 'foc.noise_x', 'foc.noise_y'} & set(answer['parameters'])
     assert (config.foc.eta, config.foc.noise_x) == (Config().foc.eta, Config().foc.noise_x)
-    assert any('foc.eta, foc.noise_x, foc.noise_y: no recording has an obstacle' in words for words in answer['warnings'])
+    assert all(
+        answer['undetermined'][name]['why'].startswith('no recording has an obstacle')
+        for name in ('foc.eta', 'foc.noise_x', 'foc.noise_y')
+    )
     assert answer['scores']['ways']['fitted'] > answer['scores']['ways']['uniform'] + 0.1
+
+
+def test_two_recordings_do_not_determine_the_likelihood(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer, config = _fit(write_tables(tmp_path / 'data', count=2), capsys)
+    kept = {
+        'likelihood.beta',
+        'likelihood.planning_horizon_s',
+        'likelihood.lookahead_s',
+        'likelihood.weaving',
+        'duration.arrival',
+    }
+    assert kept <= set(answer['undetermined'])
+    given = flatten(Config())
+    assert {name: flatten(config)[name] for name in kept} == {name: given[name] for name in kept}
+    assert answer['undetermined']['likelihood.beta'] == {
+        'given': given['likelihood.beta'],
+        'why': 'all values tried, 0.5 to 16, explain the recordings within 2 nat',
+    }
+    assert 'estimator.position_stddev' in answer['parameters']
+    shown = {row[0]: row[2] for row in fitting.format_parameters(answer)}
+    assert shown['likelihood.beta'] == 'kept'
 
 
 def test_strategy_fixed_keeps_its_tau_and_lambda_and_says_so(past_an_obstacle: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from object_messages import collision_object, detection, detections
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction
 
-from foc_ros.analysis.replay_summary import Summary, facts
+from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import MessageError
 from foc_ros.core.pipeline import Pipeline

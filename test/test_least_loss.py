@@ -9,11 +9,11 @@ from reach_helpers import bowed, case_guess, case_problem, random_scene, reach, 
 
 from foc_ros.core.config import Config, FocConfig, replace_values
 from foc_ros.core.ocp.lv_hc import Curve
+from foc_ros.core.ocp.point import solve_at
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
 from foc_ros.core.ocp.solver import LARGEST_TOLERANCE
 from foc_ros.core.ocp.start import cold_start, warm_start
-from foc_ros.core.ocp.strategies import solve_at
 from foc_ros.core.predict import predict
 from foc_ros.core.safety_preference import SafetyPreference
 from foc_ros.core.tracks import NO_TRACKS

@@ -9,7 +9,10 @@ from reach_helpers import bowed, reach, solved
 from foc_ros.core.obstacles.geometry import Edges, find_offset
 from foc_ros.core.obstacles.risk import CERTAIN_K, compute_safety_factor
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
-from foc_ros.core.ocp.margin import Contacts, Gradients, Margins
+from foc_ros.core.ocp import gradients
+from foc_ros.core.ocp.gradients import Gradients
+from foc_ros.core.ocp.margin import Contacts, Margins
+from foc_ros.core.ocp.minima import find_least_factors
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_damped_mass
 from foc_ros.core.safety_preference import SafetyPreference
@@ -56,7 +59,9 @@ def linearise(
     count = len(times)
     none = np.zeros(count, dtype=np.intp)
     controls, is_held = np.tile(control, (count, 1)), np.full(count, slides)
-    return margins.linearise(Contacts(none, none, times), controls, np.full(count, k), is_held, np.full(count, is_free))
+    return gradients.linearise(
+        margins, Contacts(none, none, times), controls, np.full(count, k), is_held, np.full(count, is_free)
+    )
 
 
 def list_minima(margins: Margins, control: np.ndarray) -> list[float]:
@@ -213,8 +218,8 @@ def test_a_problem_without_obstacles_is_certain_beside_one_with_some():
     problem, control = make_problem('circle')
     empty = replace(problem, obstacles=collect_obstacles([]))
     controls = np.stack((control, control))
-    k, _, _ = Margins([problem, empty], np.zeros(2), is_chance=True).find_least_factors(controls)
-    alone, _, _ = Margins([problem], np.zeros(1), is_chance=True).find_least_factors(controls[:1])
+    k, _, _ = find_least_factors(Margins([problem, empty], np.zeros(2), is_chance=True), controls)
+    alone, _, _ = find_least_factors(Margins([problem], np.zeros(1), is_chance=True), controls[:1])
     assert k[0] == pytest.approx(float(alone[0]), rel=1e-12)
     assert k[1] == CERTAIN_K
 
@@ -263,7 +268,7 @@ def test_times_before_the_hand_has_to_be_out_of_a_margin_do_not_count():
     problem = reach(near, recovery_s=0.3)
     control = solved(problem, bowed((0, 0), (0.3, 0), 50, -0.02), 'optimal').control.T.ravel() * problem.horizon.gain
     counted, all_times = (Margins([replace(problem, recovery_s=each)], np.zeros(1), is_chance=True) for each in (0.3, 0.0))
-    (k,), _, (time,) = counted.find_least_factors(control[None])
-    (least,), _, (first,) = all_times.find_least_factors(control[None])
+    (k,), _, (time,) = find_least_factors(counted, control[None])
+    (least,), _, (first,) = find_least_factors(all_times, control[None])
     assert k > least
     assert time >= 15.0 > first

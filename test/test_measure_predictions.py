@@ -48,7 +48,7 @@ def make_prediction(tick: int, shares: dict[str, float], bows: dict[str, float] 
         candidates.append(PredictedCandidate(Candidate(label, 0, sides, mean[:, :2], 0.3), solution, {}, 1.0, share))
     obstacles, goals = make_obstacles([[0.15, 0.0]], 0.03), np.array([[0.3, 0.0]])
     best = max(shares, key=lambda label: shares[label]) if shares else None
-    return Prediction(tick * 20_000_000, '', 0.0, tuple(candidates), best, obstacles=obstacles, goals=goals)
+    return Prediction(tick * 20_000_000, '', 0.0, tuple(candidates), best, obstacles=obstacles, goal_positions=goals)
 
 
 def measure(*shares: dict[str, float]) -> flicker.Steadiness:
@@ -118,5 +118,5 @@ def test_a_path_that_moves_sideways_is_measured() -> None:
 def test_a_change_of_the_goals_begins_anew() -> None:
     first, second = make_prediction(0, {'+a': 1.0}), make_prediction(1, {'-a': 1.0})
     total = flicker.Steadiness()
-    flicker.measure_steadiness([first, replace(second, goals=np.array([[0.0, 0.3]]))], total)
+    flicker.measure_steadiness([first, replace(second, goal_positions=np.array([[0.0, 0.3]]))], total)
     assert (total.ticks, total.changed) == (0, 0)

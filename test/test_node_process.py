@@ -58,8 +58,9 @@ sys.meta_path.insert(0, Slow())
 
 
 @contextmanager
-def running(ros: Graph, launch: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    command = [*LAUNCHES[launch], *arguments]
+def running(ros: Graph, launch: str | list[str], *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a node as a process; launch: the key of a command, or the command itself."""
+    command = [*(LAUNCHES[launch] if isinstance(launch, str) else launch), *arguments]
     pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
     with subprocess.Popen(command, cwd=ROOT, env=ros.environment, **pipes) as process:
         try:

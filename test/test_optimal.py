@@ -8,6 +8,7 @@ from reach_helpers import bowed, random_scene, reach
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.obstacles.risk import eta_of_k
+from foc_ros.core.ocp.gradients import linearise
 from foc_ros.core.ocp.margin import Contacts, Margins
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
@@ -80,7 +81,7 @@ def test_the_multipliers_say_what_safety_costs(seed):
     control = np.tile(solution.control.T.ravel() * problem.horizon.gain, (len(name), 1))
     margins = Margins([problem], np.zeros(1), is_chance=True)
     held, k = np.full(len(name), True), np.full(len(name), solution.safety_factor)
-    rate = margins.linearise(places, control, k, held, ~held).stddev_rate
+    rate = linearise(margins, places, control, k, held, ~held).stddev_rate
     cost = (more.effort - less.effort) / (more.safety_factor - less.safety_factor)
     assert np.dot(push, rate) == pytest.approx(cost, rel=5e-3)
 

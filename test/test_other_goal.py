@@ -87,7 +87,7 @@ def test_the_share_is_published_and_read_back() -> None:
     assert table.layout.dim[0].label.endswith(';other') and np.asarray(table.data).reshape(-1, 4)[:, 0].sum() == pytest.approx(
         1.0
     )
-    read = read_snapshot(cloud, table, 'xy', prediction.obstacles, prediction.goals)
+    read = read_snapshot(cloud, table, 'xy', prediction.obstacles, prediction.goal_positions)
     assert (
         read.other_share == build_snapshot(prediction).other_share == prediction.other == encode_prediction(prediction)['other']
     )
@@ -134,7 +134,7 @@ def test_ratios_between_candidates_to_one_goal_stay_as_they_are() -> None:
     pipeline.add_hand_sample(HandSample(0, np.zeros(2), 0.0, 'world'))
     prediction = pipeline.predict()
     assert prediction is not None
-    compared = compare_goals(prediction.candidates, hand, prediction.goals, [0.9, 1.2], passing=False)
+    compared = compare_goals(prediction.candidates, hand, prediction.goal_positions, [0.9, 1.2], passing=False)
     for goal in (0, 1):
         pairs = [pair for pair in zip(compared, prediction.candidates, strict=True) if pair[1].candidate.goal == goal]
         assert len(pairs) > 1

@@ -50,6 +50,7 @@ def test_topics_and_counts(decoded: dict[str, list[object]]) -> None:
         '/goals': 1,
         '/foc/prediction': poses,
         '/foc/likelihoods': poses,
+        '/foc/likelihoods_by_name': poses,
         '/foc/path': poses,
         '/foc/markers': poses,
     }

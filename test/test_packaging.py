@@ -55,15 +55,6 @@ def test_package_xml_agrees_with_the_wheel(package_xml: ET.Element, wheel: zipfi
     assert package_xml.findtext('export/build_type') == 'ament_python'
 
 
-def test_package_xml_names_every_requirement(package_xml: ET.Element, wheel: zipfile.ZipFile) -> None:
-    metadata = HeaderParser().parsestr(wheel.read(next(n for n in wheel.namelist() if n.endswith('/METADATA'))).decode())
-    required = [line for line in metadata.get_all('Requires-Dist') if 'extra ==' not in line]
-    keys = {node.text.removeprefix('python3-').removesuffix('-pip') for node in package_xml.findall('exec_depend')}
-    for line in required:
-        name = re.match(r'[A-Za-z0-9-]+', line).group().lower()
-        assert name.replace('pyyaml', 'yaml') in keys, f'{line} is not in package.xml'
-
-
 def test_package_xml_names_every_message_package(package_xml: ET.Element) -> None:
     keys = {node.text for node in package_xml.findall('exec_depend')}
     used = set()

@@ -1,22 +1,23 @@
 """Recordings in parallel: results do not depend on the workers, and a killed worker fails one recording only."""
 
+import os
+import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 import worker_tasks
 
-from foc_ros.analysis.parallel import Failure, IsolatedProcessPool, open_executor, run
+from foc_ros.analysis.parallel import Failure, open_workers, run
 from foc_ros.cli.main import app
 from foc_ros.cli.options import Study
-from foc_ros.core.errors import InputError
+from foc_ros.core.errors import InputError, RecordingError
 
 ITEMS = [(f'r{number}', number) for number in range(8)]
 SQUARES = [(name, number**2) for name, number in ITEMS]
-KILLED = [(name, Failure('its worker process was killed') if number in (3, 5) else number**2) for name, number in ITEMS]
+LIMIT_S = 60.0
 
 
 def parse_study(*given: str) -> Study:
@@ -27,68 +28,108 @@ def parse_study(*given: str) -> Study:
 
 @pytest.mark.parametrize('count', [1, 2, 3])
 def test_results_come_in_order_and_do_not_depend_on_the_number_of_workers(count: int) -> None:
-    with open_executor(count) as executor:
-        assert list(run(worker_tasks.squared, ITEMS, executor)) == SQUARES
+    with open_workers(count):
+        assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
 
 
-def test_any_executor_can_be_used() -> None:
-    with ThreadPoolExecutor(2) as executor:
-        assert list(run(worker_tasks.squared, ITEMS, executor)) == SQUARES
+def test_without_workers_this_process_computes() -> None:
+    assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
+
+
+def test_the_cluster_gives_the_same_results(cluster_address: str) -> None:
+    with open_workers(1, cluster_address):
+        assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
+
+
+def check_that_only_the_deadly_fail(error: str) -> None:
+    found = dict(run(worker_tasks.deadly, ITEMS))
+    failure = Failure(f'its worker process was lost ({error})')
+    assert found == {name: failure if name in ('r3', 'r5') else square for name, square in SQUARES}
+
+
+@pytest.mark.parametrize('count', [2, 3])
+def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(count: int) -> None:
+    with open_workers(count):
+        check_that_only_the_deadly_fail('TerminatedWorkerError')
+
+
+def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else(cluster_address: str) -> None:
+    with open_workers(1, cluster_address):
+        check_that_only_the_deadly_fail('KilledWorker')
 
 
 @pytest.mark.parametrize('count', [1, 2])
-def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(count: int) -> None:
-    with IsolatedProcessPool(count) as pool:
-        assert list(run(worker_tasks.deadly, ITEMS, pool)) == KILLED
-
-
-def test_an_exception_is_the_failure_of_its_item() -> None:
-    with IsolatedProcessPool(1) as pool:
-        found = dict(run(worker_tasks.faulty, ITEMS[:4], pool))
+def test_an_exception_is_the_failure_of_its_item(count: int) -> None:
+    with open_workers(count):
+        found = dict(run(worker_tasks.faulty, ITEMS[:4]))
     assert found['r0'] == 0 and found['r3'] == 3
     assert found['r1'] == Failure('number: expected another than 1, got 1')
     assert found['r2'].reason.startswith("KeyError: 'two' (worker_tasks.py:")
 
 
 def test_an_argument_that_cannot_be_loaded_is_the_failure_of_its_item() -> None:
-    with IsolatedProcessPool(1) as pool:
-        found = dict(run(worker_tasks.squared, [('bad', worker_tasks.Unloadable()), ('good', 2)], pool))
-    assert found['good'] == 4 and 'ValueError: invalid literal' in found['bad'].reason
+    with open_workers(2):
+        found = dict(run(worker_tasks.squared, [('bad', worker_tasks.Unloadable()), ('good', 2)]))
+    assert found['good'] == 4 and isinstance(found['bad'], Failure)
 
 
 def test_workers_run_concurrently(tmp_path: Path) -> None:
-    with IsolatedProcessPool(2) as pool:
-        assert len({pid for _, pid in run(worker_tasks.meet, [(str(n), str(tmp_path)) for n in range(2)], pool)}) == 2
+    with open_workers(2):
+        assert len({pid for _, pid in run(worker_tasks.meet, [(str(n), str(tmp_path)) for n in range(2)])}) == 2
 
 
-def test_an_exception_that_leaves_the_context_kills_the_workers() -> None:
+def test_an_exception_that_leaves_the_context_ends_the_work() -> None:
     began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         _run_interrupted()
-    assert time.monotonic() - began < 30.0
-
-
-def test_workers_end_with_a_parent_that_is_killed() -> None:
-    script = """if __name__ == '__main__':
-        import os, worker_tasks
-        from foc_ros.analysis.parallel import IsolatedProcessPool
-        pool = IsolatedProcessPool(1)
-        print(pool.submit(os.getpid).result(), flush=True)
-        pool.submit(worker_tasks.sleepy, 60.0).result()"""
-    with subprocess.Popen([sys.executable, '-c', script], cwd=Path(__file__).parent, stdout=subprocess.PIPE, text=True) as parent:
-        worker = int(parent.stdout.readline())
-        parent.kill()
-    deadline = time.monotonic() + 30.0
-    while Path(f'/proc/{worker}').exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not Path(f'/proc/{worker}').exists()
+    assert time.monotonic() - began < LIMIT_S / 2.0
 
 
 def _run_interrupted() -> None:
-    with IsolatedProcessPool(1) as pool:
-        results = run(worker_tasks.sleepy, [('short', 0.0), ('long', 60.0), ('later', 60.0)], pool)
-        assert next(results) == ('short', 0.0)
-        raise KeyboardInterrupt
+    with open_workers(2):
+        for found in run(worker_tasks.sleepy, [('short', 0.0), ('long', LIMIT_S), ('later', LIMIT_S)]):
+            assert found == ('short', 0.0)
+            raise KeyboardInterrupt
+
+
+def start_workers(tmp_path: Path) -> tuple[subprocess.Popen[str], list[int]]:
+    """Return a command that waits for two workers, and the processes of these."""
+    script = f"""if __name__ == '__main__':
+        import worker_tasks
+        from foc_ros.analysis.parallel import open_workers, run
+        from foc_ros.cli.main import handle_interrupts
+        with handle_interrupts(), open_workers(2):
+            list(run(worker_tasks.wait_here, [(name, {str(tmp_path)!r}) for name in 'ab']))"""
+    pipes = {'stderr': subprocess.PIPE, 'text': True, 'start_new_session': True}
+    process = subprocess.Popen([sys.executable, '-c', script], cwd=Path(__file__).parent, **pipes)
+    deadline = time.monotonic() + LIMIT_S
+    while len(list(tmp_path.iterdir())) < 2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return process, [int(each.name) for each in tmp_path.iterdir()]
+
+
+def wait_for_the_end(workers: list[int]) -> None:
+    assert len(workers) == 2
+    deadline = time.monotonic() + LIMIT_S / 2.0
+    while any(Path(f'/proc/{each}').exists() for each in workers) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(Path(f'/proc/{each}').exists() for each in workers)
+
+
+def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    process, workers = start_workers(tmp_path)
+    process.kill()
+    process.communicate()
+    wait_for_the_end(workers)
+
+
+def test_an_interrupt_of_the_terminal_ends_command_and_workers(tmp_path: Path) -> None:
+    process, workers = start_workers(tmp_path)
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=LIMIT_S)
+    wait_for_the_end(workers)
+    assert errors.rstrip().endswith('KeyboardInterrupt'), 'the traceback of the command, which its program does not print'
+    assert 'Warning' not in errors and errors.count('Traceback') == 1
 
 
 @pytest.mark.parametrize('given', [('--workers', '0'), ('--workers', '2000')])
@@ -99,7 +140,31 @@ def test_a_wrong_number_of_workers_is_refused(given: tuple[str, ...]) -> None:
 
 def test_a_scheduler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip('distributed', reason='the extra cluster is not installed')
-    monkeypatch.setattr('foc_ros.analysis.dask_cluster.CONNECT_S', 0.3)
+    monkeypatch.setattr('foc_ros.analysis.parallel.CONNECT_S', 0.3)
     for address in ('tcp://127.0.0.1:9', 'nonsense://host'):
-        with pytest.raises(InputError, match='--scheduler: expected the address of a Dask scheduler'):
-            parse_study('--scheduler', address).open_executor()
+        refused = pytest.raises(InputError, match='--scheduler: expected the address of a Dask scheduler')
+        with refused, parse_study('--scheduler', address).open_workers():
+            pass
+
+
+def test_a_scheduler_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
+    monkeypatch.setattr('foc_ros.analysis.parallel.CONNECT_S', 0.3)
+    refused = pytest.raises(InputError, match='--scheduler: expected a Dask scheduler with workers, got none at')
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=':0') as cluster,
+        refused,
+        open_workers(1, cluster.scheduler_address),
+    ):
+        pass
+
+
+def test_a_scheduler_that_dies_ends_the_run_in_words() -> None:
+    distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
+    local = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=':0')
+    with local as cluster, open_workers(1, cluster.scheduler_address):
+        results = run(worker_tasks.sleepy, [('a', 0.0), ('b', 1.0), ('c', 1.0)])
+        assert next(results) == ('a', 0.0)
+        cluster.close()
+        with pytest.raises(RecordingError, match='the Dask scheduler was lost before all recordings had their turn'):
+            list(results)

@@ -15,7 +15,7 @@ from report_samples import START_NS
 from report_samples import prediction as make_prediction
 
 from foc_ros.analysis.replay import Replay, Step, replay
-from foc_ros.analysis.replay_summary import Summary, facts
+from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.cli.main import main
 from foc_ros.core.config import replace_values
 from foc_ros.core.scene import Scene

@@ -60,7 +60,7 @@ def test_an_old_python_is_refused_before_anything_is_made(clone: Path, tmp_path:
     old = write_program(tmp_path / 'bin' / 'python3', 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.10.2;; esac')
     result = make(clone, 'setup', f'PYTHON={old}')
     assert result.returncode != 0
-    assert f'make: foc_ros needs Python 3.11 or 3.12, and {old} is Python 3.10.2; choose another' in result.stderr
+    assert f'make: foc_ros needs Python 3.11 to 3.14, and {old} is Python 3.10.2; choose another' in result.stderr
     assert not (clone / '.venv').exists()
 
 

@@ -3,19 +3,34 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from foc_ros.analysis.simulation.assistance import RULES
-from foc_ros.analysis.simulation.intended_path import DT, FREE_M, interpolate_minimum_jerk, plan_path
-from foc_ros.analysis.simulation.names import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
-from foc_ros.analysis.simulation.operators import Arm, SimulatedArm, Task, draw_task
-from foc_ros.analysis.simulation.study import estimate_mean, make_pairs, simulate, summarise
-from foc_ros.analysis.simulation.trial import Trial, measure_trial, run_trial
+from foc_ros.analysis.parallel import open_workers
+from foc_ros.analysis.simulation import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
+from foc_ros.analysis.simulation.operators import (
+    DT,
+    FREE_M,
+    Arm,
+    SimulatedArm,
+    Task,
+    draw_task,
+    interpolate_minimum_jerk,
+    plan_path,
+)
+from foc_ros.analysis.simulation.study import (
+    RULES,
+    Trial,
+    estimate_mean,
+    make_pairs,
+    measure_trial,
+    run_trial,
+    simulate,
+    summarise,
+)
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.types import Array, make_obstacles
@@ -92,12 +107,12 @@ def test_every_rule_keeps_force_and_slew_within_the_limits(rule: str) -> None:
 
 
 def run_study(workers: int) -> list[dict[str, object]]:
-    with ThreadPoolExecutor(workers) as executor:
-        results = simulate(make_pairs(['noisy', 'changes_way'], ['foc'], 2, 7), QUICK, executor)
+    with open_workers(workers):
+        results = simulate(make_pairs(['noisy', 'changes_way'], ['foc'], 2, 7), QUICK)
     return summarise(results, 7)
 
 
-def test_equal_seeds_give_equal_studies_whatever_the_executor() -> None:
+def test_equal_seeds_give_equal_studies_whatever_the_workers() -> None:
     cells = run_study(1)
     assert cells == run_study(2)
     assert [(cell['operator'], cell['assistance'], cell['trials']) for cell in cells] == [

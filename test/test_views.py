@@ -47,7 +47,7 @@ def test_a_snapshot_holds_the_numbers_of_its_prediction_and_names_classes_in_wor
     assert snapshot.candidates[1].cost_ratio == pytest.approx(made.candidates[1].cost / made.candidates[0].cost)
     lengths = np.linalg.norm(np.diff(best.path, axis=0), axis=1)
     assert np.sum((best.speed[1:] + best.speed[:-1]) / 2 * 0.05) == pytest.approx(lengths.sum(), rel=0.02)
-    one = build_snapshot(replace(made, goals=made.goals[:1]))
+    one = build_snapshot(replace(made, goal_positions=made.goal_positions[:1]))
     assert [each.description for each in (*one.candidates[:1], *one.unsolved)] == ['left of 1', 'left of 1, left of post']
     assert describe_class(()) == 'direct'
 
@@ -110,10 +110,12 @@ def test_the_messages_hold_everything_that_a_report_shows(plane: str) -> None:
 def test_messages_of_unknown_obstacles_of_nothing_and_of_different_predictions() -> None:
     made, other = prediction(START_NS, NOWHERE), prediction(START_NS + 20_000_000, NOWHERE)
     cloud, likelihoods = encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES)
-    read = read_snapshot(cloud, likelihoods, 'xy', made.obstacles.take([1]), made.goals)
+    read = read_snapshot(cloud, likelihoods, 'xy', made.obstacles.take([1]), made.goal_positions)
     assert [each.description for each in read.candidates] == ['', '', '']
     above = replace(made.obstacles, heights=np.array([[-np.inf, np.inf], [0.2, 0.3]]))
-    assert read_snapshot(cloud, likelihoods, 'xy', above, made.goals).cleared == ['post'], 'the hand is at a height of 0.1 m'
+    assert read_snapshot(cloud, likelihoods, 'xy', above, made.goal_positions).cleared == ['post'], (
+        'the hand is at a height of 0.1 m'
+    )
     nothing = Prediction(START_NS, 'world', 0.1, (), None)
     read = read_snapshot(encode_prediction_cloud(nothing, 'xy', TYPES), encode_likelihoods(nothing, TYPES), 'xy', *scene())
     assert (read.candidates, read.most_likely) == ((), None)

@@ -43,7 +43,7 @@ LONG = (
     # the commands of the documentation
     'test_shown_commands.py::test_commands_work_as_shown',
     # a node under load, and a process that is stopped or killed
-    'test_cluster.py::test_a_scheduler_that_dies_ends_the_run_in_words',
+    'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
     'test_demo.py::test_the_live_predictions_are_those_of_the_recording',
     'test_node_hostile.py::test_*a_flood_of_obstacles*',
     'test_node_hostile.py::test_a_node_that_is_killed_and_started_again',
@@ -54,12 +54,12 @@ LONG = (
 )
 
 PROCESS = (
-    'test_cluster.py::*',
+    'test_parallel.py::*',
     'test_demo.py::*',
     'test_demo_*.py::test_the_node_*',
     'test_fit.py::*',
     'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
-    'test_evaluate.py::test_the_number_of_workers_does_not_matter',
+    'test_evaluate.py::test_workers_do_not_matter_*',
     'test_paper.py::*',
     'test_plan_recovery.py::test_recovered_*',
     # a dozen programs with a picture each

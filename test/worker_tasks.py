@@ -47,3 +47,9 @@ def meet(folder: str) -> int:
 def sleepy(seconds: float) -> float:
     time.sleep(seconds)
     return seconds
+
+
+def wait_here(folder: str) -> None:
+    """Leave the process id in a folder, and wait."""
+    Path(folder, str(os.getpid())).touch()
+    time.sleep(120.0)

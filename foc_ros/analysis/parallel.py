@@ -1,32 +1,42 @@
-"""Recordings in parallel: one function applied to many named items by worker processes or by a Dask cluster.
+"""Recordings in parallel by joblib: one function applied to many named items.
 
-Results come in the order of the items and do not depend on the number of workers. What goes wrong with one item, an exception or
-a worker process that is killed, becomes the :class:`Failure` of this item alone.
+Where that happens is joblib's setting: this process unless :func:`open_workers`, or `joblib.parallel_config`, says otherwise.
+Results do not depend on it. What goes wrong with one item, an exception or a worker process that is killed, becomes the
+:class:`Failure` of this item alone.
 """
 
 from __future__ import annotations
 
 import os
-import pickle
 import threading
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError, Executor, Future, wait
+from concurrent.futures import CancelledError
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context, parent_process
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pebble import ProcessExpired, ProcessPool
+from joblib import Parallel, delayed, effective_n_jobs, parallel_config, register_parallel_backend
+from joblib.parallel import ThreadingBackend
 
-from foc_ros.core.errors import FocError, FocWarning, RecordingError, warn
+from foc_ros.core.errors import FocError, FocWarning, InputError, RecordingError, warn
 from foc_ros.io.terminal import show_progress
-
-from .dask_cluster import DaskExecutor
 
 T = TypeVar('T')
 R = TypeVar('R')
+
+CONNECT_S = 10.0
+"""Time within which a scheduler and its first worker have to answer [s]."""
+DASK = 'foc_ros.dask'
+"""Name of :class:`DaskBackend` among the backends of joblib."""
+MOST_THREADS = 512
+"""Most calls that wait for a cluster at the same time."""
+WATCH_S = 0.5
+"""Period at which a worker process looks for its parent [s]."""
 
 
 @dataclass(frozen=True)
@@ -36,85 +46,106 @@ class Failure:
     reason: str
 
 
-class IsolatedProcessPool(Executor):
-    """A number of worker processes, of which one can die without the others.
+@contextmanager
+def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
+    """Let :func:`run` use a number of worker processes, 1 for this one, or the Dask cluster of a scheduler.
 
-    In a `ProcessPoolExecutor` a killed worker breaks the pool. Here its call alone raises `pebble.ProcessExpired`, and a new
-    worker takes its place. When the context is left by an exception, the workers are killed; they also end with their parent.
+    Raises InputError where there is no such cluster.
+    """
+    with warnings.catch_warnings():
+        # said by joblib where a command is interrupted
+        warnings.filterwarnings('ignore', '.* tasks which were still being processed', UserWarning)
+        if scheduler is None:
+            with parallel_config('loky', n_jobs=count):
+                yield
+        else:
+            with _connect(scheduler) as client, parallel_config(DASK, client=client):
+                yield
+
+
+class DaskBackend(ThreadingBackend):
+    """The backend of joblib for a Dask cluster: as many calls wait in threads as the cluster has.
+
+    With joblib's own one a result that is lost with a killed worker, and is then blamed for the death of the next one, never
+    arrives (joblib 1.6, distributed 2026.8).
     """
 
-    def __init__(self, count: int) -> None:
-        # spawned: a fork of a process with threads may hang, and would inherit what this one has computed so far
-        self._pool = ProcessPool(count, initializer=_end_with_parent, context=get_context('spawn'))
+    def __init__(self, client: Any = None, **options: Any) -> None:
+        super().__init__(**options)
+        self._client = client
 
-    def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
-        """Schedule a call; see :class:`concurrent.futures.Executor`."""
-        # pickled here and loaded in the call: a worker that could not load its task would die, and its future never end
-        future: Future[R] = self._pool.schedule(_call_pickled, args=[pickle.dumps((fn, args, kwargs))])
-        return future
+    def __reduce__(self) -> tuple[Any, ...]:
+        return DaskBackend, ()
 
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the workers; see :class:`concurrent.futures.Executor`."""
-        if cancel_futures:
-            self._pool.stop()  # type: ignore[no-untyped-call]
-        else:
-            self._pool.close()  # type: ignore[no-untyped-call]
-        if wait:
-            self._pool.join()
+    def effective_n_jobs(self, n_jobs: int) -> int:  # noqa: ARG002 (joblib's signature)
+        """Return the number of calls at the same time; with a single one joblib would compute here."""
+        return int(max(2, min(sum(self._client.nthreads().values()), MOST_THREADS)))
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.shutdown(cancel_futures=kind is not None)
+    def submit(self, func: Callable[[], Any], callback: Callable[[Any], None] | None = None) -> Any:
+        """Schedule a call."""
+        return super().submit(partial(self._compute, func), callback)
+
+    def _compute(self, func: Callable[[], Any]) -> Any:
+        # not pure: a call that is repeated would return the old task with its error
+        return self._client.submit(func, pure=False).result()
 
 
-def _call_pickled(pickled: bytes) -> Any:
-    function, args, kwargs = pickle.loads(pickled)  # noqa: S301 (our own)
-    return function(*args, **kwargs)
+register_parallel_backend(DASK, DaskBackend)
 
 
-def _end_with_parent() -> None:
-    """Let this worker process end as soon as its parent has ended, by whatever cause."""
-    parent = parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-def run(function: Callable[[T], R], items: Sequence[tuple[str, T]], executor: Executor) -> Iterator[tuple[str, R | Failure]]:
+def run(function: Callable[[T], R], items: Sequence[tuple[str, T]]) -> Iterator[tuple[str, R | Failure]]:
     """Apply a function to every item; yield names and results in the order of the items.
 
     function: importable by name where the workers are, and without a state of its own; items: names with arguments that can be
-    pickled. Raises RecordingError where the executor gave up.
+    pickled. Raises RecordingError where the workers cannot go on.
     """
-    futures = [executor.submit(call_guarded, function, item) for _, item in items]
-    try:
-        for (name, item), future in zip(items, futures, strict=True):
-            try:
-                result, texts = future.result()
-            except ProcessExpired:
-                result, texts = Failure('its worker process was killed'), []
-            except CancelledError as error:
-                raise RecordingError(f'{name}: the executor gave up before its turn') from error
-            except Exception:
-                result, texts = _run_alone(function, item, futures, executor)
-            for text in texts:
-                warn(f'{name}: {text}')
-            yield name, result
-    finally:
-        for future in futures:
-            future.cancel()
+    found: dict[int, R | Failure] = {}
+    first = 0
+    for number, result, texts in _run_unordered(function, [item for _, item in items]):
+        for text in texts:
+            warn(f'{items[number][0]}: {text}')
+        found[number] = result
+        while first in found:
+            yield items[first][0], found.pop(first)
+            first += 1
 
 
-def collect(
-    function: Callable[[T], R], items: Sequence[tuple[str, T]], executor: Executor, description: str
-) -> tuple[list[R], dict[str, str]]:
+def _run_unordered(function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | Failure, list[str]]]:
+    """Yield number, result and warnings of every item, as they come.
+
+    A worker that is killed takes those beside it along. All that may have been at work is then computed again, one after the
+    other, so that only the guilty one fails.
+    """
+    missing, at_work = list(range(len(items))), 2 * effective_n_jobs()
+    while missing:
+        try:
+            for found in _compute(function, [(each, items[each]) for each in missing]):
+                missing.remove(found[0])
+                yield found
+        except CancelledError as error:
+            raise RecordingError('the Dask scheduler was lost before all recordings had their turn') from error
+        except Exception:
+            for number in missing[:at_work]:
+                try:
+                    yield from _compute(function, [(number, items[number])])
+                except Exception as error:
+                    yield number, Failure(f'its worker process was lost ({type(error).__name__})'), []
+            missing = missing[at_work:]
+
+
+def _compute(function: Callable[[T], R], items: Sequence[tuple[int, T]]) -> Iterator[tuple[int, R | Failure, list[str]]]:
+    is_alone, parent = len(items) == 1 and effective_n_jobs() > 1, os.getpid()
+    # in a process of its own, also alone; arrays are passed as they are, not as files
+    parallel = Parallel(2 if is_alone else None, return_as='generator_unordered', batch_size=1, max_nbytes=None)
+    with closing(parallel(delayed(call_guarded)(function, *item, parent) for item in items)) as found:
+        yield from found
+
+
+def collect(function: Callable[[T], R], items: Sequence[tuple[str, T]], description: str) -> tuple[list[R], dict[str, str]]:
     """Run with a progress bar; return the results in the order of the items, and the reason of every failure by name."""
     results: list[R] = []
     failed: dict[str, str] = {}
-    for name, result in show_progress(run(function, items, executor), description, len(items)):
+    for name, result in show_progress(run(function, items), description, len(items)):
         if isinstance(result, Failure):
             failed[name] = result.reason
         else:
@@ -122,16 +153,21 @@ def collect(
     return results, failed
 
 
-def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], executor: Executor, description: str) -> list[R]:
+def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], description: str) -> list[R]:
     """Run with a progress bar and return every result; raise RecordingError where an item failed."""
-    results, failed = collect(function, items, executor, description)
+    results, failed = collect(function, items, description)
     for name, reason in failed.items():
         raise RecordingError(f'{name}: {reason}')
     return results
 
 
-def call_guarded(function: Callable[[T], R], item: T) -> tuple[R | Failure, list[str]]:
-    """Return the result of a function, or its failure in words, as an exception may not survive pickling, and its warnings."""
+def call_guarded(function: Callable[[T], R], number: int, item: T, parent: int) -> tuple[int, R | Failure, list[str]]:
+    """Return the number and result of an item, or its failure in words, as an exception may not survive pickling; and warnings.
+
+    parent: process that gave the work; a worker process that is its child ends with it.
+    """
+    if os.getppid() == parent:
+        _end_with(parent)
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter('always', FocWarning)
         result: R | Failure
@@ -143,26 +179,34 @@ def call_guarded(function: Callable[[T], R], item: T) -> tuple[R | Failure, list
             place = traceback.extract_tb(error.__traceback__)[-1]
             words = f'{type(error).__name__}: {" ".join(str(error).split())} ({Path(place.filename).name}:{place.lineno})'
             result = Failure(words)
-    return result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
+    return number, result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
 
 
-def _run_alone(
-    function: Callable[[T], R], item: T, futures: Sequence[Future[Any]], executor: Executor
-) -> tuple[R | Failure, list[str]]:
-    """Compute an item again after all others.
+@cache
+def _end_with(parent: int) -> None:
+    """Let this process end soon after its parent has ended, by whatever cause."""
 
-    A Dask scheduler blames the death of a worker on all tasks that waited there; alone, only the guilty one fails again.
-    """
-    wait(futures)
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _connect(address: str) -> Any:
+    """Return the client of a Dask scheduler with workers, as a context."""
     try:
-        return executor.submit(call_guarded, function, item).result()
-    except Exception as error:
-        return Failure(f'its worker was lost: {type(error).__name__}: {" ".join(str(error).split())}'), []
-
-
-def open_executor(workers: int, scheduler: str | None = None) -> Executor:
-    """Return the executor of a number of worker processes, or of the Dask cluster of a scheduler, as a context.
-
-    Raises InputError where there is no such cluster.
-    """
-    return IsolatedProcessPool(workers) if scheduler is None else DaskExecutor(scheduler)
+        from distributed import Client
+    except ImportError as error:
+        raise InputError('--scheduler', "Dask: pip install 'foc_ros[cluster]'", error) from error
+    try:
+        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError('--scheduler', 'the address of a Dask scheduler, as in tcp://host:8786', address) from error
+    try:
+        client.wait_for_workers(1, timeout=CONNECT_S)
+    except OSError as error:
+        client.close()
+        raise InputError('--scheduler', 'a Dask scheduler with workers', f'none at {address}') from error
+    return client

@@ -1,23 +1,28 @@
-"""A recording through the predictor in the recording's own time: without ROS, clock or waiting, so that results repeat."""
+"""A recording through predictor and guidance in its own time: without ROS, clock or waiting, so that results repeat."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from foc_ros.core.config import Config
+from foc_ros.analysis.recordings import Recording
+from foc_ros.core.classes.library import Demonstration
+from foc_ros.core.config import ONLINE, Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import FocError, MessageError, RecordingError, warn
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.scene import Scene
-from foc_ros.core.types import NANOSECONDS, HandSample, Prediction, SampleStatus
+from foc_ros.core.types import NANOSECONDS, HandSample, HandState, Prediction, SampleStatus
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
+from foc_ros.io.terminal import show_progress
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
 from foc_ros.ros.intake import DROPPED, Intake
+from foc_ros.ros.messages.encode_guidance import Place
 from foc_ros.ros.transform_tree import TransformTree
 from foc_ros.ros.transforms import Transforms
 
@@ -143,3 +148,88 @@ def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = N
         for step in Replay(config).steps(reader):
             if step.prediction is not None:
                 yield step.prediction
+
+
+@dataclass(frozen=True)
+class GuidanceStep:
+    """One update: its stamp [ns], where its hand sample was, and its output."""
+
+    stamp_ns: int
+    place: Place
+    output: GuidanceOutput
+
+
+class GuidanceReplay:
+    """Updates guidance between the steps of a replay, at `guidance.rate_hz`, as a node that receives messages without delay.
+
+    An update at an instant knows the hand samples and predictions of stamps before it. Between movements, while there is no force
+    and no fresh prediction, there are no updates.
+    """
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self._pipeline = pipeline
+        self._period_ns = round(NANOSECONDS / pipeline.config.guidance.rate_hz)
+        self._state, self._first_ns, self._next_ns = GuidanceState(), 0, 0
+        self._hand: HandState | None = None
+        self._prediction: Prediction | None = None
+
+    def add(self, step: Step) -> Iterator[GuidanceStep]:
+        """Yield the updates until the hand sample of a step, then use its sample and its prediction."""
+        if step.sample is None:
+            return
+        stamp_ns, hand = step.sample.stamp_ns, self._pipeline.hand_state
+        if self._hand is None or stamp_ns < self._hand.stamp_ns:  # the recording began anew
+            self._state, self._first_ns, self._next_ns, self._prediction = GuidanceState(), stamp_ns, stamp_ns, None
+        elif self._hand is not None:
+            yield from self._update_until(stamp_ns, self._hand)
+        self._hand = hand
+        if step.prediction is not None:
+            self._prediction = step.prediction
+
+    def _update_until(self, end_ns: int, hand: HandState) -> Iterator[GuidanceStep]:
+        config = self._pipeline.config
+        while self._next_ns < end_ns:
+            output, self._state = guide(config, self._state, self._make_input(hand))
+            yield GuidanceStep(self._next_ns, Place(hand.stamp_ns, hand.frame_id, hand.height, config.plane), output)
+            self._next_ns += self._period_ns
+            if output.status is GuidanceStatus.STALE and not output.force.any() and not output.authority:
+                self._next_ns = max(self._next_ns, end_ns)
+                self._state = replace(self._state, t=(self._next_ns - self._first_ns) / NANOSECONDS)
+
+    def _make_input(self, hand: HandState) -> GuidanceInput:
+        now_ns, prediction = self._next_ns, self._prediction
+        prediction_ns = now_ns if prediction is None else prediction.stamp_ns
+        ages = (now_ns - hand.stamp_ns) / NANOSECONDS, (now_ns - prediction_ns) / NANOSECONDS
+        # seconds since the epoch would be rounded to a quarter of a microsecond
+        t = (now_ns - self._first_ns) / NANOSECONDS
+        return GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages, acceleration=hand.mean[4:6])
+
+
+def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration, ...]:
+    """Return the movements of a recording that end at a goal (`foc_ros.core.learning.movements`), at most the last `MOST_LEARNT`.
+
+    Raises RecordingError where the recording cannot be read or contains none.
+    """
+    replayed = Replay(config.with_values({'experience.learning': ONLINE, 'homotopy.library': ''}))
+    for _ in replayed.take(recording.items()):
+        pass
+    movements = replayed.pipeline.learnt.movements.finish()
+    losses = replayed.describe_losses()
+    if not movements.learnt:
+        standing = f'no movement: the hand was never faster than {config.estimator.onset_speed:g} m/s'
+        unused = losses or replayed.pipeline.not_ready_reason()
+        raise RecordingError(f'{recording.name}: {movements.refusal or unused or standing}')
+    if losses:
+        warn(f'{recording.name}: {losses}')
+    return movements.learnt
+
+
+def learn_recordings(recordings: Mapping[str, Recording], config: Config) -> tuple[list[Demonstration], dict[str, str]]:
+    """Return the movements of all recordings, with a progress bar, and why recordings could not be used, by name."""
+    learnt, failed = list[Demonstration](), dict[str, str]()
+    for name, recording in show_progress(recordings.items(), 'learn', len(recordings)):
+        try:
+            learnt.extend(learn_recording(recording, config))
+        except FocError as error:
+            failed[name] = str(error)
+    return learnt, failed

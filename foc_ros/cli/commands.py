@@ -166,10 +166,8 @@ def replay(
     check_bag(bag)
     if output is not None:
         check_new_bag(output)
-    from foc_ros.analysis import replay_files as files
-    from foc_ros.analysis.replay import Replay
-    from foc_ros.analysis.replay_guidance import GuidanceReplay
-    from foc_ros.analysis.replay_summary import Summary, facts
+    from foc_ros.analysis.replay import GuidanceReplay, Replay
+    from foc_ros.analysis.replay_output import Summary, facts, replay_to
     from foc_ros.io.bags import BagReader
     from foc_ros.io.class_library import extend_library
     from foc_ros.io.terminal import show_address, show_table
@@ -179,14 +177,12 @@ def replay(
         from foc_ros.reporting.report import ReportCollector
     played, summary = Replay(learning.prepare(params)), Summary()
     collector = None if report is None else ReportCollector()
-    consumers: list[files.Consumer] = [summary.add, *([] if collector is None else [collector.add])]
+    consumers = [summary.add, *([] if collector is None else [collector.add])]
     # The answers wait in files: nothing is printed of a recording that turns out to be damaged.
     with TemporaryFile('w+', encoding='utf-8') as predictions, TemporaryFile('w+', encoding='utf-8') as updates:
-        guided = [files.list_guidance(updates)] if json else []
-        consumers += [files.list_steps(predictions)] if json else []
         with BagReader(bag, dict(remap)) as reader:
             guiding = GuidanceReplay(played.pipeline) if guidance else None
-            files.replay_to(output, reader, played, guiding, consumers, guided)
+            replay_to(reader, played, consumers, guiding, output, *((predictions, updates) if json else ()))
             answer = summary.answer(played.intake.counts, reader.duration_s)
         if learning.learn is not None:
             answer['learned'] = extend_library(learning.learn, played.pipeline.learnt.movements.finish().learnt)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Group, Parameter, Token
 
 import foc_ros
-from foc_ros.analysis.simulation.names import ASSISTANCE, OPERATORS
+from foc_ros.analysis.simulation import ASSISTANCE, OPERATORS
 from foc_ros.core.config import ONLINE, Config
 from foc_ros.core.errors import InputError, RecordingError, collect_all, suggest
 from foc_ros.io.outputs import check_file, check_page
@@ -27,7 +27,7 @@ from foc_ros.io.topics import TYPES
 from foc_ros.ros.parameters import load_parameter_file
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
+    from contextlib import AbstractContextManager
 
 app = App(
     name='foc_ros',
@@ -179,7 +179,7 @@ class Study:
     report
         Folder for a page with plots.
     workers
-        Worker processes (default: one for each core that this process may use).
+        Worker processes (default: one for each core that this process may use; 1: this process itself).
     scheduler
         Address of a Dask scheduler, whose workers are used instead (extra: cluster).
     """
@@ -197,11 +197,11 @@ class Study:
         if self.report is not None:
             check_page('--report', self.report, page)
 
-    def open_executor(self) -> Executor:
-        """Return the executor of the workers, as a context; raise InputError where there is none."""
+    def open_workers(self) -> AbstractContextManager[None]:
+        """Return the context in which work is done by the workers; raise InputError where there are none."""
         from foc_ros.analysis import parallel
 
-        return parallel.open_executor(self.workers or len(os.sched_getaffinity(0)), self.scheduler)
+        return parallel.open_workers(self.workers or len(os.sched_getaffinity(0)), self.scheduler)
 
     def load_report(self, module: str) -> Callable[..., None]:
         """Return what writes the report, so that a missing library is reported before the work; without one it does nothing."""

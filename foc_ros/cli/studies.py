@@ -6,7 +6,7 @@ import json as json_format
 import sys
 from pathlib import Path
 
-from foc_ros.analysis.simulation.names import ASSISTANCE, HUMAN_PATHS, OPERATORS
+from foc_ros.analysis.simulation import ASSISTANCE, HUMAN_PATHS, OPERATORS
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE, check_file, check_folder
 
@@ -51,7 +51,7 @@ def learn(data: Existing, /, *, output: Path, params: Params = DEFAULTS, json: b
     recordings = find_recordings(data)
     if len(recordings) > MOST_WAYS:
         raise InputError(f'{data}', f'at most {MOST_WAYS} recordings', len(recordings))
-    from foc_ros.analysis.learn_demonstrations import learn_recordings
+    from foc_ros.analysis.replay import learn_recordings
     from foc_ros.io.class_library import save_library
 
     learnt, failed = learn_recordings(recordings, params)
@@ -83,13 +83,13 @@ def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = 
     study.check(FIT_PAGE)
     recordings = find_recordings(data)
     write_report = study.load_report('fit_report')
-    from foc_ros.analysis.fitting import comparison, fit, tables
+    from foc_ros.analysis.fitting import fit as fitting
     from foc_ros.ros.parameters import write_parameter_file
 
-    with study.open_executor() as executor:
-        found = fit.fit_parameters(recordings, study.params, executor, may_lower_eta='eta' in allow)
-    answer = tables.make_answer(found, study.params, output)
-    losses = comparison.find_worse_positions(found.comparison)
+    with study.open_workers():
+        found = fitting.fit_parameters(recordings, study.params, may_lower_eta='eta' in allow)
+    answer = fitting.make_answer(found, study.params, output)
+    losses = fitting.find_worse_positions(found.comparison)
     for loss in losses:
         print(f'foc_ros fit: {loss}', file=sys.stderr)
     if losses and 'positions' not in allow and not confirm(f'Write {output} all the same?'):
@@ -97,7 +97,7 @@ def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = 
         return 2
     write_parameter_file('--output', output, found.config)
     write_report(data.resolve().name, answer)
-    study.show(answer, tables.make_tables(answer), tables.make_sentences(answer), FIT_PAGE, tables.list_commands(answer))
+    study.show(answer, fitting.make_tables(answer), fitting.make_sentences(answer), FIT_PAGE, fitting.list_commands(answer))
     return warn_all('fit', [f'{name}: {reason}' for name, reason in found.failed.items()])
 
 
@@ -119,28 +119,28 @@ def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = F
     study.check(EVALUATION_PAGE)
     recordings = find_recordings(data)
     write_report = study.load_report('evaluation_report')
-    from foc_ros.analysis.evaluation import evaluate, observations, other_goal, tables
+    from foc_ros.analysis.evaluation import observations, other_goal, report
 
-    with study.open_executor() as executor:
-        observed, failed = observations.observe_all(recordings, study.params, executor, in_order)
+    with study.open_workers():
+        observed, failed = observations.observe_all(recordings, study.params, in_order)
         warn_all('evaluate', [f'{name}: {reason}' for name, reason in failed.items()])
         if not observed:
             print(f'foc_ros evaluate: none of the {len(failed)} recordings could be evaluated', file=sys.stderr)
             return 3
-        answer = evaluate.evaluate(observed, study.params, executor)
+        answer = report.evaluate(observed, study.params)
         if unannounced:
-            left_out, _ = observations.observe_all(other_goal.leave_goals_out(recordings), study.params, executor, in_order)
+            left_out, _ = observations.observe_all(other_goal.leave_goals_out(recordings), study.params, in_order)
             answer['other_goal'] = other_goal.score_other_goal(observed, left_out, study.params.likelihood.other_goal)
             if answer['other_goal'] is None:
                 warn_all('evaluate', ['no recording has several goals of which one could be left out'])
             else:
                 answer['verdict'].append(other_goal.describe_scores(answer['other_goal']))
-    mismatches = evaluate.find_label_mismatches(data, observed)
+    mismatches = report.find_label_mismatches(data, observed)
     differ = 'the label differs from the recorded path'
     warn_all('evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
     answer |= {'failed': failed, 'labels_not_taken': mismatches}
     write_report(data.resolve().name, answer)
-    study.show(answer, tables.make_tables(answer), answer['verdict'], EVALUATION_PAGE)
+    study.show(answer, report.make_tables(answer), answer['verdict'], EVALUATION_PAGE)
     return 2 if failed else 0
 
 
@@ -178,15 +178,15 @@ def simulate(
         raise InputError('--recordings', f'recordings of people for the operator {HUMAN_PATHS}', 'none')
     found = find_recordings(recordings) if recordings is not None and HUMAN_PATHS in operators else {}
     write_report = study.load_report('simulation_report')
-    from foc_ros.analysis.simulation import human_paths, tables
-    from foc_ros.analysis.simulation.study import make_pairs, simulate, summarise
+    from foc_ros.analysis.simulation.operators import read_tasks
+    from foc_ros.analysis.simulation.study import make_pairs, make_tables, simulate, summarise
 
-    tasks = human_paths.read_tasks(found.values(), study.params) if found else []
-    with study.open_executor() as executor:
-        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params, executor)
+    tasks = read_tasks(found.values(), study.params) if found else []
+    with study.open_workers():
+        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params)
     cells = summarise(results, seed)
     write_report(cells, results)
-    study.show({'cells': cells, 'seed': seed}, tables.make_tables(cells), (), SIMULATION_PAGE)
+    study.show({'cells': cells, 'seed': seed}, make_tables(cells), (), SIMULATION_PAGE)
     return 0
 
 
@@ -206,7 +206,7 @@ def convert(csv: Existing, /, *, output: Path, obstacles: Existing | None = None
         Columns x_m, y_m[, z_m, recording].
     """
     check_folder('--output', output)
-    from foc_ros.analysis.convert import convert_tables
+    from foc_ros.analysis.recordings import convert_tables
 
     print(convert_tables(csv, obstacles, goals, output))
     return 0

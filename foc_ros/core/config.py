@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from typing import Any, TypeVar, cast
 
 from .errors import ParameterError, join_errors, suggest
@@ -51,7 +52,17 @@ def _p(default: Any, meaning: str, unit: str = '', low: float | None = None, hig
 
 
 @dataclass(frozen=True)
-class FocConfig:
+class Group:
+    """Base of the groups of parameters: each value is checked, and has the type of its default, once a group is created."""
+
+    def __post_init__(self) -> None:
+        """Raise ParameterError, which names all wrong values with their bounds."""
+        name = type(self).__name__.removesuffix('Config').lower()
+        vars(self).update(_check_fields(self, f'{name}.'))
+
+
+@dataclass(frozen=True)
+class FocConfig(Group):
     """The forward optimal control."""
 
     steps: int = _p(50, 'number of control steps N of the horizon', '', 5, 400)
@@ -84,7 +95,7 @@ class FocConfig:
 
 
 @dataclass(frozen=True)
-class DurationConfig:
+class DurationConfig(Group):
     """Duration of the movement, and how it ends."""
 
     model: str = _p('fitts', 'duration of a movement: fixed, or by Fitts law', choices=DURATION_MODELS)
@@ -101,7 +112,7 @@ class DurationConfig:
 
 
 @dataclass(frozen=True)
-class CovarianceConfig:
+class CovarianceConfig(Group):
     """Factors on the predicted standard deviations."""
 
     near: float = _p(
@@ -120,7 +131,7 @@ class CovarianceConfig:
 
 
 @dataclass(frozen=True)
-class EstimatorConfig:
+class EstimatorConfig(Group):
     """The Kalman filter of the hand."""
 
     position_stddev: float = _p(0.001, 'standard deviation of a measured position', 'm', 1e-7, 1.0)
@@ -141,7 +152,7 @@ class EstimatorConfig:
 
 
 @dataclass(frozen=True)
-class HomotopyConfig:
+class HomotopyConfig(Group):
     """Homotopy classes that are considered."""
 
     max_candidates: int = _p(
@@ -152,7 +163,7 @@ class HomotopyConfig:
 
 
 @dataclass(frozen=True)
-class LikelihoodConfig:
+class LikelihoodConfig(Group):
     """Conversion of costs to likelihoods."""
 
     rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
@@ -187,7 +198,7 @@ class LikelihoodConfig:
 
 
 @dataclass(frozen=True)
-class ExperienceConfig:
+class ExperienceConfig(Group):
     """Use of recordings as evidence: those in the class library (`homotopy.library`), and those that are learnt."""
 
     learning: str = _p(
@@ -198,7 +209,7 @@ class ExperienceConfig:
 
 
 @dataclass(frozen=True)
-class SceneConfig:
+class SceneConfig(Group):
     """Use of the scene topics."""
 
     timeout_s: float = _p(
@@ -211,11 +222,8 @@ class SceneConfig:
     hand_radius: float = _p(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
 
 
-Group = TypeVar('Group', DurationConfig, CovarianceConfig)
-
-
 @dataclass(frozen=True)
-class FramesConfig:
+class FramesConfig(Group):
     """Transforms of messages that are in another frame than the working frame."""
 
     tolerance_s: float = _p(
@@ -224,7 +232,7 @@ class FramesConfig:
 
 
 @dataclass(frozen=True)
-class GuidanceConfig:
+class GuidanceConfig(Group):
     """The guiding force: `core/guidance`."""
 
     enabled: bool = _p(False, 'whether the node publishes guidance; without it the node is a predictor only')
@@ -249,6 +257,9 @@ class GuidanceConfig:
     max_speed: float = _p(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
     hold_s: float = _p(0.25, 'age of the newest pose or prediction after which the force is released', 's', 0.001, 10.0)
     ramp_s: float = _p(0.1, 'time within which a released force becomes zero', 's', 0.001, 10.0)
+    unstamped: bool = _p(
+        False, 'whether the force is also published without a stamp, on `~/guidance/wrench_unstamped`', read_only=True
+    )
     authority: float = _p(0.5, 'largest share of guidance in `~/guidance/twist`', '', 0.0, 1.0)
 
 
@@ -267,6 +278,11 @@ class Config:
     <Config rate_hz=20.0, foc.eta=0.95>
     >>> config.foc.eta
     0.95
+
+    The same for one group, given as a whole or by the values that differ from the defaults:
+
+    >>> foc_ros.Config(rate_hz=20.0, foc={'eta': 0.95})
+    <Config rate_hz=20.0, foc.eta=0.95>
     """
 
     rate_hz: float = _p(50.0, 'predictions per second of message time', 'Hz', 0.1, 1000.0)
@@ -288,6 +304,19 @@ class Config:
     scene: SceneConfig = field(default_factory=SceneConfig)
     frames: FramesConfig = field(default_factory=FramesConfig)
     guidance: GuidanceConfig = field(default_factory=GuidanceConfig)
+
+    def __post_init__(self) -> None:
+        """Take a mapping as a group of these values; raise ParameterError for anything that is no value of its parameter."""
+        for item in fields(self):
+            given = getattr(self, item.name)
+            if 'bound' in item.metadata or isinstance(given, cast('type', item.default_factory)):
+                continue
+            if not isinstance(given, Mapping):
+                expected = f'a {item.type}, or a mapping of its parameters to their values'
+                raise ParameterError(item.name, expected, repr(given))
+            defaults = replace_values(Config(), {f'{item.name}.{name}': value for name, value in given.items()})
+            vars(self)[item.name] = getattr(defaults, item.name)
+        vars(self).update(_check_fields(self))
 
     def __repr__(self) -> str:
         """Name the parameters that differ from their defaults."""
@@ -331,7 +360,10 @@ def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Paramete
             yield from list_parameters(cast('type', item.default_factory), f'{prefix}{item.name}.')
 
 
-def clip_values(group: Group, values: Mapping[str, float]) -> Group:
+G = TypeVar('G', bound=Group)
+
+
+def clip_values(group: G, values: Mapping[str, float]) -> G:
     """Return a group of parameters with other numbers, each of which stays within its bounds."""
     bounds = {item.name: item.metadata['bound'] for item in fields(group)}
     return replace(group, **{name: min(max(value, bounds[name].low), bounds[name].high) for name, value in values.items()})
@@ -363,6 +395,30 @@ def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     if errors:
         raise join_errors(errors)
     return config
+
+
+def _check_fields(group: Group | Config, prefix: str = '') -> dict[str, float | int | str | bool]:
+    """Return the values besides the defaults of a group, in the types of these; an error names all that are wrong."""
+    errors: list[ParameterError] = []
+    values = {}
+    kind: Any = type(group)
+    for name, default, bound in _list_fields(kind):
+        value = getattr(group, name)
+        if value is default:
+            continue
+        try:
+            values[name] = _check_value(Parameter(prefix + name, default, bound), value)
+        except ParameterError as error:
+            errors.append(error)
+    if errors:
+        raise join_errors(errors)
+    return values
+
+
+@cache
+def _list_fields(group: type) -> tuple[tuple[str, Any, Bound], ...]:
+    """Return name, default and bound of the parameters of a config class itself."""
+    return tuple((item.name, item.default, item.metadata['bound']) for item in fields(group) if 'bound' in item.metadata)
 
 
 def _find_parameter(name: str, value: object, known: Mapping[str, Parameter]) -> Parameter:

@@ -134,7 +134,7 @@ def predict(
         notes=dict(found.notes) | {name: count for name, count in counts.items() if count},
         solve_s=time.perf_counter() - began,
         obstacles=obstacles,
-        goals=goals,
+        goal_positions=goals,
         cleared=tuple(scene.cleared.tolist()),
         unknown=rest.unknown,
         other=rest.other,

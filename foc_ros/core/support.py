@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Mapping
+from numbers import Number
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .config import Config
 from .errors import InputError, SceneError
-from .types import NANOSECONDS, Array
+from .types import NANOSECONDS, Array, Goal, name_goal
 
 FARTHEST = 1e4
 """Bound on every length, velocity and acceleration, in SI units."""
@@ -42,6 +45,47 @@ def check_position(field: str, value: ArrayLike) -> Array:
     if find_shape(value) not in ((2,), (3,)):
         raise SceneError(field, 'two numbers [m] in the task plane, or three with the height over it', repr(value))
     return check_vector(field, value, find_shape(value)[0])
+
+
+class GoalTable(NamedTuple):
+    """Goals that a user gave: positions (g, 2) [m], heights (g,) [m] or None, names (g,), objects (g,) or none."""
+
+    positions: Array
+    heights: Array | None
+    names: tuple[str, ...]
+    objects: tuple[str | None, ...]
+
+
+def collect_goals(field: str, goals: ArrayLike | Goal | Iterable[Goal | ArrayLike]) -> GoalTable:
+    """Return the table of goals, each a position (2,) or (3,) or a `Goal`, or of one that is given without a list.
+
+    Raises SceneError for anything else, for goals of which only some have a height, and for a name that occurs twice.
+    """
+    if not isinstance(goals, (Goal, Iterable)) or isinstance(goals, (str, Mapping)):
+        raise SceneError(field, 'positions or Goals', repr(goals))
+    rows: list[tuple[str, Any]] = [(field, goals)]
+    if not isinstance(goals, Goal) and not _is_position(goals):
+        rows = [(f'{field}[{row}]', each) for row, each in enumerate(goals)]
+    given = [each if isinstance(each, Goal) else Goal(check_position(name, each)) for name, each in rows]
+    if not given:
+        raise SceneError(field, 'at least one position', 'none')
+    sizes = {len(np.asarray(each.position)) for each in given}
+    if len(sizes) > 1:
+        raise SceneError(field, 'a height for all goals or for none', 'heights for some')
+    points = np.array([each.position for each in given])
+    names = tuple(each.name or name_goal(row) for row, each in enumerate(given))
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise SceneError(field, 'a different name for each goal', f'{twice!r} twice')
+    has_names = any(each.name for each in given)
+    objects = tuple(each.object for each in given) if any(each.object for each in given) else ()
+    return GoalTable(points[:, :2], points[:, 2] if sizes == {3} else None, names if has_names else (), objects)
+
+
+def _is_position(goals: Any) -> bool:
+    """Return whether something is one position rather than a list of them: numbers alone."""
+    shape = find_shape(goals)
+    return len(shape) == 1 and shape[0] > 0 and all(isinstance(each, Number) for each in goals)
 
 
 def check_number(field: str, value: object, low: float = -FARTHEST, high: float = FARTHEST) -> float:

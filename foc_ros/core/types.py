@@ -5,21 +5,24 @@ message -> HandSample -> HandState -> Candidates -> Solutions -> Prediction -> m
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import SceneError
+from .errors import InputError, SceneError
+from .interpolation import interpolate_covariance, interpolate_position
 
 Array = NDArray[np.float64]
 
 NANOSECONDS = 1_000_000_000
 LEFT, RIGHT = 1, -1
 """Side on which a path passes an obstacle, seen in the direction of travel."""
+ROUNDING = 1e-9
+"""Relative error of a time that may be that of rounding."""
 SHOWN_NAMES = 5
 """Number of obstacles that the repr of a table names."""
 
@@ -264,18 +267,24 @@ class Goal(Record):
         return f'<Goal {self.name + " " if self.name else ""}at ({numbers}) m>'
 
 
+def name_goal(row: int) -> str:
+    """Return the name of the goal of a row that was given none, as labels begin with it."""
+    return f'goal{row}'
+
+
 def describe_class(sides: Iterable[tuple[str, int]], goal: str = '') -> str:
     """Return a homotopy class in words, such as `left of l1, right of l2`; goal: its name, which comes first if it is given."""
     words = ', '.join(f'{"left" if side == LEFT else "right"} of {name}' for name, side in sides) or 'direct'
     return f'{goal}: {words}' if goal else words
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Candidate(Record):
     """A homotopy class towards one goal that is followed, with a timed guess of a path inside it.
 
     label: stable name such as `goal0:+l1-l2` (+ passes on the left); goal: row of the goals; sides: (obstacle id, LEFT or
-    RIGHT) of the obstacles in the name; guess (N + 1, 2): positions at steps 0..N [m]; length: of the path [m].
+    RIGHT) of the obstacles in the name; guess (N + 1, 2): positions at steps 0..N [m]; length: of the path [m]; goal_name: what
+    the goal is called, `goal0` and so on if not given.
     """
 
     label: str
@@ -283,11 +292,16 @@ class Candidate(Record):
     sides: tuple[tuple[str, int], ...]
     guess: Array
     length: float
+    goal_name: str = ''
+
+    def __repr__(self) -> str:
+        """Say label and length."""
+        return f'<Candidate {self.label}, {self.length:.3g} m>'
 
     @property
     def description(self) -> str:
         """The homotopy class in words, such as `goal0: left of l1, right of l2`."""
-        return describe_class(self.sides, f'goal{self.goal}')
+        return describe_class(self.sides, self.goal_name or name_goal(self.goal))
 
 
 class Status(Enum):
@@ -454,6 +468,10 @@ class PredictedCandidate:
         """Say label, status and likelihood."""
         return f'<PredictedCandidate {self.label}, {self.status.value}, likelihood {self.likelihood:.2f}>'
 
+    def with_goal_name(self, name: str) -> PredictedCandidate:
+        """Return the candidate with a name for its goal, for its description."""
+        return replace(self, candidate=replace(self.candidate, goal_name=name))
+
     @property
     def is_solved(self) -> bool:
         """Whether the solution meets the wanted eta."""
@@ -511,6 +529,59 @@ class PredictedCandidate:
         """Seconds from now, (N + 1,) [s]."""
         return self.solution.times
 
+    def position_at(self, t: ArrayLike) -> Array:
+        """Return the mean position at times between the steps, too.
+
+        Parameters
+        ----------
+        t : float or array_like of shape (q,)
+            Seconds from now, in [0, `times[-1]`].
+
+        Returns
+        -------
+        ndarray of shape (2,) or (q, 2)
+            Position [m]: within a step the cubic through the positions and velocities at both ends.
+
+        Raises
+        ------
+        InputError
+            For a time beyond the prediction, or a candidate without a path.
+        """
+        return interpolate_position(self.mean, self.solution.dt, self._check_times(t))
+
+    def covariance_at(self, t: ArrayLike) -> Array:
+        """Return the covariance of the position at times between the steps, too: the total uncertainty.
+
+        Parameters
+        ----------
+        t : float or array_like of shape (q,)
+            Seconds from now, in [0, `times[-1]`].
+
+        Returns
+        -------
+        ndarray of shape (2, 2) or (q, 2, 2)
+            Covariance [m^2]: within a step the quintic through the values and their first two derivatives at both ends.
+
+        Raises
+        ------
+        InputError
+            For a time beyond the prediction, or a candidate without a path.
+        """
+        return interpolate_covariance(self.covariance, self.solution.dt, self._check_times(t))
+
+    def _check_times(self, t: ArrayLike) -> Array:
+        if len(self.mean) < 2:
+            raise InputError('t', 'a candidate with a path', f'{self.label}, {self.status.value}')
+        end = float(self.times[-1])
+        try:
+            times = np.asarray(t, dtype=float)
+        except (TypeError, ValueError):
+            times = np.array(np.nan)
+        if not ((times >= 0.0) & (times <= end * (1.0 + ROUNDING))).all():
+            raise InputError('t', f'seconds from now in [0, {end:.6g}], the end of the prediction', repr(t))
+        checked: Array = np.minimum(times, end)
+        return checked
+
     @property
     def eta(self) -> float:
         """Probability of avoidance that the solution achieves."""
@@ -523,15 +594,34 @@ class PredictedCandidate:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class PredictedGoal(Record):
+    """One goal of a prediction.
+
+    name: as given, `goal0` and so on by its row otherwise; position (2,) [m]. likelihood in [0, 1]: of its candidates together;
+    None where none of them has one, which says nothing about the goal. What is `unknown` in a prediction may belong to any goal.
+    """
+
+    name: str
+    position: Array
+    likelihood: float | None
+
+    def __repr__(self) -> str:
+        """Say name, position and likelihood."""
+        x, y = self.position.tolist()
+        shown = 'unknown' if self.likelihood is None else f'{self.likelihood:.2f}'
+        return f'<PredictedGoal {self.name} at ({x:g}, {y:g}) m, likelihood {shown}>'
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Prediction(Record):
     """The prediction that belongs to one hand sample.
 
     candidates: solved, compromised and estimated ones, most likely first; then those without a likelihood, with their status.
     most_likely: label after hysteresis, None where no candidate has a likelihood. notes: facts for diagnostics (relaxed margins,
     merged classes, culled obstacles), as counts by name. solve_s: wall time of the whole prediction [s]. obstacles: all that were
-    given, at the stamp of the hand; goals (g, 2) [m]. cleared (n,): whether the predicted height clears each obstacle, which
-    therefore does not block. unknown: share of the likelihood that belongs to classes that are not among the candidates; other:
-    that of a goal that nobody announced.
+    given, at the stamp of the hand; goal_positions (g, 2) [m]; goal_names (g,): empty if none was given. cleared (n,): whether
+    the predicted height clears each obstacle, which therefore does not block. unknown: share of the likelihood that belongs to
+    classes that are not among the candidates; other: that of a goal that nobody announced.
     """
 
     stamp_ns: int
@@ -542,10 +632,23 @@ class Prediction(Record):
     notes: dict[str, int] = field(default_factory=dict)
     solve_s: float = 0.0
     obstacles: Obstacles = field(default_factory=make_obstacles)
-    goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    goal_positions: Array = field(default_factory=lambda: np.zeros((0, 2)))
     cleared: tuple[bool, ...] = ()
     unknown: float = 0.0
     other: float = 0.0
+    goal_names: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        """Count the candidates."""
+        return len(self.candidates)
+
+    def __iter__(self) -> Iterator[PredictedCandidate]:
+        """Yield the candidates in their order."""
+        return iter(self.candidates)
+
+    def __bool__(self) -> bool:
+        """Be true, also without candidates: a prediction is there."""
+        return True
 
     def __repr__(self) -> str:
         """Say time, number of candidates and the most likely one."""
@@ -558,6 +661,22 @@ class Prediction(Record):
     def t(self) -> float:
         """Time of the hand sample [s]."""
         return self.stamp_ns / NANOSECONDS
+
+    def with_goal_names(self, names: tuple[str, ...]) -> Self:
+        """Return the prediction with names (g,) for its goals, which then stand in the descriptions of its candidates, too."""
+        candidates = tuple(each.with_goal_name(names[each.candidate.goal]) for each in self.candidates)
+        return replace(self, candidates=candidates, goal_names=names)
+
+    @property
+    def goals(self) -> tuple[PredictedGoal, ...]:
+        """The goals in their order, each with its name, its position and its likelihood."""
+        likelihoods: dict[int, float] = {}
+        for each in self.candidates_with_likelihood:
+            row = each.candidate.goal
+            likelihoods[row] = likelihoods.get(row, 0.0) + each.likelihood
+        names = self.goal_names or tuple(map(name_goal, range(len(self.goal_positions))))
+        rows = zip(names, self.goal_positions, strict=True)
+        return tuple(PredictedGoal(*each, likelihoods.get(row)) for row, each in enumerate(rows))
 
     @property
     def blocking_obstacles(self) -> Obstacles:

@@ -20,11 +20,16 @@ from types import TracebackType
 from typing import Any
 
 import yaml
-import zstandard  # a requirement of mcap
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 
-from foc_ros.core.errors import RecordingError, warn
+from foc_ros.core.errors import FocError, RecordingError, warn
+
+try:
+    import mcap  # noqa: F401  of `mcap_files`
+    import zstandard  # a requirement of mcap
+    from rosbags.interfaces import Connection
+    from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
+except ImportError as error:
+    raise FocError(f'recordings need the package {error.name}: pip install mcap rosbags') from error
 
 from . import topics
 from .channels import TYPESTORE as TYPESTORE

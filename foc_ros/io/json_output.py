@@ -19,6 +19,9 @@ def encode_prediction(prediction: Prediction) -> dict[str, Any]:
         'most_likely': prediction.most_likely,
         'unknown': prediction.unknown,
         'other': prediction.other,
+        'goals': [
+            {'name': each.name, 'position': each.position.tolist(), 'likelihood': each.likelihood} for each in prediction.goals
+        ],
         'candidates': [encode_candidate(each) for each in candidates],
     }
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from foc_ros.analysis.fitting.comparison import find_worse_positions
+from foc_ros.analysis.fitting.fit import find_worse_positions
 from foc_ros.core.errors import FocError, InputError
 
 from .recording import OPERATOR, PARAMETERS, UNGUIDED, Recording

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from foc_ros.analysis.fitting.tables import (
+from foc_ros.analysis.fitting.fit import (
     COMPARISON_COLUMNS,
     PARAMETER_COLUMNS,
     SCORE_COLUMNS,

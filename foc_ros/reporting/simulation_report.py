@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.simulation.names import FOC, NONE
+from foc_ros.analysis.simulation import FOC, NONE
 from foc_ros.analysis.simulation.operators import Task
-from foc_ros.analysis.simulation.study import PairResult
-from foc_ros.analysis.simulation.tables import COLUMNS, make_tables
-from foc_ros.analysis.simulation.trial import Trial
+from foc_ros.analysis.simulation.study import COLUMNS, PairResult, Trial, make_tables
 from foc_ros.io.outputs import SIMULATION_PAGE
 
 from .draw import draw_scene, get_class_style, open_figure

@@ -285,10 +285,10 @@ def build_snapshot(prediction: Prediction) -> Snapshot:
     return Snapshot(
         prediction.stamp_ns,
         prediction.obstacles,
-        prediction.goals,
-        build_candidate_views(order_candidates(prediction), len(prediction.goals)),
+        prediction.goal_positions,
+        build_candidate_views(order_candidates(prediction), len(prediction.goal_positions)),
         prediction.most_likely,
-        build_unsolved_views(prediction.candidates, len(prediction.goals)),
+        build_unsolved_views(prediction.candidates, len(prediction.goal_positions)),
         prediction.solve_s,
         next((each.candidate.guess[0] for each in sorted(prediction.candidates, key=lambda each: each.age_s)), None),
         tuple(name for name, is_cleared in zip(prediction.obstacles.ids, prediction.cleared, strict=False) if is_cleared),

@@ -23,11 +23,12 @@ from rclpy.qos import (
 )
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
+from foc_ros.core.types import Prediction, name_goal
 from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
-from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, TWIST_TYPE
-from .messages.encode_prediction import OUTPUTS
-from .messages.types import find_message_class
+from .messages.encode_guidance import GUIDANCE_OUTPUTS, LIVE_OUTPUTS, TWIST, TWIST_TYPE
+from .messages.encode_prediction import GOAL_LIKELIHOOD_TYPE, OUTPUTS, encode_goal_likelihoods
+from .messages.types import MessageTypes, find_message_class
 
 INPUTS = (GOALS, GOAL, CLOUD, MARKERS, COLLISION, DETECTIONS, HAND)
 """Input topics in the order in which the executor takes their messages: the scene before the hand."""
@@ -36,6 +37,8 @@ BEST_EFFORT = (HAND, CLOUD, DETECTIONS)
 HAND_DEPTH = 200
 """Length of the queue of hand poses: 0.2 s at 1 kHz, during which a prediction may be computed."""
 SCENE_DEPTH, OUTPUT_DEPTH = 10, 10
+MOST_GOAL_TOPICS = 16
+"""Number of goals with a topic of their own: each costs an endpoint in every participant. `~/likelihoods_by_name` has all."""
 OVERRIDABLE = QoSOverridingOptions(
     (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
 )
@@ -114,7 +117,8 @@ def create_command_subscription(node: Node, receive: Callable[[Any], None]) -> A
 
 def create_guidance_publishers(node: Node) -> dict[str, Any]:
     """Create the publishers of guidance, by the name of the topic below the node's name."""
-    kinds = {name: kind for name, (kind, _) in GUIDANCE_OUTPUTS.items()} | {TWIST: TWIST_TYPE}
+    outputs = LIVE_OUTPUTS if node.get_parameter('guidance.unstamped').value else GUIDANCE_OUTPUTS
+    kinds = {name: kind for name, (kind, _) in outputs.items()} | {TWIST: TWIST_TYPE}
     return {name: _create_publisher(node, name, kind) for name, kind in kinds.items()}
 
 
@@ -127,6 +131,40 @@ def find_missing_packages() -> dict[str, str]:
 def create_publishers(node: Node) -> dict[str, Any]:
     """Create the publishers of the outputs, by the name of the topic below the node's name."""
     return {name: _create_publisher(node, name, kind) for name, (kind, _) in OUTPUTS.items()}
+
+
+class GoalTopics:
+    """One topic for the likelihood of each goal, `~/goal_likelihood/goal0` and so on, which any tool plots by its name.
+
+    A topic is made with the first prediction that has its goal. `remove_absent`, which the node calls once a second, removes
+    those of goals that are gone, so that goals that come and go do not keep the graph busy.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._goals = 0
+        self.publishers: list[Any] = []
+
+    def publish(self, prediction: Prediction, types: MessageTypes) -> None:
+        """Publish the likelihood of each goal of which something is known; there is no message for another."""
+        self._goals = min(len(prediction.goal_positions), MOST_GOAL_TOPICS)
+        for row in range(len(self.publishers), self._goals):
+            self.publishers.append(_create_publisher(self._node, f'goal_likelihood/{name_goal(row)}', GOAL_LIKELIHOOD_TYPE))
+        heard = [row for row in range(self._goals) if self.publishers[row].get_subscription_count()]
+        messages = encode_goal_likelihoods(prediction, types) if heard else {}
+        for row in heard:
+            if row in messages and self._node.context.ok():
+                self.publishers[row].publish(messages[row])
+
+    def remove_absent(self) -> None:
+        """Remove the topics of goals that the last prediction did not have."""
+        while len(self.publishers) > self._goals:
+            self._node.destroy_publisher(self.publishers.pop())
+
+    def destroy(self) -> None:
+        """Remove all topics."""
+        self._goals = 0
+        self.remove_absent()
 
 
 def _create_publisher(node: Node, name: str, kind: str) -> Any:

@@ -16,7 +16,7 @@ from .endpoints import create_guidance_publishers
 from .guidance_loop import GuidanceLoop
 from .health import THROTTLE_S
 from .messages.decode_poses import decode_frame
-from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, Place, blend_twist, encode_guidance_markers
+from .messages.encode_guidance import LIVE_OUTPUTS, TWIST, Place, blend_twist, encode_guidance_markers
 from .messages.types import MessageTypes, RclpyTypes
 
 
@@ -76,8 +76,8 @@ class GuidanceTopics:
 
     def _publish_output(self, output: GuidanceOutput, place: Place) -> None:
         """Publish an output; this happens in the thread of guidance."""
-        for name, (_, encode) in GUIDANCE_OUTPUTS.items():
-            if self.publishers[name].get_subscription_count():
+        for name, (_, encode) in LIVE_OUTPUTS.items():
+            if name in self.publishers and self.publishers[name].get_subscription_count():
                 self._publish(name, encode(output, place, self._thread_types))
 
     def _publish(self, name: str, message: Any) -> None:

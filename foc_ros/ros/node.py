@@ -37,6 +37,7 @@ from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MAR
 
 from .endpoints import (
     INPUTS,
+    GoalTopics,
     create_command_subscription,
     create_publishers,
     create_subscriptions,
@@ -82,6 +83,7 @@ class FocNode(LifecycleNode):
         self._has_predicted = False
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
+        self._goal_topics = GoalTopics(self)
         self._guidance = GuidanceTopics(self, self._live_parameters.config, self.report)
         try:
             self._tf: TfListener | None = TfListener(self, self._take_held)
@@ -176,6 +178,7 @@ class FocNode(LifecycleNode):
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
+        self._goal_topics.destroy()
         self._inputs, self._outputs = {}, {}
 
     def _enter(self, state: str) -> TransitionCallbackReturn:
@@ -324,6 +327,7 @@ class FocNode(LifecycleNode):
             if name == 'markers':
                 message.markers.extend(self._guidance.encode_markers(self._types))
             self._publish(self._outputs[name], message)
+        self._goal_topics.publish(prediction, self._types)
         self._monitor.note_prediction(prediction, ended.start_s, monotonic())
         if not self._has_predicted:
             self._has_predicted = True
@@ -341,6 +345,7 @@ class FocNode(LifecycleNode):
     def _publish_health(self) -> None:
         self.polling.take()  # a hand whose poses wait here is not silent
         self._report_missing_packages()
+        self._goal_topics.remove_absent()
         clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
         busy_s = monotonic() - present.start_s if present is not None else 0.0

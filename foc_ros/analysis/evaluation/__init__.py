@@ -3,9 +3,7 @@
 A baseline is added by :func:`register_baseline`.
 """
 
-from .baselines import Baseline, register_baseline
-from .forecasts import Forecast
-from .observations import Observation, ObservedRecording
-from .questions import Question
+from foc_ros.analysis.evaluation.baselines import Baseline, Forecast, register_baseline
+from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, Question
 
 __all__ = ['Baseline', 'Forecast', 'Observation', 'ObservedRecording', 'Question', 'register_baseline']

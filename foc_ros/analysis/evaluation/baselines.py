@@ -1,29 +1,42 @@
-"""The predictors that `evaluate` compares, each with the settings among which cross-validation chooses.
+"""The predictors that `evaluate` compares, each with the settings among which cross-validation chooses, and their forecasts.
 
-Constant velocity, nearest gap and shortest path name one answer and get a confidence in it. A baseline is added from outside by
-:func:`register_baseline`; the built-in ones are registered in the same way.
+What a predictor leaves over, such as the unknown share, is spread evenly over the possible answers. Every predictor leaves at
+least `UNCERTAINTY`, so that an answer that no candidate gives is unlikely, not impossible. A candidate without a likelihood
+counts as the node publishes it: 0. Constant velocity, nearest gap and shortest path name one answer and get a confidence in it.
+
+A baseline is added from outside by :func:`register_baseline`; the built-in ones are registered in the same way.
+
+**Straight minimum jerk** is the movement to a goal, obstacles disregarded: `core.hand.straight`.
+
+**The Singer model** of a manoeuvring target (Singer 1970, doi:10.1109/TAES.1970.310128) knows no scene. Per axis the state is
+(position, velocity, acceleration). The acceleration has the standard deviation sigma and decays with the time constant tau. It
+is driven by white noise, a' = -a / tau + w, of spectral density 2 sigma^2 / tau. A Kalman filter follows the recorded positions,
+and its state is propagated ahead. All settings are filtered together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
 
+from foc_ros.analysis.evaluation.observations import GOAL, Answer, Observation, ObservedRecording, Question
 from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig
-from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.hand.straight import compute_straight_effort, compute_straight_jerk
+from foc_ros.core.likelihood import OWN_SPREAD, compute_likelihoods
 from foc_ros.core.registry import Registry
-from foc_ros.core.types import LEFT, RIGHT, Array
+from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Record
 
-from .forecasts import Forecast, boltzmann_shares, power_rule_shares, published_shares
-from .minimum_jerk import compute_straight_costs
-from .observations import Observation, ObservedRecording
-from .questions import GOAL, Answer, Question
-
+UNCERTAINTY = 0.01
+TIE = 1e-12
+FIRST_SPEED = 1.0
+"""Standard deviation of the velocity at the first sample [m/s]."""
 PUBLISHED, REFITTED, PLAIN, UNIFORM, BOLTZMANN = 'foc', 'foc, held out', 'foc, plain rule', 'uniform', 'Boltzmann'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
@@ -36,6 +49,182 @@ HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS = (
 """Values that are tried where near and far choices differ."""
 RATES = tuple(float(rate) for rate in np.geomspace(0.01, 100.0, 25))
 """Inverse temperatures that are tried, in parts of one over the median effort to go."""
+BASELINES = Registry('baseline', {})
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast(Record):
+    """Probabilities of the m answers of a question (m,); each_other: of each possible answer that is not listed."""
+
+    probability: Array
+    each_other: float
+
+    @classmethod
+    def from_shares(cls, shares: Array, question: Question) -> Forecast:
+        """Sum shares (k,) of all candidates by the answers that they give."""
+        by_answer = np.bincount(question.given, shares, len(question.answers)).astype(float)
+        total = float(by_answer.sum())
+        even = by_answer / total if total > 0.0 else by_answer
+        return cls.from_answer_shares(even, question, 1.0 - (1.0 - UNCERTAINTY) * min(total, 1.0))
+
+    @classmethod
+    def from_answer(cls, answer: Answer, confidence: float, question: Question) -> Forecast:
+        """Give one answer a confidence in [0, 1 - UNCERTAINTY]."""
+        named = np.array([1.0 if each == answer else 0.0 for each in question.answers])
+        return cls.from_answer_shares(named, question, 1.0 - confidence)
+
+    @classmethod
+    def from_answer_shares(cls, shares: Array, question: Question, rest: float) -> Forecast:
+        """Give the answers their shares (m,) of 1 - rest, and spread the rest evenly over the possible answers."""
+        each = rest / question.possible
+        return cls((1.0 - rest) * shares + each * question.is_possible, each)
+
+    @classmethod
+    def uniform(cls, question: Question) -> Forecast:
+        """Give all possible answers the same probability."""
+        return cls.from_answer_shares(np.zeros(len(question.answers)), question, 1.0)
+
+    def true_probability(self, question: Question) -> float:
+        """Return the probability of the true answer."""
+        return float(self.probability[question.truth])
+
+    def confidence(self) -> float:
+        """Return the probability of the likeliest answer."""
+        return float(max(self.probability.max(), self.each_other))
+
+    def correctness(self, question: Question) -> float:
+        """Return 1 where the likeliest answer is true, else 0; each of several equally likely answers counts its part."""
+        is_likeliest = self.probability >= self.confidence() - TIE
+        unlisted = question.unlisted if self.each_other >= self.confidence() - TIE else 0
+        return float(is_likeliest[question.truth] / (is_likeliest.sum() + unlisted))
+
+
+def published_shares(observation: Observation, _: None = None) -> Array:
+    """Return the shares (k,) of the candidates by the likelihoods that the node publishes."""
+    return observation.candidates.likelihood
+
+
+def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Array:
+    """Return the shares (k,) that the node would publish to a known operator with other parameters of the likelihood."""
+    candidates = observation.candidates
+    solved = np.flatnonzero(candidates.has_likelihood)
+    branch_times, shortfalls = candidates.branch_times.take(solved), candidates.safety_shortfall[solved]
+    time_s = float(candidates.time_s[solved].min()) if len(solved) else 0.0
+    decided = branch_times, shortfalls, candidates.decisions, time_s, OWN_SPREAD
+    shares = compute_likelihoods(candidates.cost_to_go[solved], config, *decided)
+    return _share_among_solved(observation, shares)
+
+
+def boltzmann_shares(observation: Observation, inverse_temperature: float) -> Array:
+    """Return the maximum-entropy rule exp(-b J), (k,); b: inverse temperature [s^5/m^2]."""
+    cost = observation.candidates.cost_to_go[observation.candidates.has_likelihood]
+    weights = np.exp(-inverse_temperature * (cost - cost.min()))
+    return _share_among_solved(observation, weights / weights.sum())
+
+
+def _share_among_solved(observation: Observation, solved: Array) -> Array:
+    """Return shares (k,) of all candidates from those of the ones that take part; the others have none."""
+    shares = np.zeros(len(observation.candidates))
+    shares[observation.candidates.has_likelihood] = solved
+    return shares
+
+
+def compute_straight_costs(observation: Observation) -> Array:
+    """Return the cost [m^2/s^5] of the movement to each goal, (g,): the integral of squared jerk."""
+    return compute_straight_effort(_find_state(observation), observation.goals, _find_times(observation))
+
+
+def compute_straight_positions(observation: Observation, goal: int, seconds: Array) -> Array:
+    """Return the positions (h, 2) [m] of the movement to a goal some seconds (h,) from now; at the goal once it has ended."""
+    state, times_s = _find_state(observation), _find_times(observation)[[goal]]
+    alpha, beta, gamma = (each[0] for each in compute_straight_jerk(state, observation.goals[[goal]], times_s))
+    t = np.minimum(seconds, times_s[0])[:, None]
+    x, v, a = state
+    return np.asarray(x + v * t + a * t**2 / 2 + (gamma * t**3 / 6 + beta * t**4 / 24 + alpha * t**5 / 120))
+
+
+def _find_state(observation: Observation) -> Array:
+    """Return position, velocity and acceleration (3, 2); at rest the last two are noise, and 0 as in the predictor."""
+    state = observation.hand.reshape(3, 2).copy()
+    if observation.movement_age_s == 0.0:
+        state[1:] = 0.0
+    return state
+
+
+def _find_times(observation: Observation) -> Array:
+    """Return the time to each goal, (g,) [s]."""
+    return np.array([_find_time(observation, goal) for goal in range(len(observation.goals))])
+
+
+def _find_time(observation: Observation, goal: int) -> float:
+    """Return the time that the predictor gave the movement to a goal, or the longest time where no candidate leads there."""
+    candidates = observation.candidates
+    times = candidates.time_s[candidates.goal == goal]
+    return float(times[0]) if len(times) else float(candidates.time_s.max())
+
+
+class SingerSetting(NamedTuple):
+    """Standard deviations of the acceleration [m/s^2] and of a measured position [m], decay time of the acceleration [s]."""
+
+    acceleration_stddev: float
+    position_stddev: float
+    decay_s: float
+
+
+SINGER_SETTINGS = tuple(
+    SingerSetting(*each) for each in product(np.geomspace(0.05, 6.4, 8).tolist(), (2e-4, 1e-3), (0.1, 0.3, 1.0))
+)
+"""The settings that are tried."""
+
+
+def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array, ahead_s: Array) -> tuple[Array, Array]:
+    """Forecast the positions some times (h,) [s] after each of some stamps (m,) [ns], which are among those of the samples.
+
+    stamps_ns (n,), rising, and positions (n, 2) [m] of the samples. Returns the mean (m, s, h, 2) [m] and the variance (m, s, h)
+    [m^2] per axis under each of the s `SINGER_SETTINGS`; each forecast uses the samples up to its stamp.
+    """
+    accelerations, noises, _ = np.array(SINGER_SETTINGS).T
+    state, covariance = np.zeros((len(SINGER_SETTINGS), 3, 2)), np.zeros((len(SINGER_SETTINGS), 3, 3))
+    state[:, 0], covariance[:, 0, 0] = positions[0], noises**2
+    covariance[:, 1, 1], covariance[:, 2, 2] = FIRST_SPEED**2, accelerations**2
+    wanted, means, variances, last_ns = set(at_ns.tolist()), [], [], int(stamps_ns[0])
+    ahead = [_discretise(float(each)) for each in ahead_s]
+    for stamp_ns, position in zip(stamps_ns.tolist(), positions, strict=True):
+        if stamp_ns > last_ns:
+            state, covariance = _propagate(state, covariance, _discretise((stamp_ns - last_ns) / NANOSECONDS))
+            gain = covariance[:, :, 0] / (covariance[:, 0, 0] + noises**2)[:, None]
+            state = state + gain[:, :, None] * (position - state[:, 0])[:, None]
+            kept = np.eye(3) - gain[:, :, None] * np.eye(3)[0]
+            # Joseph form: the covariance stays positive
+            covariance = kept @ covariance @ kept.swapaxes(1, 2) + noises[:, None, None] ** 2 * gain[:, :, None] * gain[:, None]
+            last_ns = stamp_ns
+        if stamp_ns in wanted:
+            wanted.remove(stamp_ns)
+            later = [_propagate(state, covariance, each) for each in ahead]
+            means.append(np.stack([each[:, 0] for each, _ in later], axis=1))
+            variances.append(np.stack([each[:, 0, 0] for _, each in later], axis=1))
+    return np.array(means), np.array(variances)
+
+
+def _propagate(state: Array, covariance: Array, model: tuple[Array, Array]) -> tuple[Array, Array]:
+    transition, added = model
+    return transition @ state, transition @ covariance @ transition.swapaxes(1, 2) + added
+
+
+@lru_cache(maxsize=4096)
+def _discretise(dt: float) -> tuple[Array, Array]:
+    """Return transition and added covariance (s, 3, 3) over dt [s] for each setting, by Van Loan (1978)."""
+    rate = np.zeros((len(SINGER_SETTINGS), 6, 6))
+    accelerations, _, decays = np.array(SINGER_SETTINGS).T
+    drift = np.zeros((len(SINGER_SETTINGS), 3, 3))
+    drift[:, 0, 1] = drift[:, 1, 2] = 1.0
+    drift[:, 2, 2] = -1.0 / decays
+    rate[:, :3, :3], rate[:, 3:, 3:] = -drift, drift.swapaxes(1, 2)
+    rate[:, 2, 5] = 2.0 * accelerations**2 / decays
+    grown = expm(rate * dt)
+    transition = grown[:, 3:, 3:].swapaxes(1, 2)
+    return transition, transition @ grown[:, :3, 3:]
+
 
 ForecastFunction = Callable[[Observation, Question, Any], Forecast]
 SettingsFunction = Callable[[Sequence[ObservedRecording], LikelihoodConfig], tuple[Any, ...]]
@@ -51,9 +240,6 @@ class Baseline:
     name: str
     forecast: ForecastFunction
     settings: tuple[Any, ...]
-
-
-BASELINES = Registry('baseline', {})
 
 
 def register_baseline(name: str, forecast: ForecastFunction, settings: Sequence[Any] | SettingsFunction = (None,)) -> None:
@@ -77,22 +263,16 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: Sequence[
     InputError
         If the name is taken or empty.
     """
-    BASELINES.register(name, partial(_make_baseline, name, forecast, settings))
+    BASELINES.register(name, (forecast, settings))
 
 
 def make_baselines(recordings: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[Baseline, ...]:
     """Return all registered predictors; published: the parameters that the recordings were replayed with."""
-    return tuple(BASELINES.get(name)(recordings, published) for name in BASELINES)
-
-
-def _make_baseline(
-    name: str,
-    forecast: ForecastFunction,
-    settings: Sequence[Any] | SettingsFunction,
-    recordings: Sequence[ObservedRecording],
-    published: LikelihoodConfig,
-) -> Baseline:
-    return Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings))
+    found = []
+    for name in BASELINES:
+        forecast, settings = BASELINES.get(name)
+        found.append(Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings)))
+    return tuple(found)
 
 
 def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
@@ -117,11 +297,6 @@ def make_plain(likelihood: LikelihoodConfig, beta: float) -> LikelihoodConfig:
 def make_ahead(likelihood: LikelihoodConfig, horizon_s: float, lookahead_s: float, beta: float) -> LikelihoodConfig:
     """Return a likelihood of an operator with a planning horizon."""
     return replace(likelihood, planning_horizon_s=horizon_s, lookahead_s=lookahead_s, beta=beta)
-
-
-def is_plain(likelihood: LikelihoodConfig) -> bool:
-    """Return whether all choices are made with one exponent."""
-    return likelihood.planning_horizon_s == WHOLE_WAY_S
 
 
 def make_boltzmann_rates(recordings: Sequence[ObservedRecording], _: LikelihoodConfig) -> tuple[float, ...]:

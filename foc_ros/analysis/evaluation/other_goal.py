@@ -20,8 +20,8 @@ from foc_ros.analysis.recordings import Recording, TableRecording
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.types import Array
 
-from .metrics import BINS
 from .observations import ObservedRecording
+from .scores import BINS
 
 HALF_WAY = 0.5
 

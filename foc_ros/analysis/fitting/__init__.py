@@ -1,1 +1,150 @@
-"""Fitting: recordings of an operator enter; the parameters that explain them best leave."""
+"""Fitting: recordings of an operator enter; the parameters that explain them best leave.
+
+What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings (Efron 1979,
+doi:10.1214/aos/1176344552) and the cross-validation are exact. A parameter that the recordings do not determine keeps its given
+value: where its profile, the best log-likelihood over all other parameters, is flat, or best at the end of what was tried.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.analysis.evaluation.scores import CENTRAL, choose_held_out, resample
+from foc_ros.core.config import list_parameters
+from foc_ros.core.types import Array
+
+BOUNDS = {parameter.name: parameter.bound for parameter in list_parameters()}
+FLAT_NAT = 2.0
+"""A profile that varies by less is flat: settings this far apart are not distinguished (95 % of chi-square, halved)."""
+Setting = Mapping[str, float]
+"""Values by dotted name."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings (nan: none), and its data."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    how: str
+
+    @classmethod
+    def from_resamples(cls, name: str, value: float, resampled: Array | Sequence[float], how: str) -> Estimate:
+        """Return the estimate whose interval holds the value and the central values of a bootstrap, (b,)."""
+        low, high = np.percentile(resampled, CENTRAL).tolist()
+        return cls(name, value, min(low, value), max(high, value), how)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return plain values; an unknown end of the interval is null."""
+        ends = [None if math.isnan(end) else end for end in (self.low, self.high)]
+        return {'value': self.value, 'interval': ends, 'how': self.how}
+
+
+@dataclass
+class Findings:
+    """What one step of a fit found.
+
+    estimates by name; chosen: values that are no numbers; undetermined: why a parameter keeps its given value, by name; warnings.
+    """
+
+    estimates: dict[str, Estimate] = field(default_factory=dict)
+    chosen: dict[str, str] = field(default_factory=dict)
+    undetermined: dict[str, str] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def values(self) -> dict[str, float | str]:
+        """The values that were found, by name."""
+        return {name: each.value for name, each in self.estimates.items()} | self.chosen
+
+
+def clip_to_bounds(name: str, value: float, least: float = 0.0) -> float:
+    """Return a value within the bounds of a parameter, and not below `least`; rounded, so that a file reads well."""
+    bound = BOUNDS[name]
+    assert bound.low is not None and bound.high is not None
+    return float(f'{min(max(value, bound.low, least), bound.high):.6g}')
+
+
+@dataclass(frozen=True)
+class SettingTable:
+    """Log-likelihoods, or log-densities, of n recordings under s settings (n, s) [nat]; nan where nothing is known.
+
+    Predictions within a recording are not independent: their mean counts as one observation.
+    """
+
+    values: Array
+    settings: tuple[Setting, ...]
+
+    @classmethod
+    def from_errors(cls, errors: Array, settings: Sequence[Setting]) -> SettingTable:
+        """Return the table of mean absolute errors (n, s), by Laplace's distribution of the scale of the best."""
+        scale = max(float(errors.mean(axis=0).min()), 1e-9)
+        return cls(-errors / scale, tuple(settings))
+
+    def find_best(self, columns: Sequence[int] | NDArray[np.intp]) -> int:
+        """Return the column of some that is best for all recordings, the first of equal ones."""
+        return int(columns[int(np.nansum(self.values[:, columns], axis=0).argmax())])
+
+    def choose_held_out(self, columns: Sequence[int] | NDArray[np.intp], groups: Sequence[Hashable]) -> NDArray[np.intp]:
+        """Return the column of some, for each recording (n,), that is best for the other groups."""
+        return np.array(columns)[choose_held_out(np.nan_to_num(self.values[:, columns]), groups)]
+
+    def score(self, chosen: int | NDArray[np.intp]) -> float:
+        """Return the mean over the recordings under the column chosen for all, or for each of them (n,)."""
+        return float(np.nanmean(self.values[np.arange(len(self.values)), chosen]))
+
+    def determine(self, given: Setting) -> tuple[NDArray[np.intp], dict[str, str]]:
+        """Find the parameters that the recordings do not determine.
+
+        They keep their given values, one after the other, the flattest first, because one that is kept may determine another.
+        Return the columns that are left, and the reasons by name. The given values are among the settings.
+        """
+        total, columns, undetermined = np.nansum(self.values, axis=0), np.arange(len(self.settings)), dict[str, str]()
+        while True:
+            found = [(*self._examine(name, total, columns), name) for name in given if name not in undetermined]
+            doubted = min((each for each in found if each[1]), default=None)
+            if doubted is None:
+                return columns, undetermined
+            _, undetermined[doubted[2]], name = doubted
+            columns = np.array([each for each in columns if self.settings[each][name] == given[name]])
+
+    def _examine(self, name: str, total: Array, columns: NDArray[np.intp]) -> tuple[float, str]:
+        """Return how much the profile of a parameter varies [nat], and why it is undetermined, empty if it is determined."""
+        profile: dict[float, float] = {}
+        for column in columns.tolist():
+            value = self.settings[column][name]
+            profile[value] = max(total[column], profile.get(value, -math.inf))
+        best, least, most = max(profile, key=lambda each: profile[each]), min(profile), max(profile)
+        variation = profile[best] - min(profile.values())
+        if len(profile) == 1:
+            return variation, ''
+        if variation < FLAT_NAT:
+            return variation, f'all values tried, {least:.3g} to {most:.3g}, explain the recordings within {FLAT_NAT:g} nat'
+        bound = BOUNDS[name]
+        if best in (least, most) and best not in (bound.low, bound.high):
+            return variation, f'{best:.3g}, the end of the values tried, explains the recordings best'
+        return variation, ''
+
+    def estimate(self, given: Setting, how: str) -> tuple[Findings, NDArray[np.intp]]:
+        """Return the values that are best for all recordings, with intervals, and what is undetermined; and the columns left."""
+        columns, undetermined = self.determine(given)
+        if len(undetermined) == len(given):
+            return Findings(undetermined=undetermined), columns
+        best = self.settings[self.find_best(columns)]
+        values = np.nan_to_num(self.values[:, columns])
+        drawn = resample(lambda rows: int(values[rows].sum(axis=0).argmax()), len(values)).astype(int)
+        resampled = [self.settings[columns[each]] for each in drawn]
+        estimates = {
+            name: Estimate.from_resamples(name, clip_to_bounds(name, best[name]), [each[name] for each in resampled], how)
+            for name in given
+            if name not in undetermined
+        }
+        return Findings(estimates, undetermined=undetermined), columns

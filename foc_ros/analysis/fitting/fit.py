@@ -1,110 +1,332 @@
-"""All parameters in turn: first those that need no prediction, then those that need replays, then the rest from one replay."""
+"""All parameters in turn, the given and the fitted ones compared, and the result as plain values and tables.
+
+First come the parameters that need no prediction, then those that need replays, then the rest from one replay.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from foc_ros.analysis.evaluation.baselines import Forecast, published_shares
+from foc_ros.analysis.evaluation.observations import GAP, ObservedRecording, ask_all, ask_main, observe
+from foc_ros.analysis.evaluation.report import OURS
+from foc_ros.analysis.evaluation.scores import compute_position_scores
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
-from . import covariance_fit, likelihood_fit
-from .comparison import compare_configs, find_worse_positions
-from .duration_fit import fit_duration, fit_wait
-from .estimates import Fit, clip_to_bounds
-from .estimator_fit import fit_estimator, fit_fading
-from .predictor_settings import fit_max_candidates, make_eta_settings, make_movement_settings, make_noise_settings
-from .recorded_hand import RecordedHand, read_hand
-from .setting_search import Replays, observe_by_motor_noise, sample_names, search_settings
+from . import Estimate, Findings, clip_to_bounds
+from .direct import (
+    RecordedHand,
+    fit_duration,
+    fit_estimator,
+    fit_fading,
+    fit_max_candidates,
+    fit_wait,
+    read_hand,
+)
+from .search import (
+    COVERAGE_LEVEL,
+    Replays,
+    fit_likelihood,
+    fit_widening,
+    is_cross_validated,
+    make_eta_settings,
+    make_movement_settings,
+    make_noise_settings,
+    observe_by_motor_noise,
+    sample_names,
+    search_settings,
+)
 
 PREDICTIONS = 10
 """About as many predictions are made in each recording, because neighbours say the same."""
-MIN_FOLDS = 3
-"""Recordings below which there is no cross-validation."""
 UNSCALED: dict[str, object] = {'covariance.near': 1.0, 'covariance.far': 1.0}
 """A fit sets both factors to 1, because it fits the covariances that they multiply."""
 BY_EXAMPLE = 'examples/plan_recovery'
 """Where tau and lambda of strategy `fixed` are fitted."""
+WORSE_SHARE, WORSE_M = 0.05, 0.001
+"""Growth of an error of positions above which it is worse: a share of it, and a length [m]."""
+WORSE_COVERAGE = 0.01
+"""Fall of the share of true positions in the region of 90 % that is told."""
+SMALLER_IS_BETTER = ('error_m', 'nlpd')
+"""Measures that begin with one of these are better if they are smaller."""
+PARAMETER_COLUMNS = ('parameter', 'given', 'fitted', '95 %', 'data')
+SCORE_COLUMNS = ('score', 'setting', 'value')
+CHANGES = ('better', 'worse')
+COMPARISON_COLUMNS = ('with the same recordings', 'before', 'after', '')
+COMPARISON_TITLES = {
+    'class_gain': ('log-likelihood of the answer taken, above uniform [nat]', 1.0, 3),
+    'gap_right': ('next gap correct [%]', 100.0, 1),
+    'error_m 0.25': ('error of positions 0.25 s ahead [mm]', 1e3, 1),
+    'error_m 0.5': ('error of positions 0.5 s ahead [mm]', 1e3, 1),
+    'error_m 1': ('error of positions 1 s ahead [mm]', 1e3, 1),
+    'nlpd': ('negative log-density of positions 0.5 s ahead [nat]', 1.0, 2),
+    'inside_90': ('positions in the region of 90 %, 0.5 s ahead [%]', 100.0, 1),
+}
+"""Words, factor and digits of each measure."""
+SCORE_TITLES = {
+    'ways': 'log-likelihood of the class taken [nat]',
+    'positions': 'log-density of true positions [nat]',
+    'inside_90': 'true positions in the 90 % ellipse of the likeliest candidate at 0.5 s',
+    'inside_all_90': 'true positions in the 90 % region of all candidates at 0.5 s',
+}
+Comparison = Mapping[str, Mapping[str, float | None]]
+Rows = list[tuple[str, ...]]
 
 
-def fit_parameters(recordings: Mapping[str, Recording], config: Config, executor: Executor, may_lower_eta: bool = False) -> Fit:
+@dataclass
+class Fit:
+    """The state of a fit.
+
+    config; recordings: how many are used; estimates, chosen, undetermined and warnings: as of `Findings`; failed recordings with
+    reasons; scores as plain values; comparison: of the given parameters with the fitted ones.
+    """
+
+    config: Config
+    recordings: int = 0
+    estimates: dict[str, Estimate] = field(default_factory=dict)
+    chosen: dict[str, str] = field(default_factory=dict)
+    undetermined: dict[str, str] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)
+    scores: dict[str, Any] = field(default_factory=dict)
+    comparison: dict[str, dict[str, float | None]] = field(default_factory=dict)
+
+    def take(self, found: Findings) -> None:
+        """Take what a step found into the configuration; what an earlier step determined stays determined."""
+        for name, each in found.estimates.items():
+            before = self.estimates.get(name)
+            how = each.how if before is None or before.how == each.how else f'{before.how}, then {each.how}'
+            low, high = each.low, each.high
+            if before is not None and before.value == each.value:
+                low, high = min(low, before.low), max(high, before.high)
+            self.estimates[name] = Estimate(name, each.value, low, high, how)
+        self.chosen |= found.chosen
+        self.undetermined |= found.undetermined
+        for name in (*self.estimates, *self.chosen):
+            self.undetermined.pop(name, None)
+        self.warnings.extend(found.warnings)
+        self.config = replace_values(self.config, found.values)
+
+
+def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lower_eta: bool = False) -> Fit:
     """Fit all parameters to recordings; raises RecordingError where no recording can be used.
 
     may_lower_eta: whether obstacles may be avoided with less certainty than the configuration wants.
     """
     fit = Fit(config)
-    hands = _read_hands(recordings, fit, executor)
-    usable = {each.name: recordings[each.name] for each in hands}
-    fit.take(*fit_estimator(hands, fit.config))
-    fit.take(*fit_fading(hands, fit.config))
-    fit.take(*fit_duration(hands, fit.config))
-    fit.take(fit_wait(hands, fit.config))
-    fit.take(*fit_max_candidates(hands, fit.config))
+    hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), 'read')
+    if not hands:
+        raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
+    fit.recordings, usable = len(hands), {each.name: recordings[each.name] for each in hands}
+    for step in (fit_estimator, fit_fading, fit_duration, fit_wait, fit_max_candidates):
+        fit.take(step(hands, fit.config))
     if config.foc.strategy == 'fixed':
         fit.warnings.append(f'foc.tau, foc.lam: kept as they are; {BY_EXAMPLE} finds them from movements')
     duration_s = float(np.median([each.times[-1] for each in hands]))
     rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
     thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
-    _search(hands, fit, Replays(usable, thinned | UNSCALED, executor), may_lower_eta)
-    _fit_to_one_replay(usable, fit, thinned | UNSCALED, executor)
+    _search(hands, fit, Replays(usable, thinned | UNSCALED), may_lower_eta)
+    _fit_to_one_replay(usable, fit, thinned | UNSCALED)
     given = flatten(config)
     fit.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
     fit.config = replace_values(fit.config, UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
-    fit.comparison = compare_configs(compared, (config, fit.config), thinned, executor)
-    fit.warnings[:0] = find_worse_positions(fit.comparison)
+    fit.comparison = compare_configs(compared, (config, fit.config), thinned)
+    fit.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
     return fit
 
 
 def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower_eta: bool) -> None:
     """Fit the parameters that need replays."""
+
+    def take_best(kind: str, settings: Sequence[Config]) -> None:
+        fit.config, found = search_settings(kind, settings, replays)
+        fit.take(found)
+
     if not any(len(each.obstacles) for each in hands):
-        fit.warnings.append(
-            'foc.eta, foc.noise_x, foc.noise_y: no recording has an obstacle, and without one the recordings determine neither '
-            'margins nor noise: they are kept'
-        )
+        reason = 'no recording has an obstacle, without which neither margins nor noise show'
+        fit.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
     elif fit.config.foc.strategy != 'fixed':
         # with strategy `fixed` eta has no effect, and lambda holds for the noise as it is
-        search_settings('noise', make_noise_settings(fit.config), replays, fit)
-        search_settings('eta', make_eta_settings(fit.config, may_lower_eta), replays, fit)
+        take_best('noise', make_noise_settings(fit.config))
+        take_best('eta', make_eta_settings(fit.config, may_lower_eta))
         if not may_lower_eta:
             fit.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
-    search_settings('movement', make_movement_settings(hands, fit.config), replays, fit)
+    take_best('movement', make_movement_settings(hands, fit.config))
 
 
-def _read_hands(recordings: Mapping[str, Recording], fit: Fit, executor: Executor) -> list[RecordedHand]:
-    hands, failed = collect(partial(read_hand, config=fit.config), list(recordings.items()), executor, 'read')
-    fit.failed.update(failed)
-    if not hands:
-        raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
-    fit.recordings = len(hands)
-    return hands
-
-
-def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object], executor: Executor) -> None:
+def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
-    observed, failed = observe_by_motor_noise(recordings, replace_values(fit.config, thinned), executor, 'replay')
+    observed, failed = observe_by_motor_noise(recordings, replace_values(fit.config, thinned), 'replay')
     fit.failed.update(failed)
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
-    cross = len(observed) >= MIN_FOLDS
-    table = likelihood_fit.tabulate_likelihoods(observed, fit.config, executor)
-    if np.isnan(table.values).all():
-        fit.warnings.append(
-            'likelihood.beta: no recording has an obstacle to pass on one of two sides, or a second goal: it is kept'
-        )
-    else:
-        fit.warnings.extend(likelihood_fit.warn_of_missed_classes(observed))
-        columns = likelihood_fit.choose_form(table, [each.name for each in observed])
-        fit.take(*likelihood_fit.estimate_likelihood(table, columns))
-        fit.scores.update(likelihood_fit.score_classes(table, columns, observed, cross))
-    densities = covariance_fit.tabulate_densities(observed, fit.config)
-    fit.take(*covariance_fit.estimate_widening(densities))
-    fit.scores.update(covariance_fit.score_positions(densities, fit.config, observed, cross))
-    if not cross:
-        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, {MIN_FOLDS} are needed')
+    for step in (fit_likelihood, fit_widening):
+        found, scores = step(observed, fit.config)
+        fit.take(found)
+        fit.scores.update(scores)
+    if not is_cross_validated(observed):
+        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
+
+
+def compare_configs(
+    recordings: Mapping[str, Recording], configs: tuple[Config, Config], thinned: Mapping[str, object]
+) -> dict[str, dict[str, float | None]]:
+    """Return the measures of two configurations, `before` and `after`, by measure, from the recordings that both predict.
+
+    thinned: parameters of these replays alone. `class_gain`: log-likelihood of the answer taken above uniform [nat]; `gap_right`:
+    share of correct next gaps; `error_m 0.5`: distance of the likelihood-weighted position from the true one 0.5 s ahead [m];
+    `nlpd`: negative log-density of the true positions 0.5 s ahead [nat]; `inside_90`: their share in the region of 90 %.
+    """
+    items = list(recordings.items())
+    replays = []
+    for config, words in zip(configs, ('before', 'after'), strict=True):
+        observed, _ = collect(partial(observe, config=replace_values(config, thinned)), items, words)
+        replays.append({each.name: each for each in observed})
+    common = [name for name in recordings if all(name in replay for replay in replays)]
+    if not common:
+        return {}
+    before, after = (_measure([replay[name] for name in common]) for replay in replays)
+    return {name: {'before': before[name], 'after': after[name]} for name in before}
+
+
+def _measure(recordings: Sequence[ObservedRecording]) -> dict[str, float | None]:
+    gains, gaps = [], []
+    for recording in recordings:
+        for observation, question in ask_main(recording):
+            forecast = Forecast.from_shares(published_shares(observation), question)
+            gains.append(np.log(forecast.true_probability(question)) + np.log(question.possible))
+        for observation, question in ask_all(recording, GAP):
+            gaps.append(Forecast.from_shares(published_shares(observation), question).correctness(question))
+    positions = compute_position_scores(recordings)
+    return {
+        'class_gain': float(np.mean(gains)) if gains else None,
+        'gap_right': float(np.mean(gaps)) if gaps else None,
+        **{f'error_m {horizon}': error for horizon, error in positions['displacement_m'][OURS]['final'].items()},
+        'nlpd': positions['nlpd']['foc']['0.5'],
+        'inside_90': positions['inside_all']['0.9']['0.5'],
+    }
+
+
+def find_worse_positions(comparison: Comparison) -> list[str]:
+    """Return a sentence for each horizon at which the positions become worse."""
+    sentences = []
+    for name, each in comparison.items():
+        before, after = each['before'], each['after']
+        if not name.startswith('error_m') or before is None or after is None:
+            continue
+        if after > before * (1.0 + WORSE_SHARE) + WORSE_M:
+            horizon, change = name.split()[1], f'from {1e3 * before:.0f} to {1e3 * after:.0f} mm'
+            sentences.append(f'predicted positions {horizon} s ahead become worse with the fitted parameters: {change}')
+    return sentences
+
+
+def find_lower_coverage(fit: Fit) -> list[str]:
+    """Return a sentence where the coverage falls: of held-out predictions if there are any, else of all."""
+    shares = fit.scores.get('inside_all_90', {})
+    changes = {'of recordings held out ': (shares.get('as given'), shares.get('without the recording'))}
+    if 'inside_90' in fit.comparison:
+        changes[''] = (fit.comparison['inside_90']['before'], fit.comparison['inside_90']['after'])
+    for kind, (before, after) in changes.items():
+        if before is not None and after is not None and after < before - WORSE_COVERAGE:
+            held = f'the region of {100 * COVERAGE_LEVEL:.0f} % holds fewer true positions {kind}0.5 s ahead'
+            return [f'{held} with the fitted parameters: {100 * after:.0f} % instead of {100 * before:.0f} %']
+    return []
+
+
+def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
+    """Return a fit as plain values; node: the commands that run the node with it, without and with a ROS installation."""
+    before, options = flatten(given), f'--ros-args --params-file {output}'
+    return {
+        'recordings': fit.recordings,
+        'failed': fit.failed,
+        'parameters': {name: {**each.as_json(), 'given': before[name]} for name, each in fit.estimates.items()},
+        'chosen': {name: {'value': value, 'given': before[name]} for name, value in fit.chosen.items()},
+        'undetermined': {name: {'given': before[name], 'why': why} for name, why in fit.undetermined.items()},
+        'scores': fit.scores,
+        'comparison': fit.comparison,
+        'warnings': fit.warnings,
+        'output': str(output),
+        'node': [f'python -m foc_ros node {options}', f'ros2 run foc_ros foc_node {options}'],
+    }
+
+
+def format_parameters(answer: Mapping[str, Any]) -> Rows:
+    """Return the rows of the parameters in an answer of `fit --json`; of those that are not determined, with the reason."""
+    rows: Rows = []
+    for name, each in answer['parameters'].items():
+        low, high = ('-' if end is None else f'{end:.3g}' for end in each['interval'])
+        rows.append((name, f'{each["given"]:.3g}', f'{each["value"]:.3g}', f'{low} to {high}', each['how']))
+    rows += [
+        (name, each['given'], each['value'], '', 'predicted positions and classes')
+        for name, each in answer.get('chosen', {}).items()
+    ]
+    for name, each in answer.get('undetermined', {}).items():
+        given = each['given'] if isinstance(each['given'], str) else f'{each["given"]:.3g}'
+        rows.append((name, given, 'kept', '', f'not determined: {each["why"]}'))
+    return rows
+
+
+def format_comparison(answer: Mapping[str, Any]) -> Rows:
+    """Return the rows of the measures before and after a fit in an answer of `fit --json`, with a word for each change."""
+    rows: Rows = []
+    for name, each in answer['comparison'].items():
+        words, factor, digits = COMPARISON_TITLES[name]
+        before, after = each['before'], each['after']
+        if before is None or after is None:
+            continue
+        shown = [f'{factor * value:.{digits}f}' for value in (before, after)]
+        rows.append((words, *shown, '' if shown[0] == shown[1] else 'better' if _is_better(name, before, after) else 'worse'))
+    return rows
+
+
+def _is_better(name: str, before: float, after: float) -> bool:
+    if name == 'inside_90':
+        return abs(after - COVERAGE_LEVEL) < abs(before - COVERAGE_LEVEL)
+    return after < before if name.startswith(SMALLER_IS_BETTER) else after > before
+
+
+def make_verdict(answer: Mapping[str, Any]) -> list[str]:
+    """Return sentences that say what a fit makes better, and what worse."""
+    rows = format_comparison(answer)
+    found = {
+        change: [f'{words} {before} to {after}' for words, before, after, each in rows if each == change] for change in CHANGES
+    }
+    judged = [f'{change.capitalize()} with the fitted parameters: {"; ".join(each)}.' for change, each in found.items() if each]
+    return judged or ['The fitted parameters change no measure.']
+
+
+def format_scores(answer: Mapping[str, Any]) -> Rows:
+    """Return the rows of the scores in an answer of `fit --json`."""
+    return [
+        (SCORE_TITLES[score], setting, '-' if value is None else f'{value:.3f}')
+        for score, values in answer['scores'].items()
+        for setting, value in values.items()
+    ]
+
+
+def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[None, tuple[str, ...], Rows]]:
+    """Yield the tables of an answer of `fit --json`."""
+    yield None, PARAMETER_COLUMNS, format_parameters(answer)
+    yield None, SCORE_COLUMNS, format_scores(answer)
+    yield None, COMPARISON_COLUMNS, format_comparison(answer)
+
+
+def make_sentences(answer: Mapping[str, Any]) -> list[str]:
+    """Return the notes of an answer of `fit --json`, and what became better and worse."""
+    return [*(f'note: {warning}' for warning in answer['warnings']), *make_verdict(answer)]
+
+
+def list_commands(answer: Mapping[str, Any]) -> str:
+    """Return the lines that say how the node is run with the parameters."""
+    words = f'{answer["recordings"]} recordings; parameters written to {answer["output"]}. Run the node with them:'
+    return '\n  '.join((words, *answer['node']))

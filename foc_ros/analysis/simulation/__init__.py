@@ -2,3 +2,9 @@
 
 Operators know nothing of the predictor's model. May import the core, recordings and the parallel execution of `analysis`.
 """
+
+ACCURATE, NOISY, LAGGY = 'accurate', 'noisy', 'laggy'
+CHANGES_WAY, UNANNOUNCED_GOAL, HUMAN_PATHS = 'changes_way', 'unannounced_goal', 'human_paths'
+OPERATORS = (ACCURATE, NOISY, LAGGY, CHANGES_WAY, UNANNOUNCED_GOAL, HUMAN_PATHS)
+NONE, FOC = 'none', 'foc'
+ASSISTANCE = (NONE, FOC)

@@ -1,24 +1,39 @@
-"""The study: paired trials of operators and assistance rules, and their means with bootstrap intervals."""
+"""The study: assistance rules in closed loop with operators, in paired trials, and their means with bootstrap intervals.
+
+Each rule is told the scene and the goals, and has the same estimate of the hand and the same limits of force and slew.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.analysis.parallel import collect_all
+from foc_ros.analysis.simulation import FOC, HUMAN_PATHS, NONE, OPERATORS
+from foc_ros.analysis.simulation.operators import DT, SimulatedArm, Task, draw_task
+from foc_ros.core.classes.sides import find_path_sides
 from foc_ros.core.config import Config
-from foc_ros.core.types import Array
+from foc_ros.core.guidance.guide import GuidanceInput, GuidanceState, guide
+from foc_ros.core.guidance.limits import find_largest_force, shorten
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, Prediction, Record
 
-from .assistance import RULES, Assistance
-from .names import HUMAN_PATHS, NONE, OPERATORS
-from .operators import Task, draw_task
-from .trial import Trial, count_steps, measure_trial, run_trial
-
+POSE_STEPS = 2
+"""Time steps between two measured poses: 100 Hz."""
+SOURCE = 'simulation'
+MEASURED_STDDEV_M = 0.0003
+"""Standard deviation of a measured position, along each axis."""
+ARRIVED_M, STOPPED = 0.01, 0.05
+"""Distance from the goal [m] and speed [m/s] at which a movement is complete."""
+EXTRA_S = 1.5
+"""Time beyond that of the intended movement after which a trial ends."""
 MEASURES = (
     'collision_rate',
     'completion_s',
@@ -33,10 +48,172 @@ MEASURES = (
 WRONG_S = 0.1
 """Time for which the likeliest way has to be a wrong one for a trial to count in the harm of wrong ways [s]."""
 RESAMPLES = 2000
-LEVEL = 0.95
 SHOWN_TRIALS = 3
 """Number of trials of each operator that are kept with their paths."""
 Row = dict[str, float | None]
+COLUMNS = {
+    'collision_rate': ('collisions [%]', 100.0, 1),
+    'completion_s': ('time [s]', 1.0, 2),
+    'min_clearance_m': ('clearance [mm]', 1e3, 1),
+    'path_m': ('path [m]', 1.0, 3),
+    'effort': ('effort [N² s]', 1.0, 2),
+    'opposing_impulse': ('opposing impulse [N s]', 1.0, 3),
+    'opposing_share': ('mean opposing force [% of f_max]', 100.0, 2),
+    'wrong_way_s': ('extra time, wrong way [s]', 1.0, 2),
+    'wrong_way_effort': ('extra effort, wrong way [N² s]', 1.0, 2),
+}
+"""Heading, factor and digits of every measure."""
+
+
+class Assistance(ABC):
+    """A rule in one trial. Attributes: is_wrong, whether its likeliest way is not the intended one."""
+
+    def __init__(self, task: Task, config: Config) -> None:
+        self.task, self.config, self.is_wrong = task, config, False
+        self.pipeline = Pipeline(config)
+        self.pipeline.set_goals(task.goals, '')
+        self.pipeline.set_obstacles(SOURCE, task.obstacles, None, '')
+        self._force = np.zeros(2)
+
+    def update(self, step: int, measured: Array) -> Array:
+        """Return the force (2,) [N] at a time step from the measured position (2,) [m]."""
+        if step % POSE_STEPS == 0:
+            self.pipeline.add_hand_sample(HandSample(round((1.0 + step * DT) * NANOSECONDS), measured))
+        assert self.pipeline.hand_state is not None
+        mean = self.pipeline.hand_state.mean
+        target = self.compute_force(step, *mean.reshape(3, 2))
+        settings = self.config.guidance
+        change = shorten(shorten(target, find_largest_force(settings)) - self._force, settings.slew * DT)
+        self._force = self._force + change
+        return self._force
+
+    @abstractmethod
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """Return the wanted force (2,) [N] for the estimated position [m], velocity [m/s] and acceleration [m/s^2], (2,) each."""
+
+
+class NoAssistance(Assistance):
+    """The operator alone."""
+
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
+        """Return no force."""
+        return np.zeros(2)
+
+
+class FocAssistance(Assistance):
+    """The guidance of this package. A prediction is available one period after the pose that it was made from."""
+
+    def __init__(self, task: Task, config: Config) -> None:
+        super().__init__(task, config)
+        self._state = GuidanceState()
+        self._newest: Prediction | None = None
+        self._next: Prediction | None = None
+        self._is_next_wrong = False
+
+    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """Return the force of the guidance."""
+        t = 1.0 + step * DT
+        if self.pipeline.is_due:
+            self._newest, self.is_wrong = self._next, self._is_next_wrong
+            self._next = self.pipeline.predict()
+            self._is_next_wrong = self._next is not None and is_wrong_way(self._next, self.task, step)
+        age_s = 0.0 if self._newest is None else t - self._newest.t
+        given = GuidanceInput(t, position, velocity, self._newest, 0.0, age_s, acceleration=acceleration)
+        output, self._state = guide(self.config, self._state, given)
+        return output.force
+
+
+def is_wrong_way(prediction: Prediction, task: Task, step: int) -> bool:
+    """Return whether the likeliest candidate leads to another goal, or passes an obstacle on another side, than intended."""
+    likeliest = next((each for each in prediction.candidates_with_likelihood if each.label == prediction.most_likely), None)
+    if likeliest is None:
+        return False
+    if likeliest.candidate.goal != task.goal_row:
+        return True
+    rest = task.path.position[min(step, len(task.path.position) - 2) :]
+    intended = find_path_sides(np.ascontiguousarray(rest), task.obstacles)
+    return any(intended.get(name, side) != side for name, side in likeliest.sides.items())
+
+
+RULES: Mapping[str, type[Assistance]] = {NONE: NoAssistance, FOC: FocAssistance}
+"""The rules of `simulate` by name. A study may have others: they need a task and a configuration, as `Assistance` has them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial(Record):
+    """What happened in a trial, at each of its n time steps.
+
+    position (n, 2) [m]; assistance, effort (n, 2): forces of assistance and operator [N]; is_wrong (n,): whether the rule took
+    another way than the intended one to be the likeliest.
+    """
+
+    position: Array
+    assistance: Array
+    effort: Array
+    is_wrong: Array
+
+    @property
+    def duration_s(self) -> float:
+        """Time until the goal was reached, or until the end of the trial [s]."""
+        return DT * len(self.position)
+
+    def measure_clearances(self, task: Task) -> Array:
+        """Return the distance of the hand from the nearest obstacle, (n,) [m]; infinite without obstacles."""
+        obstacles = task.obstacles.grow(task.hand_radius)
+        if not len(obstacles):
+            return np.full(len(self.position), np.inf)
+        clearances: Array = (measure_offsets(self.position, obstacles)[1] - obstacles.radius).min(axis=1)
+        return clearances
+
+    def find_collisions(self, task: Task) -> NDArray[np.bool_]:
+        """Return whether the hand is within an obstacle, (n,)."""
+        return self.measure_clearances(task) < 0.0
+
+
+def count_steps(task: Task) -> int:
+    """Return the largest number of time steps of a trial."""
+    return len(task.path.position) + round(EXTRA_S / DT)
+
+
+def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: Array) -> Trial:
+    """Run a trial. noise (n, 2, 2): standard normal numbers for arm and measurement, the same ones for each rule of a pair."""
+    arm, rule = SimulatedArm(task.arm, task.path, noise[:, 0]), assistance(task, config)
+    rows = []
+    for step in range(count_steps(task)):
+        force = rule.update(step, arm.position + MEASURED_STDDEV_M * noise[step, 1])
+        arm.move(force)
+        rows.append((*arm.position, *force, *arm.force, float(rule.is_wrong)))
+        if np.hypot(*(arm.position - task.goal)) < ARRIVED_M and np.hypot(*arm.velocity) < STOPPED:
+            break
+    table = np.array(rows)
+    return Trial(table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6])
+
+
+def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
+    """Return the measures of a trial by name.
+
+    The opposing impulse is the integral of the force of the assistance against the direction in which the operator intends to
+    move, and the opposing share its mean as a share of the largest force.
+    """
+    clearance = float(trial.measure_clearances(task).min())
+    velocity = np.zeros_like(trial.position)
+    steps = min(len(velocity), len(task.path.velocity))
+    velocity[:steps] = task.path.velocity[:steps]
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    along = (trial.assistance * velocity).sum(axis=1) / np.where(speed > 0.0, speed, 1.0)
+    opposing = DT * float(np.maximum(-along, 0.0).sum())
+    return {
+        'collision_rate': float(clearance < 0.0),
+        'completion_s': trial.duration_s,
+        'min_clearance_m': clearance,
+        'path_m': float(np.hypot(*np.diff(trial.position, axis=0).T).sum()),
+        'effort': DT * float((trial.effort**2).sum()),
+        'opposing_impulse': opposing,
+        'opposing_share': opposing / trial.duration_s / f_max,
+        'wrong_s': DT * float(trial.is_wrong.sum()),
+    }
+
+
 Rules = Mapping[str, type[Assistance]]
 """Assistance rules by name."""
 
@@ -68,10 +245,10 @@ class PairResult:
     trials: Mapping[str, Trial]
 
 
-def simulate(pairs: Sequence[Pair], config: Config, executor: Executor, rules: Rules = RULES) -> list[PairResult]:
-    """Run all pairs with a progress bar; raise RecordingError where one fails. The results do not depend on the executor."""
+def simulate(pairs: Sequence[Pair], config: Config, rules: Rules = RULES) -> list[PairResult]:
+    """Run all pairs with a progress bar; raise RecordingError where one fails. The results do not depend on the workers."""
     items = [(f'{pair.operator} {pair.number}', pair) for pair in pairs]
-    return collect_all(partial(run_pair, config=config, rules=rules), items, executor, 'simulate')
+    return collect_all(partial(run_pair, config=config, rules=rules), items, 'simulate')
 
 
 def make_pairs(
@@ -130,7 +307,30 @@ def estimate_mean(values: Array, seed: int) -> tuple[float | None, list[float] |
     finite = values[np.isfinite(values)]
     if not len(finite):
         return None, None
-    rows = np.random.default_rng(seed).integers(len(finite), size=(RESAMPLES, len(finite)))
-    tail = 50.0 * (1.0 - LEVEL)
-    low, high = np.percentile(finite[rows].mean(axis=1), [tail, 100.0 - tail])
-    return float(finite.mean()), [float(low), float(high)]
+    from scipy.stats import bootstrap  # not before: worker processes do without it
+
+    mean = float(finite.mean())
+    if len(finite) == 1:
+        return mean, [mean, mean]
+    options = {'n_resamples': RESAMPLES, 'method': 'percentile', 'random_state': np.random.default_rng(seed)}
+    return mean, [float(end) for end in bootstrap((finite,), np.mean, **options).confidence_interval]
+
+
+def make_tables(cells: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+    """Yield title, columns and rows for each operator, from the cells of `simulate --json`."""
+    for operator in dict.fromkeys(cell['operator'] for cell in cells):
+        rows = [cell for cell in cells if cell['operator'] == operator]
+        title = f'{operator}: mean of {rows[0]["trials"]} paired trials, and bootstrap interval of 95 %'
+        yield title, ('', *(heading for heading, _, _ in COLUMNS.values())), [_format_row(cell) for cell in rows]
+
+
+def _format_row(cell: Mapping[str, Any]) -> tuple[str, ...]:
+    return (cell['assistance'], *(_format(cell, name) for name in COLUMNS))
+
+
+def _format(cell: Mapping[str, Any], name: str) -> str:
+    _, factor, digits = COLUMNS[name]
+    if cell[name] is None:
+        return '-'
+    low, high = cell[f'{name}_interval']
+    return f'{factor * cell[name]:.{digits}f} ({factor * low:.{digits}f} to {factor * high:.{digits}f})'

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import wraps
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,6 +57,26 @@ def make_hull_polygon(points: Array) -> tuple[Array, Array]:
     return centre, corners - centre
 
 
+T = TypeVar('T', bound='type[Shape]')
+
+
+def accept_center(shape: T) -> T:
+    """Let the constructor of a shape take `center` for `centre`, both spellings being common."""
+    changed: Any = shape
+    create = changed.__init__
+
+    @wraps(create)
+    def create_with_center(self: Shape, *args: Any, **values: Any) -> None:
+        if 'center' in values:
+            if args or 'centre' in values:
+                raise SceneError('obstacle.center', 'one centre', 'two')
+            values['centre'] = values.pop('center')
+        create(self, *args, **values)
+
+    changed.__init__ = create_with_center
+    return shape
+
+
 class Shape:
     """What the shapes have in common: an uncertain radius, a velocity, a name, an uncertain centre, heights."""
 
@@ -95,6 +116,7 @@ class Shape:
         return f'<{type(self).__name__} {self.name + " " if self.name else ""}at ({x:g}, {y:g}) m, radius {self.radius:g} m>'
 
 
+@accept_center
 @dataclass(frozen=True, repr=False)
 class Circle(Shape):
     """A circular obstacle in the task plane.
@@ -102,7 +124,7 @@ class Circle(Shape):
     Parameters
     ----------
     centre : array_like of shape (2,)
-        Position of the centre [m].
+        Position of the centre [m]; `center` is taken, too.
     radius : float
         Mean radius [m], larger than 0.
     radius_stddev : float
@@ -141,6 +163,7 @@ class Circle(Shape):
         self._check('centre')
 
 
+@accept_center
 @dataclass(frozen=True, repr=False)
 class Box(Shape):
     """A rectangular obstacle in the task plane, with corners that are sharp or rounded; a wall is a long thin box.
@@ -148,7 +171,7 @@ class Box(Shape):
     Parameters
     ----------
     centre : array_like of shape (2,)
-        Position of the centre [m].
+        Position of the centre [m]; `center` is taken, too.
     size : array_like of shape (2,)
         Full lengths along its own axes [m]. One length 0 makes a capsule.
     yaw : float
@@ -330,14 +353,16 @@ class Hull(_HullOfPoints):
         return np.array(self.points)
 
 
-def collect_obstacles(shapes: Iterable[Shape] | Obstacles) -> Obstacles:
-    """Return the table of some shapes, or a table as it is.
+def collect_obstacles(shapes: Iterable[Shape] | Shape | Obstacles) -> Obstacles:
+    """Return the table of some shapes or of one, or a table as it is.
 
     Raises SceneError, which names the place in the list, for anything else or a name that occurs twice.
     """
     if isinstance(shapes, Obstacles):
         return shapes
-    given = list(shapes)
+    if not isinstance(shapes, (Shape, Iterable)):
+        raise SceneError('obstacles', 'a list of Circle, Box, Capsule and Hull', repr(shapes))
+    given = [shapes] if isinstance(shapes, Shape) else list(shapes)
     for row, each in enumerate(given):
         if not isinstance(each, Shape):
             raise SceneError(f'obstacles[{row}]', 'a Circle, Box, Capsule or Hull', repr(each))

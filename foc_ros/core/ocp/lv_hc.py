@@ -21,9 +21,11 @@ from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.types import Array, Status
 
 from .margin import Margins
+from .minima import find_least_factors
+from .point import Point, solve_at
 from .problem import Problem
 from .start import Start
-from .strategies import INFEASIBLE, REACHED, Point, StrategyResult, collect, solve_at
+from .strategies import INFEASIBLE, REACHED, StrategyResult, collect
 
 STRIDE, LONGEST = 4.0, 60.0
 """First stride along the curve of `lv` and `hc`, and its end: with a growth of 2, lambda has grown by 1e18 there."""
@@ -175,7 +177,7 @@ def follow_curve(
     while len(results) < len(problems):
         point = solve_at(problems, starts, curve.at(s), is_chance=False, deadline=deadline, before=point)
         solves += point.now.iterations
-        k, *_ = chance.find_least_factors(point.now.control)
+        k, *_ = find_least_factors(chance, point.now.control)
         touching = point.is_touching()
         is_late = not deadline.allows()
         for row, problem in enumerate(problems):

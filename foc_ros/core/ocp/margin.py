@@ -6,8 +6,7 @@ obstacle, and the moments of the radius R,
     g(u, t; k, tau) = D - k s - sqrt(k^2 s^2 + E),    s^2 = n' P n + Var[R^2] / (4 D^2),    E = E[R^2] + tau,
 
 is zero where E[C] + tau + k sqrt(Var[C]) = E + 2 k D s - D^2 is (paper, equations 8-15): it is the same condition as a distance.
-An obstacle holds the movement off where the safety factor k(t) = (D^2 - E) / (2 D s) is least. There the margin has the gradient
-g_u and, by the envelope theorem, the Hessian g_uu - g_ut g_ut' / g_tt, so that contacts slide along obstacles.
+An obstacle holds the movement off where the safety factor k(t) = (D^2 - E) / (2 D s) is least (`minima`, `gradients`).
 
 All functions take several problems at once, because NumPy takes as long for one as for a few.
 """
@@ -22,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
-from foc_ros.core.obstacles.risk import CERTAIN_K, compute_safety_factor
 from foc_ros.core.plant.response import fall_as_minimum_jerk, hermite, hermite_quintic, pair_steps
 from foc_ros.core.types import Array
 
@@ -36,21 +34,8 @@ LEAST_REACH = 1e-6
 """Least distance to keep from a polygon, relative to the scene: where none is asked for, a sharp corner has no normal."""
 ELASTIC_STDDEV = 1e-2
 """Standard deviation, relative to the scene, with which k measures a distance that is missing where no chance is constrained."""
-DIFFERENCE = 5e-3
-"""Time on both sides of a contact by whose gradients its sliding is found [steps]."""
-LEAST_BEND = 3e-2
-"""Least second derivative of a margin in time, relative to scene and whole time: along a flat side the contact is anywhere."""
 GRID = 4
 """Points for each step on which closest approaches are looked for."""
-BRACKET = np.linspace(-1.0, 1.0, 9)
-"""Times, relative to a bracket, at which safety factors are sampled; the next bracket is a quarter of it."""
-NARROWINGS = 2
-"""Brackets after the one in which minima are told apart: the last points are 4e-3 steps apart, and a parabola or two lines pass
-through them."""
-BOLD = 1.5
-"""Between two points of the grid a safety factor may change by this much more than from one point to the next."""
-FACTORS, GRADIENT = 5, 1
-"""Vectors of which the second derivatives of a margin consist, besides a diagonal, and which of them is its gradient."""
 
 
 class Contacts(NamedTuple):
@@ -107,39 +92,6 @@ class Margin(NamedTuple):
         return Margin(*(each[rows] for each in self))  # type: ignore[arg-type]  # all fields are arrays
 
 
-class Turning(NamedTuple):
-    """What the second derivatives of q margins follow from.
-
-    k; is_free: whether k changes with the control; worth: -dg/dw of the variance w = s^2; turn: 1 / D where the normal turns,
-    else 0 [1/m]; across: dw by the angle of the normal; size: Var[R^2] / 4 where it counts [m^4]; bend: second derivative in
-    time. All are (q,).
-    """
-
-    k: Array
-    is_free: NDArray[np.bool_]
-    worth: Array
-    turn: Array
-    across: Array
-    size: Array
-    bend: Array
-
-
-class Gradients(NamedTuple):
-    """Margins at q places, linearised.
-
-    value (q,) [m]; gradient (q, 2N), with respect to the control; stddev_rate (q,): -dg/dk [m]. For the h places that hold the
-    mean off, diagonal (h, 2N): what a unit of the multiplier adds to the diagonal of the Hessian of the Lagrangian; factors
-    (h, 5, 2N) and weights (h, 5, 5): the remaining part of it, sum_ab weights_ab factors_a factors_b'.
-    """
-
-    value: Array
-    gradient: Array
-    stddev_rate: Array
-    diagonal: Array
-    factors: Array
-    weights: Array
-
-
 class Margins:
     """The margins of several problems with the same response to the control.
 
@@ -171,7 +123,7 @@ class Margins:
     def _set_times(self, between: bool) -> None:
         """Set the grid of times."""
         points = GRID if between else 1
-        self.times, self._half = np.arange(points, points * self.steps + 1) / points, 1.0 / points
+        self.times, self.spacing = np.arange(points, points * self.steps + 1) / points, 1.0 / points
         self._step, share = self.response.locate(self.times)
         self._weight, self._quintic = hermite(share), hermite_quintic(share)
 
@@ -340,124 +292,7 @@ class Margins:
         angles: Array = np.arctan2(turned, x[..., :-1] * x[..., 1:] + y[..., :-1] * y[..., 1:])
         return np.where(self.counts[rows, :, None], angles, 0.0)
 
-    def find_minima(
-        self, rows: Indices, motion: Motion, k: Array, grid: Margin, is_wanted: NDArray[np.bool_]
-    ) -> tuple[Contacts, Array]:
-        """Return the local minima in time of the safety factors, and these.
-
-        Parameters
-        ----------
-        rows, motion, k
-            As for `measure_grid`.
-        grid : Margin
-            What it returned for them.
-        is_wanted : NDArray[np.bool_]
-            Which points of the grid may be minima that matter, (r, m, T).
-
-        Returns
-        -------
-        Contacts, Array
-            Minima with refined times, and the safety factors there, (q,).
-        """
-        factor = grid.factor
-        at, obstacle, place = np.nonzero(_is_lowest(factor) & is_wanted)
-        places = Contacts(rows[at], obstacle, self.times[place])
-        if not self.between or not len(at):
-            return places, factor[at, obstacle, place]
-        return self._refine(motion, k, at, places)
-
-    def _refine(
-        self, motion: Motion, k: Array, at: Indices, places: Contacts, bound: Array | None = None
-    ) -> tuple[Contacts, Array]:
-        """Return the minima beside some places of the grid, of movements in rows `at`, and the safety factors there.
-
-        There may be several beside one place, next to the corners of a small obstacle. Those are left out that cannot be below
-        the least factor found for their movement and a bound (r,), if there is one.
-        """
-        spacing = self._half * (BRACKET[1] - BRACKET[0])
-        times, factors, is_on_edge = self._sample(motion, k, at, places, self._half)
-        is_lowest = _is_lowest(factors.T)
-        if bound is not None:
-            bound = bound.copy()
-            np.minimum.at(bound, at, factors.min(axis=0))
-            is_lowest &= factors.T - BOLD * _vary(factors.T) <= bound[at, None]
-        which, column = np.nonzero(is_lowest)
-        at, places = at[which], Contacts(places.problem[which], places.obstacle[which], times[column, which])
-        times, factors, is_on_edge = times[:, which], factors[:, which], is_on_edge[:, which]
-        for _ in range(NARROWINGS):
-            places = places._replace(time=self._estimate(times, factors, is_on_edge, column, spacing))
-            half, spacing = spacing, spacing * (BRACKET[1] - BRACKET[0])
-            times, factors, is_on_edge = self._sample(motion, k, at, places, half)
-            column = factors.argmin(axis=0)
-        found = places._replace(time=self._estimate(times, factors, is_on_edge, column, spacing))
-        best = np.arange(len(column))
-        lowest, least = factors[column, best], self.measure(found, at, motion, k[at]).factor
-        return found._replace(time=np.where(least <= lowest, found.time, times[column, best])), np.minimum(least, lowest)
-
-    def _sample(
-        self, motion: Motion, k: Array, at: Indices, places: Contacts, half: float
-    ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return times (n, q) in brackets around places (q,), the safety factors, and whether an edge is nearest there."""
-        times = np.clip(places.time + half * BRACKET[:, None], 1.0, float(self.steps))
-        several = [np.tile(each, len(times)) for each in (places.problem, places.obstacle, at)]
-        margin = self.measure(Contacts(several[0], several[1], times.ravel()), several[2], motion, k[several[2]])
-        return times, margin.factor.reshape(times.shape), margin.is_on_edge.reshape(times.shape)
-
-    def _estimate(self, times: Array, factors: Array, is_on_edge: NDArray[np.bool_], column: Indices, spacing: float) -> Array:
-        """Return the times (q,) of minima near the given one of n even samples (n, q) of each."""
-        row, best = np.clip(column, 2, len(times) - 3), np.arange(len(column))
-        near = np.stack([factors[row + step, best] for step in range(-2, 3)])
-        shift = _find_lowest(near, is_on_edge[row - 2, best] != is_on_edge[row + 2, best])
-        is_inside = (times[0] > 1.0) & (times[-1] < self.steps)
-        return np.where(is_inside, times[row, best] + spacing * shift, times[column, best])
-
-    def find_least_factors(self, control: Array, factors: Array | None = None) -> tuple[Array, Indices, Array]:
-        """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
-
-        Wherever a factor that changes from one point of the grid to the next as it does there may fall below the least one, it is
-        sampled between them, and the minima are refined.
-
-        Parameters
-        ----------
-        control : Array
-            The controls.
-        factors : Array, optional
-            Their safety factors on the grid, (b, m, T), where they are known.
-
-        Returns
-        -------
-        Array, Indices, Array
-            Safety factors k (b,), `CERTAIN_K` without obstacles; rows of the obstacles; times [steps].
-        """
-        rows = np.arange(len(control))
-        k, row, moment = np.full(len(rows), CERTAIN_K), np.zeros(len(rows), dtype=np.intp), np.zeros(len(rows))
-        if not self.count:
-            return k, row, moment
-        motion, none = self.move(rows, control), np.zeros(len(rows))
-        if factors is None:
-            factors = self.measure_grid(rows, motion, none).factor
-        counts = self.counts[..., None] & (self.times >= self.recovery_steps[..., None])
-        factors = np.where(counts, factors, np.inf)
-        least = factors.min(axis=(1, 2))
-        may_be_least = np.isfinite(factors) & (factors - BOLD * _vary(factors) <= least[:, None, None])
-        at, obstacle, place = np.nonzero(may_be_least)
-        times = np.maximum(self.times[place], self.recovery_steps[at, obstacle])
-        places, _ = self._refine(motion, none, at, Contacts(at, obstacle, times), least)
-        places = places._replace(time=np.maximum(places.time, self.recovery_steps[places.problem, places.obstacle]))
-        found = self._measure_exactly(places, control)
-        for which in np.argsort(-found, kind='stable').tolist():
-            problem = places.problem[which]
-            k[problem], row[problem], moment[problem] = found[which], places.obstacle[which], places.time[which]
-        return k, row, moment
-
-    def _measure_exactly(self, places: Contacts, control: Array) -> Array:
-        """Return the safety factors of controls (b, 2N) at q places as the paper has them, (q,)."""
-        margin, _ = self._respond(places, control[places.problem], np.zeros(len(places.time)))
-        along = margin.normal_x * margin.variance_x + margin.normal_y * margin.variance_y
-        where = places.problem, places.obstacle
-        return compute_safety_factor(margin.distance, along, self.size_mean[where], self.size_variance[where])
-
-    def _respond(self, places: Contacts, control: Array, k: Array) -> tuple[Margin, Array]:
+    def respond(self, places: Contacts, control: Array, k: Array) -> tuple[Margin, Array]:
         """Return margins at q places with exact covariances, and the response (q, 2, 2N) of the position there."""
         response = self.response.at(places.time)
         step, share = self.response.locate(places.time)
@@ -471,125 +306,8 @@ class Margins:
 
     def measure_spread(self, places: Contacts, control: Array) -> tuple[Array, Array]:
         """Return sqrt(Var[C]) [m^2] and the distance D [m] at q contacts of controls (b, 2N)."""
-        margin, _ = self._respond(places, control[places.problem], np.zeros(len(places.time)))
+        margin, _ = self.respond(places, control[places.problem], np.zeros(len(places.time)))
         return 2.0 * np.abs(margin.distance) * margin.stddev, margin.distance
-
-    def linearise(
-        self, places: Contacts, control: Array, k: Array, is_held: NDArray[np.bool_], is_free: NDArray[np.bool_]
-    ) -> Gradients:
-        """Return margins at q places with their first and second derivatives.
-
-        Parameters
-        ----------
-        places : Contacts
-            The places.
-        control, k : Array
-            Control (2N,) and safety factor for each place, (q, 2N) and (q,).
-        is_held : NDArray[np.bool_]
-            Which places hold the mean off, (q,): those that slide with it, and have second derivatives.
-        is_free : NDArray[np.bool_]
-            Where the safety factor changes with the control, (q,).
-        """
-        count, held = len(places.time), np.flatnonzero(is_held)
-        moments = places.time[held]
-        beside = np.clip(np.concatenate((moments - DIFFERENCE, moments + DIFFERENCE)), 1.0, float(self.steps))
-        rows = np.concatenate((np.arange(count), held, held))
-        whole = Contacts(places.problem[rows], places.obstacle[rows], np.concatenate((places.time, beside)))
-        control, k = control[rows], k[rows]
-        margin, response = self._respond(whole, control, k)
-        noise = self.noise_variance[whole.problem] * control
-        nx, ny = margin.normal_x[:, None], margin.normal_y[:, None]
-        along, aside = nx * response[:, 0] + ny * response[:, 1], nx * response[:, 1] - ny * response[:, 0]
-        stddev, distance = margin.stddev, margin.distance
-        # what the variance w = s^2 costs, -dg/dw, and how the normal turns: not where an edge is nearest
-        worth = self.is_chance * (k + k * k * stddev / margin.root) / (2.0 * stddev)
-        turn = np.where(margin.is_on_edge, 0.0, 1.0 / distance)
-        across = 2.0 * (margin.normal_x * margin.variance_y - margin.normal_y * margin.variance_x)
-        is_far = distance**2 > 0.25 * self.reach_square[whole.problem, whole.obstacle]
-        size = np.where(is_far, self.size_variance[whole.problem, whole.obstacle] / 4.0, 0.0)
-        spread = 2.0 * noise * along**2 + (across * turn)[:, None] * aside - (2.0 * size / distance**3)[:, None] * along  # dw/du
-        gradient = along - worth[:, None] * spread
-        rate = stddev * (1.0 + k * stddev / margin.root)
-        earlier, later = slice(count, count + len(held)), slice(count + len(held), None)
-        apart = whole.time[later] - whole.time[earlier]
-        apart = np.where(apart > 0.0, apart, 1.0)  # there is but one time in a single step
-        rise, fall = margin.value[later] - margin.value[held], margin.value[earlier] - margin.value[held]
-        bend = 4.0 * (rise + fall) / apart**2
-        before, after = (
-            np.where(is_free[held], rate[held] / rate[beside], 1.0)[:, None] * gradient[beside] for beside in (earlier, later)
-        )
-        slide = (after - before) / apart[:, None]
-        # where the nearest point passes from an edge to a corner, the margin has a kink in time: the least margin moves with both
-        # sides, by so much of each that it does not change with time
-        is_kink = (margin.is_on_edge[later] != margin.is_on_edge[earlier]) & (rise > 0.0) & (fall > 0.0)
-        share = np.divide(rise, rise + fall, out=np.zeros(len(held)), where=is_kink)[:, None]
-        mixed = share * gradient[earlier] + (1.0 - share) * gradient[later]
-        gradient = gradient[:count]
-        gradient[held] = np.where(is_kink[:, None], mixed, gradient[held])
-        bend = np.where(is_kink, np.inf, bend)
-        moved = 4.0 * noise[held] * along[held] * aside[held]
-        factors = np.stack((aside[held], gradient[held], moved, spread[held], slide), axis=1)
-        terms = Turning(k[held], is_free[held], worth[held], turn[held], across[held], size[held], bend)
-        weights = self._weigh_factors(places.take(held), margin.take(held), terms)
-        diagonal = (2.0 * worth[held])[:, None] * self.noise_variance[whole.problem[held]] * along[held] ** 2
-        return Gradients(margin.value[:count], gradient, rate[:count], diagonal, factors, weights)
-
-    def _weigh_factors(self, places: Contacts, margin: Margin, terms: Turning) -> Array:
-        """Return the weights (q, 5, 5) of the factors: displacement across the normal, the gradient, and the effect on P, w, t.
-
-        The displacement along the normal is the gradient and worth times the effect on w. Where k is free, the margin is zero at
-        a k(u) whose second derivatives are r k_uu = g_uu + g_uk k_u' + k_u g_uk' + g_kk k_u k_u', with k_u = g_u / r.
-        """
-        k, is_free, worth, turn, across, size, bend = terms
-        reach, variance = self.reach_square[places.problem, places.obstacle], margin.stddev**2
-        difference = 2.0 * margin.trace - 4.0 * (margin.normal_x * margin.variance_x + margin.normal_y * margin.variance_y)
-        turned, along = -worth * across * turn**2, 6.0 * worth * size / margin.distance**4
-        ratio = k * margin.stddev / margin.root
-        rate = margin.stddev * (1.0 + ratio)
-        weights = np.zeros((len(k), FACTORS, FACTORS))
-        weights[:, 0, 0] = turn * (-1.0 + worth * (turn * difference - 2.0 * size / margin.distance**3))
-        weights[:, 0, 1] = weights[:, 1, 0] = turned
-        weights[:, 0, 2] = weights[:, 2, 0] = worth * turn
-        weights[:, 0, 3] = weights[:, 3, 0] = worth * turned
-        weights[:, 1, 1] = along + is_free * variance * reach / (margin.root**3 * rate**2)
-        mixed = is_free * (1.0 + 2.0 * ratio - ratio**3) / (2.0 * margin.stddev * rate)
-        weights[:, 1, 3] = weights[:, 3, 1] = worth * along + mixed
-        bent = self.is_chance * k * k * reach / (4.0 * variance * margin.root**3) - worth / (2.0 * variance)
-        weights[:, 3, 3] = bent + worth**2 * along
-        is_inside = (places.time > 1.0) & (places.time < self.steps) & self.between
-        floor = LEAST_BEND * self.extent[places.problem] / self.steps**2
-        weights[:, 4, 4] = np.where(is_inside, 1.0 / np.maximum(bend, floor), 0.0)
-        return weights
-
-
-def _is_lowest(values: Array) -> NDArray[np.bool_]:
-    """Return which values (..., T) are not above their neighbours; of equal ones the last."""
-    before, after = np.full_like(values, np.inf), np.full_like(values, np.inf)
-    before[..., 1:], after[..., :-1] = values[..., :-1], values[..., 1:]
-    return (values <= before) & (values < after)
-
-
-def _vary(values: Array) -> Array:
-    """Return the larger change of values (..., T) to a neighbour; 0 between infinite ones."""
-    changes = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
-    is_finite = np.isfinite(values)
-    np.subtract(values[..., 1:], values[..., :-1], out=changes[..., 1:-1], where=is_finite[..., 1:] & is_finite[..., :-1])
-    np.abs(changes, out=changes)
-    return np.maximum(changes[..., 1:], changes[..., :-1])
-
-
-def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> Array:
-    """Return where the least of five even values (5, q) is, counted from the middle, (q,).
-
-    It is the vertex of a parabola, or where the lines through the first two and the last two values meet.
-    """
-    first, low, middle, high, last = values
-    bend, fall, rise = low - 2.0 * middle + high, low - first, last - high
-    vertex = np.clip(np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend > 0.0), -0.5, 0.5)
-    meeting = np.divide(low - high + fall + rise, rise - fall, out=np.zeros_like(bend), where=rise > fall)
-    is_kink = is_kink & (fall < 0.0) & (rise > 0.0) & (np.abs(meeting) <= 1.0)
-    lowest: Array = np.where(is_kink, meeting, vertex)
-    return lowest
 
 
 def _spread_start(problem: Problem) -> Array:

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from foc_ros.core.types import Array
 
 from .backend import Answer, DenseQP
-from .margin import FACTORS, GRADIENT, Gradients, Indices
+from .gradients import FACTORS, GRADIENT, Gradients
+from .margin import Indices
 
 LEAST_CURVATURE = 0.1
 """Least eigenvalue of the Hessian relative to its diagonal part: with less, a step leaves the place where margins are known."""

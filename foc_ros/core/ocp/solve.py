@@ -19,6 +19,7 @@ from foc_ros.core.registry import STRATEGIES
 from foc_ros.core.types import Array, Solution, Status, as_readonly
 
 from .margin import Margins
+from .minima import find_least_factors
 from .problem import Problem
 from .start import Start
 from .strategies import StrategyResult
@@ -93,7 +94,7 @@ def find_least_safety_factor(problem: Problem, control: Array) -> tuple[float, i
         k, `CERTAIN_K` without obstacles; the row of the obstacle; the time in steps, from the end of the first step on.
     """
     margins = Margins([problem], np.zeros(1), is_chance=True)
-    k, obstacle, moment = margins.find_least_factors(np.asarray(control, dtype=float)[None] * problem.horizon.gain)
+    k, obstacle, moment = find_least_factors(margins, np.asarray(control, dtype=float)[None] * problem.horizon.gain)
     return float(k[0]), int(obstacle[0]), float(moment[0])
 
 
@@ -103,7 +104,7 @@ def _evaluate(problems: Sequence[Problem], results: Sequence[StrategyResult]) ->
     if None in minima:
         margins = Margins(problems, np.zeros(len(problems)), is_chance=True)
         control = np.stack([each.control * problem.horizon.gain for problem, each in zip(problems, results, strict=True)])
-        minima = list(zip(*(each.tolist() for each in margins.find_least_factors(control)), strict=True))
+        minima = list(zip(*(each.tolist() for each in find_least_factors(margins, control)), strict=True))
     return [_evaluate_one(*each) for each in zip(problems, results, minima, strict=True)]  # type: ignore[arg-type]
 
 

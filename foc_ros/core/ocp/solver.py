@@ -12,8 +12,6 @@ on another side. Rows are added where the solution of the QP breaks margins, so 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +19,10 @@ from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Array
 
+from .gradients import linearise
+from .iterates import Evaluation, Iterates, Plan
 from .margin import NO_CONTACTS, Contacts, Indices, Margins
+from .minima import find_minima
 from .objective import Objective
 from .qp import ReducedQP, number_rows, solve_dual
 
@@ -75,89 +76,6 @@ ACCURACY = 3e-10
 """Margin relative to the scene that counts as none: accuracy of a QP."""
 
 
-@dataclass
-class Evaluation:
-    """What the sequence knows of the controls of r problems.
-
-    cost (r,): J, in units of `gain`^2; loss (r,): what is minimised; factor (r,): the safety factor k; angles (r, m): swept
-    angles [rad]; margin, factors (r, m, T), normal (r, 2, m, T): on the grid; contacts (q,): minima of the safety factors near
-    the path.
-    """
-
-    cost: Array
-    loss: Array
-    factor: Array
-    angles: Array
-    margin: Array
-    normal: Array
-    factors: Array
-    contacts: Contacts
-
-    def put(self, rows: Indices, other: Evaluation, taken: NDArray[np.bool_], problems: Indices) -> None:
-        """Take rows over from the evaluation of some problems: those that are marked."""
-        self.cost[rows], self.loss[rows], self.factor[rows] = other.cost[taken], other.loss[taken], other.factor[taken]
-        self.angles[rows], self.margin[rows], self.normal[rows] = other.angles[taken], other.margin[taken], other.normal[taken]
-        self.factors[rows] = other.factors[taken]
-        old, new = ~np.isin(self.contacts.problem, problems[taken]), np.isin(other.contacts.problem, problems[taken])
-        self.contacts = self.contacts.take(old).join(other.contacts.take(new))
-
-
-@dataclass
-class Plan:
-    """The solutions of the QPs of r problems.
-
-    rows (r,): the problems; step (r, 2N); k (r,): planned safety factors; gain, fall (r,): how much the loss falls to first
-    order, and to second order; contacts and multipliers (q,): the rows of the QPs; further: those of them that were added.
-    """
-
-    rows: Indices
-    step: Array
-    k: Array
-    gain: Array
-    fall: Array
-    contacts: Contacts
-    multipliers: Array
-    further: Contacts
-
-    def replace(self, other: Plan) -> Plan:
-        """Return the plans with those of some of the problems replaced."""
-        place = np.searchsorted(self.rows, other.rows)
-        for mine, new in ((self.step, other.step), (self.k, other.k), (self.gain, other.gain), (self.fall, other.fall)):
-            mine[place] = new
-        kept = ~np.isin(self.contacts.problem, other.rows)
-        contacts = self.contacts.take(kept).join(other.contacts)
-        multipliers = np.concatenate((self.multipliers[kept], other.multipliers))
-        return Plan(self.rows, self.step, self.k, self.gain, self.fall, contacts, multipliers, other.further)
-
-
-@dataclass
-class Iterates:
-    """Where the sequence is: a row for each of b problems.
-
-    control (b, 2N), in units of `Horizon.gain`; k (b,): safety factor at which margins are linearised; at: what is known of the
-    controls; contacts and multipliers (q,) of the last QPs; angles (b, m): swept angles of the class [rad]; is_done (b,): whether
-    the sequence has ended, is_settled (b,): at a minimum; gain (b,): what the last QP promised; iterations (b,);
-    bound (b,): what the loss must not exceed; is_exact (b,): whether to end only where the next step would change nothing;
-    is_waiting (b,): whether it is so unlikely that it goes on in the next prediction; trial: contacts of the last step that was
-    tried.
-    """
-
-    control: Array
-    k: Array
-    at: Evaluation
-    contacts: Contacts
-    multipliers: Array
-    angles: Array
-    is_done: NDArray[np.bool_]
-    is_settled: NDArray[np.bool_]
-    gain: Array
-    iterations: Indices
-    bound: Array
-    is_exact: NDArray[np.bool_]
-    is_waiting: NDArray[np.bool_]
-    trial: Contacts = NO_CONTACTS
-
-
 class Solver:
     """The sequential QP of b problems.
 
@@ -202,7 +120,7 @@ class Solver:
         grid = margins.measure_grid(rows, motion, k)
         is_near = grid.value < NEAR * margins.extent[rows, None, None]
         is_near |= grid.factor < NEAR_FACTOR * self.wanted_k[rows, None, None]
-        contacts, factors = margins.find_minima(rows, motion, k, grid, is_near)
+        contacts, factors = find_minima(margins, rows, motion, k, grid, is_near)
         least = np.full(len(rows), np.inf)
         np.minimum.at(least, np.searchsorted(rows, contacts.problem), factors)
         cost, angles = objective.compute_cost(rows, control), margins.sweep(rows, margins.find_path(motion))
@@ -356,7 +274,7 @@ class Solver:
         places, known = self._choose_places(now, rows, further)
         at, control, k_now = np.searchsorted(rows, places.problem), now.control[rows], now.k[rows]
         is_free = (k_now > 0.0) & (k_now < self.wanted_k[rows] * (1.0 - FREE))
-        gradients = margins.linearise(places, control[at], k_now[at], known > 0.0, is_free[at])
+        gradients = linearise(margins, places, control[at], k_now[at], known > 0.0, is_free[at])
         quadratic = objective.expand(rows, control, now.at.cost[rows])
         numbered, wanted = number_rows(at, len(rows)), self.wanted_k[rows]
         short = gradients.value - gradients.stddev_rate * (wanted - k_now)[at]

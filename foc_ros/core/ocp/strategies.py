@@ -16,26 +16,21 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.types import Array, Status
 
 from .margin import Contacts, Indices, Margins
+from .minima import find_least_factors
+from .point import Point, solve_at
 from .problem import Problem
-from .solver import LARGEST_RATE, LARGEST_TOLERANCE, MOST_ITERATIONS, Iterates, Solver
-from .start import NO_FORCES, Forces, Start, follow
+from .solver import LARGEST_TOLERANCE
+from .start import NO_FORCES, Forces, Start
 
 INFEASIBLE = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
 REACHED = 1e-5
 """Relative shortfall of k that counts as rounding."""
-TOUCHING, TOUCHING_NEAR = 1e-3, 0.05
-"""Distance that the mean lacks, relative to the scene, up to which a class has a path, and within which it is looked for."""
-BETWEEN = 0.3
-"""Part of the least radius by which a mean that is held off at the steps alone may enter an obstacle between them."""
-LEAP = 2.0
-"""Angle by which the direction of an obstacle turns between two points of the grid if the mean leaps over it [rad]."""
 STALLED = 1e-6
 NEARLY = 1e-2
 """Relative shortfall of k that is made good by asking for more: an obstacle comes nearer than its contacts tell."""
@@ -102,119 +97,6 @@ class Strategy(Protocol):
         """Return a result for each problem."""
 
 
-@dataclass
-class Point:
-    """Solutions of b problems at one point of their curves.
-
-    solver, now: the solver and where its sequence ended; k (b,): the safety factors of the controls.
-    """
-
-    solver: Solver
-    now: Iterates
-    k: Array
-
-    def is_late(self, row: int) -> bool:
-        """Return whether the time was up before a problem was solved or had its iterations."""
-        return not self.now.is_done[row] and bool(self.now.iterations[row] < self.solver.most)
-
-    def is_touching(self) -> NDArray[np.bool_]:
-        """Return whether the mean enters an obstacle or its clearance, or leaps over one between two points of the grid, (b,).
-
-        Where it is held off at the steps alone, it may enter between them by a part of the radius.
-        """
-        margins = self.solver.margins.look_between()
-        rows = np.arange(len(self.k))
-        motion, none = margins.move(rows, self.now.control), np.zeros(len(rows))
-        grid = margins.measure_grid(rows, motion, none)
-        is_near = grid.value < TOUCHING_NEAR * margins.extent[:, None, None]
-        places, _ = margins.find_minima(rows, motion, none, grid, is_near)
-        least = np.full(len(rows), np.inf)
-        np.minimum.at(least, places.problem, margins.measure(places, places.problem, motion, none[places.problem]).value)
-        allowed = TOUCHING * margins.extent
-        if not self.solver.margins.between and margins.count:
-            allowed = np.maximum(allowed, BETWEEN * np.sqrt(margins.reach_square.min(axis=1)))
-        short = least < -allowed
-        leaps: NDArray[np.bool_] = np.abs(margins.turn(rows, margins.find_path(motion))).max(axis=(1, 2), initial=0.0) > LEAP
-        return short | leaps
-
-
-def solve_at(
-    problems: Sequence[Problem],
-    starts: Sequence[Start],
-    weights: tuple[Array, Array],
-    *,
-    is_chance: bool,
-    between: bool = True,
-    deadline: Deadline = NEVER,
-    before: Point | None = None,
-    most: int = MOST_ITERATIONS,
-) -> Point:
-    """Solve problems at one point of a curve.
-
-    Parameters
-    ----------
-    problems, starts
-        b problems with the same response, and where each begins.
-    weights
-        Clearance terms tau [m^2] and weights lambda of the variances [1/s^6], (b,) each.
-    is_chance
-        Whether the wanted k is asked for, as far as it is worth its effort; otherwise the mean keeps tau.
-    between
-        Whether obstacles count between the steps too.
-    deadline
-        Looked at once an iteration.
-    before
-        A solution of the same problems at another point, from which the search begins instead.
-    most
-        Most iterations.
-    """
-    tau, lam = weights
-    margins = Margins(problems, tau, is_chance=is_chance, between=between)
-    wanted = np.array([each.wanted_k for each in problems]) * is_chance
-    preferences = [each.preference for each in problems]
-    rates = [min(each.shortfall / each.beta, LARGEST_RATE) if each.beta > 0.0 else LARGEST_RATE for each in preferences]
-    # without a chance constraint no safety is wanted, and the rate has no effect
-    rate = np.array(rates) if is_chance else np.ones(len(problems))
-    solver = Solver(margins, wanted, rate, lam)
-    if before is None:
-        control, contacts, multipliers, k, angles = _stack_starts(solver, problems, starts)
-    else:
-        last = before.now
-        control, k, angles = last.control.copy(), last.k.copy(), last.angles
-        contacts, multipliers = last.contacts, last.multipliers
-    is_cold = np.array([each.control is None for each in starts])
-    now = solver.begin(control, contacts, multipliers, np.where(k > 0.0, np.minimum(k, wanted), wanted), angles, is_cold)
-    solver.run(now, deadline, most)
-    return Point(solver, now, now.at.factor)
-
-
-def _stack_starts(
-    solver: Solver, problems: Sequence[Problem], starts: Sequence[Start]
-) -> tuple[Array, Contacts, Array, Array, Array]:
-    """Return controls (b, 2N), contacts, their multipliers (q,), safety factors (b,), and swept angles (b, m) of the classes."""
-    margins = solver.margins
-    rows = np.arange(len(problems))
-    paths = np.stack([each.path for each in starts])
-    angles = margins.sweep_steps(paths)
-    controls = []
-    for row, (problem, start) in enumerate(zip(problems, starts, strict=True)):
-        if start.control is not None:
-            controls.append(start.control * problem.horizon.gain)
-            continue
-        for tightness in (1.0, 1e2, 1e4):
-            control = follow(problem, start.path, tightness)
-            one = rows[[row]]
-            swept = margins.sweep(one, margins.find_path(margins.move(one, control[None])))
-            if (np.abs(swept - angles[row]) < np.pi).all():
-                break
-        controls.append(control)
-    forces = [each.forces for each in starts]
-    problem_rows = np.repeat(rows, [len(each.time) for each in forces])
-    contacts = Contacts(problem_rows, *(np.concatenate([each[i] for each in forces]) for i in (0, 1)))
-    multipliers = np.concatenate([each.multiplier for each in forces])
-    return np.stack(controls), contacts, multipliers, np.array([each.safety_factor for each in starts]), angles
-
-
 def collect(point: Point, row: int, status: Status, message: str, **rest: object) -> StrategyResult:
     """Return the result of one problem at a point."""
     now, solver = point.now, point.solver
@@ -242,7 +124,7 @@ def solve_optimal(
 def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, Array]:
     """Return the least safety factors of a point, after asking for more where an obstacle comes nearer than its contacts tell."""
     solver, now = point.solver, point.now
-    found = solver.margins.find_least_factors(now.control, now.at.factors)
+    found = find_least_factors(solver.margins, now.control, now.at.factors)
     aimed = np.array([each.wanted_k for each in solver.margins.problems])
     for _ in range(CORRECTIONS):
         short = (found[0] < aimed * (1.0 - REACHED)) & (found[0] > aimed * (1.0 - NEARLY)) & now.is_done
@@ -252,7 +134,7 @@ def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, 
         now.is_done[short] = now.is_settled[short] = False
         now.bound[short] = np.inf
         solver.run(now, deadline)
-        found = solver.margins.find_least_factors(now.control, now.at.factors)
+        found = find_least_factors(solver.margins, now.control, now.at.factors)
     point.k = np.where(now.at.factor > 0.0, found[0], now.at.factor)
     return found
 
@@ -349,7 +231,7 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
         one = np.array([tau]), np.array([lam])
         point = solve_at([problem], [start], one, is_chance=False, between=False, before=point, most=1)
         last, effort = effort, float((point.now.control**2).sum()) / problem.horizon.gain**2
-        k = float(chance.find_least_factors(point.now.control)[0][0])
+        k = float(find_least_factors(chance, point.now.control)[0][0])
         weights = {'tau': tau, 'lam': lam, 'iterations': iteration, 'qp_solves': iteration}
         if k >= problem.wanted_k and abs(effort - last) < SETTLED_EFFORT:
             return collect(point, 0, Status.SOLVED, 'solved', **weights)

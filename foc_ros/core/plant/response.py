@@ -11,22 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
+from foc_ros.core.interpolation import hermite as hermite
+from foc_ros.core.interpolation import hermite_quintic as hermite_quintic
+from foc_ros.core.interpolation import locate
+from foc_ros.core.interpolation import pair_steps as pair_steps
 from foc_ros.core.types import Array
-
-
-def hermite(share: Array) -> Array:
-    """Return the weights (..., 4) of the position and velocity at the beginning and the end of a step, for shares in [0, 1]."""
-    s, left = share, 1.0 - share
-    return np.stack((left**2 * (1.0 + 2.0 * s), left**2 * s, s**2 * (1.0 + 2.0 * left), -(s**2) * left), axis=-1)
-
-
-def hermite_quintic(share: Array) -> Array:
-    """Return the weights (..., 6) of value, rate and second derivative at both ends of a step, for shares in [0, 1]."""
-    s, left = share, 1.0 - share
-    s2, s3, left2, left3 = s * s, s * s * s, left * left, left * left * left
-    begin = left3 * (1.0 + 3.0 * s + 6.0 * s2), left3 * s * (1.0 + 3.0 * s), 0.5 * left3 * s2
-    end = s3 * (1.0 + 3.0 * left + 6.0 * left2), -s3 * left * (1.0 + 3.0 * left), 0.5 * s3 * left2
-    return np.stack((*begin, *end), axis=-1)
 
 
 def fall_as_minimum_jerk(share: Array) -> tuple[Array, Array, Array]:
@@ -74,8 +63,7 @@ class Response:
 
     def locate(self, times: Array) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.intp]], Array]:
         """Return the step in which each time lies, and the share of it that has passed."""
-        step = np.minimum(times.astype(np.intp), self.steps - 1)
-        return step, times - step
+        return locate(times, self.steps)
 
     @cached_property
     def at_steps(self) -> Array:
@@ -109,11 +97,6 @@ def _multiply(one: Array, other: Array) -> Array:
     """Return the products xx, yy, xy of responses (N, 2, 2N), symmetric in both, (N, 3, 2N)."""
     mixed = 0.5 * (one[:, 0] * other[:, 1] + one[:, 1] * other[:, 0])
     return np.stack((one[:, 0] * other[:, 0], one[:, 1] * other[:, 1], mixed), axis=1)
-
-
-def pair_steps(motion: Array) -> Array:
-    """Return what is known at both ends of each step, (N, 4, ...), from positions and rates at steps 0..N, (N + 1, 2, ...)."""
-    return np.concatenate((motion[:-1], motion[1:]), axis=1)
 
 
 LEAST_POINTS = 50

@@ -38,6 +38,11 @@ def encode_wrench(output: GuidanceOutput, place: Place, types: MessageTypes) -> 
     return types.make('geometry_msgs/msg/WrenchStamped', header=_encode_header(place, types), wrench=wrench)
 
 
+def encode_force(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
+    """Encode the force as a geometry_msgs/Wrench without torque and without a stamp, as drivers of haptic devices take it."""
+    return encode_wrench(output, place, types).wrench
+
+
 def encode_reference(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the reference as a geometry_msgs/PoseStamped, whose orientation means nothing."""
     position = lift(output.reference, place.height, place.plane).tolist()
@@ -103,3 +108,6 @@ GUIDANCE_OUTPUTS: dict[str, tuple[str, Encoder]] = {
     STIFFNESS: ('std_msgs/msg/Float64MultiArray', encode_stiffness),
 }
 """Message type and encoder of every output of each update, by the name of its topic below the node's name."""
+UNSTAMPED = 'guidance/wrench_unstamped'
+LIVE_OUTPUTS = GUIDANCE_OUTPUTS | {UNSTAMPED: ('geometry_msgs/msg/Wrench', encode_force)}
+"""The same with what only a node publishes, if the parameter `guidance.unstamped` says so: a bag has no use for it."""

@@ -1,8 +1,8 @@
 """Encoding of a prediction as a MarkerArray: paths, ellipses and labels of all candidates, and the uncertain obstacles.
 
-Each candidate has two ellipses of one standard deviation at a place: an inner one of the motor noise, which eta is about, and an
-outer one of the total uncertainty. The names of their namespaces and a legend say so. Where the height is predicted, they are
-cylinders of one standard deviation of it up and down.
+Each candidate has ellipses of one standard deviation of the motor noise, which eta is about. The most likely one also has outer
+ones of the total uncertainty; those of all candidates would cover the scene. The names of their namespaces and a legend say so.
+Where the height is predicted, they are cylinders of one standard deviation of it up and down.
 
 Every array first deletes the markers of the one before, and all markers expire after LIFETIME_S, so that the drawing of a
 prediction that is not renewed disappears.
@@ -36,7 +36,9 @@ MAX_DRAWN = 128
 """Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
 ARC_POINTS = 32
 """Points on a full circle of an outline."""
-THICKNESS, TEXT_HEIGHT = 0.002, 0.012
+THICKNESS, TEXT_HEIGHT = 0.002, 0.008
+LABELLED = 0.01
+"""Least likelihood of a candidate with a label: those of less likely ones would cover the others."""
 MOTOR, TOTAL = 'motor_noise', 'total_uncertainty'
 """Namespaces of the two ellipses."""
 ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
@@ -86,15 +88,17 @@ class _MarkerEncoder:
             colour, text = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
             found = 'estimated' if outcome.is_estimated else 'compromised'
             text += '' if outcome.is_solved else f', {found}: eta {outcome.eta:.3f}'
-            for name in ELLIPSE_STYLES:
+            for name in ELLIPSE_STYLES if index == 0 else (MOTOR,):
                 yield from self._encode_ellipses(name, index, outcome, colour)
         else:
             colour, text = GREY, outcome.reason
         points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[self._encode_point(*p) for p in points])
-        label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goals))}) {text}'
-        yield self.encode('label', index, TEXT, colour, (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
+        if outcome.has_likelihood and likelihood < LABELLED:
+            return
+        label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goal_positions))}) {text}'
+        yield self.encode('label', index, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
 
     def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
         """Yield ellipses of one standard deviation about the mean, spread over the path."""
@@ -119,7 +123,7 @@ class _MarkerEncoder:
             (place,) = self._lift(outcome.solution.path[:1] - [0.0, LEGEND_BELOW_M])
             shares = (self.prediction.unknown, 'unknown'), (self.prediction.other, 'another goal')
             text = '\n'.join([LEGEND, *(f'{100 * share:.0f} % {name}' for share, name in shares if share > 0.0)])
-            yield self.encode('legend', 0, TEXT, GREY, (0, 0, TEXT_HEIGHT), place, text=text)
+            yield self.encode('legend', 0, TEXT, (*GREY[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
 
     def encode_obstacles(self, obstacles: Obstacles) -> Iterator[Any]:
         near = self._find_nearest(obstacles)

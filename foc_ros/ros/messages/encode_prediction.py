@@ -41,6 +41,7 @@ STAMP = 'stamp_ns:'
 """Beginning of the label with the stamp [ns] of a table of likelihoods, whose message has no header."""
 UNKNOWN, OTHER = 'unknown', 'other'
 """Labels of the shares that no candidate has: of classes that are unknown, and of a goal that nobody announced."""
+GOAL_LIKELIHOOD_TYPE = 'std_msgs/msg/Float64'
 LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
 
 
@@ -112,6 +113,31 @@ def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     return types.make('std_msgs/msg/Float64MultiArray', layout=layout, data=np.array(rows, dtype=float).ravel())
 
 
+def encode_likelihoods_by_name(prediction: Prediction, types: MessageTypes) -> Any:
+    """Encode the likelihoods as a diagnostic_msgs/DiagnosticArray, which tools plot by name: status `goals`, status `classes`.
+
+    The key of a value is the name of a goal or the label of a candidate; there is none for what is not known. Both have the keys
+    `UNKNOWN` and `OTHER` where such a share is above 0.
+    """
+    classes = {outcome.label: outcome.likelihood for outcome in order_candidates(prediction)}
+    goals = {goal.name: goal.likelihood for goal in prediction.goals if goal.likelihood is not None}
+    rest = {name: share for name, share in ((UNKNOWN, prediction.unknown), (OTHER, prediction.other)) if share > 0.0}
+    statuses = []
+    for name, rows in (('goals', goals), ('classes', classes)):
+        items = (rows | rest).items()
+        values = [types.make('diagnostic_msgs/msg/KeyValue', key=key, value=f'{share:.6g}') for key, share in items]
+        statuses.append(types.make('diagnostic_msgs/msg/DiagnosticStatus', name=name, values=values))
+    header = make_header(types, prediction.stamp_ns, prediction.frame_id)
+    return types.make('diagnostic_msgs/msg/DiagnosticArray', header=header, status=statuses)
+
+
+def encode_goal_likelihoods(prediction: Prediction, types: MessageTypes) -> dict[int, Any]:
+    """Encode the likelihood of each goal of which something is known as a std_msgs/Float64, by its row."""
+    order_candidates(prediction)  # raises FocError for a number that is not finite
+    likelihoods = {row: goal.likelihood for row, goal in enumerate(prediction.goals) if goal.likelihood is not None}
+    return {row: types.make(GOAL_LIKELIHOOD_TYPE, data=likelihood) for row, likelihood in likelihoods.items()}
+
+
 def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     """Encode the most likely candidate as a nav_msgs/Path with stamps in the future; no poses if nothing was solved."""
     stamp_ns, frame_id = prediction.stamp_ns, prediction.frame_id
@@ -131,6 +157,10 @@ OUTPUTS: dict[str, tuple[str, Encoder]] = {
         lambda prediction, _, plane, types: encode_prediction_cloud(prediction, plane, types),
     ),
     'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda prediction, _, __, types: encode_likelihoods(prediction, types)),
+    'likelihoods_by_name': (
+        'diagnostic_msgs/msg/DiagnosticArray',
+        lambda prediction, _, __, types: encode_likelihoods_by_name(prediction, types),
+    ),
     'path': ('nav_msgs/msg/Path', lambda prediction, _, plane, types: encode_path(prediction, plane, types)),
     'markers': ('visualization_msgs/msg/MarkerArray', encode_markers),
 }

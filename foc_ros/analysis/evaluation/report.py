@@ -1,0 +1,316 @@
+"""All predictors scored on all recordings: the result as plain values for JSON, as sentences, and as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foc_ros.analysis.evaluation.baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, Observation, ObservedRecording, ask_all
+from foc_ros.analysis.evaluation.scores import (
+    TENTHS,
+    Scores,
+    choose_held_out,
+    compute_log_likelihoods,
+    compute_mean_interval,
+    compute_position_scores,
+    find_tenths,
+    score_forecasts,
+    summarise,
+)
+from foc_ros.analysis.parallel import collect_all
+from foc_ros.analysis.recordings import LABELS, TRIALS, read_picked
+from foc_ros.core.config import Config, flatten
+from foc_ros.core.types import LEFT, NANOSECONDS, Array
+from foc_ros.io.csv_tables import read_rows
+
+FITTED_TO = {PATH_CLASS: PATH_CLASS, GAP: PATH_CLASS, GOAL: GOAL}
+"""The question by whose answers the settings of a predictor are chosen, for each question that it is scored by."""
+LogLikelihoods = dict[tuple[str, str], Array]
+"""Log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor."""
+SUBJECTS = {PATH_CLASS: 'Homotopy classes', GAP: 'Next gaps', GOAL: 'Goals'}
+OURS = 'likelihood-weighted'
+"""The predicted positions that are compared with those of the baselines."""
+COVERAGE_S, COVERAGE_LEVEL, TOLERANCE = '0.5', 0.9, 0.05
+"""Horizon and probability of the region that is judged, and the error of its share that counts as none."""
+ALIKE = 0.02
+"""Relative difference below which two errors of positions are alike."""
+Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
+"""Title, columns, rows."""
+GAIN_TITLES = {
+    PATH_CLASS: 'Homotopy class: log-likelihood above uniform [nat]',
+    GOAL: 'Goal: log-likelihood above uniform [nat]',
+}
+TOTALS = ('', 'gain', 'ECE', 'Brier', 'correct [%]', 'leads from [%]', 'leads for [s]')
+GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
+REGIONS = {
+    'inside': 'ellipse of the most likely candidate',
+    'inside_taken': 'ellipse of the candidate taken',
+    'inside_all': 'smallest region of all candidates',
+}
+
+
+def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[str, Any]:
+    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON.
+
+    What is fitted is scored on recordings that it was not fitted to. `questions`: values of `scores.summarise` by question and
+    predictor; for `gap`, tenths and `right_from_half_way` count from row to row, else over the whole movement. `settings`: by
+    question and predictor, the best for all recordings. `comparisons`: of the published predictions with each baseline, by
+    question. `positions`: values of `scores.compute_position_scores`. `verdict`: sentences.
+    """
+    baselines = make_baselines(recordings, config.likelihood)
+    items = [(recording.name, (recording, baselines)) for recording in recordings]
+    tables = collect_all(_tabulate_log_likelihoods, items, 'compare')
+    table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
+    asked = [name for name in FITTED_TO if any(ask_all(recording, name) for recording in recordings)]
+    scores = {
+        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], recordings, name) for each in baselines}
+        for name in asked
+    }
+    left_s = {name: _find_times_left(recordings, name) for name in asked}
+    answer = {
+        'recordings': len(recordings),
+        'predictions': sum(len(recording.observations) for recording in recordings),
+        'questions': {name: {other: summarise(each, left_s[name]) for other, each in scores[name].items()} for name in asked},
+        'comparisons': {
+            name: {
+                other: compare_scores(scores[name][PUBLISHED], each, is_share=name == GAP)
+                for other, each in scores[name].items()
+                if other not in (PUBLISHED, REFITTED, PLAIN)
+            }
+            for name in asked
+        },
+        'settings': {
+            name: {each.name: _make_plain(each.settings[int(table[name, each.name].sum(axis=0).argmax())]) for each in baselines}
+            for name in asked
+            if name != GAP
+        },
+        'positions': compute_position_scores(recordings),
+        'parameters': flatten(config),
+    }
+    return answer | {'verdict': make_verdict(answer)}
+
+
+def _find_times_left(recordings: Sequence[ObservedRecording], name: str) -> Array:
+    """Return the time [s] to the end of the movement from each observation to which a question is put, (m,)."""
+    return np.array([(each.path.end_ns - seen.stamp_ns) / NANOSECONDS for each in recordings for seen, _ in ask_all(each, name)])
+
+
+def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> LogLikelihoods:
+    recording, baselines = item
+    questions = {name: ask_all(recording, name) for name in (PATH_CLASS, GOAL)}
+    return {(name, each.name): compute_log_likelihoods(questions[name], each) for name in questions for each in baselines}
+
+
+def _score_held_out(baseline: Baseline, table: Array, recordings: Sequence[ObservedRecording], name: str) -> Scores:
+    """Score a predictor, on each recording with the setting that is best for the others by a table (r, s)."""
+    choices = choose_held_out(table, [each.name for each in recordings])
+    return score_forecasts(
+        (
+            number,
+            observation.truth.approach if name == GAP else observation.truth.progress,
+            question,
+            baseline.forecast(observation, question, baseline.settings[choices[number]]),
+        )
+        for number, recording in enumerate(recordings)
+        for observation, question in ask_all(recording, name)
+    )
+
+
+def _make_plain(setting: Any) -> Any:
+    return asdict(setting) if is_dataclass(setting) and not isinstance(setting, type) else setting
+
+
+def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -> dict[str, str]:
+    """Return both texts for each recording whose label is not the path class that was taken; none where there are no labels.
+
+    The columns of labels.csv after the first are the gaps taken, row by row, counted from low x. The column `sides` of trials.csv
+    has the side of each box by the end of its name; where it says which object was picked up instead, that is the truth already.
+    Raises RecordingError for a table that cannot be read.
+    """
+    if (data / TRIALS).exists() and read_picked(data / TRIALS):
+        return {}
+    if (data / TRIALS).exists():
+        return _find_side_mismatches(data / TRIALS, recordings)
+    if not (data / LABELS).exists():
+        return {}
+    labels = {row.cells['recording']: row.cells for row in read_rows(data / LABELS, ('recording',))}
+    found = {}
+    for recording in recordings:
+        cells = labels.get(recording.name)
+        if cells is None:
+            found[recording.name] = 'no label'
+            continue
+        labelled = [text for column, text in cells.items() if column != 'recording']
+        taken = [str(gap) for gap in find_gaps(recording.observations[0])]
+        if labelled != taken:
+            found[recording.name] = f'label {" ".join(labelled)}, path {" ".join(taken)}'
+    return found
+
+
+def _find_side_mismatches(file: Path, recordings: Sequence[ObservedRecording]) -> dict[str, str]:
+    labels = {row.cells['recording']: row.cells['sides'] for row in read_rows(file, ('recording', 'sides'))}
+    found = {}
+    for recording in recordings:
+        first = recording.observations[0]
+        names = [identity.rpartition('/')[0] for identity in first.ids]
+        taken = {name: 'left' if side == LEFT else 'right' for name, side in zip(names, first.truth.sides, strict=True)}
+        labelled = [each.rpartition('=') for each in labels.get(recording.name, '').split()]
+        others = [
+            f'{name} label {side}, path {taken[full]}'
+            for name, _, side in labelled
+            for full, is_ahead in zip(names, first.truth.is_ahead, strict=True)
+            if is_ahead and full.endswith(name) and taken[full] != side
+        ]
+        if others or recording.name not in labels:
+            found[recording.name] = '; '.join(others) or 'no label'
+    return found
+
+
+def find_gaps(observation: Observation) -> list[int]:
+    """Return the gap that the hand really took in each row still ahead, counted from low x."""
+    truth, row = observation.truth, observation.row
+    left_is_low = observation.left[0] < 0.0
+    is_higher = (truth.sides == LEFT) != left_is_low
+    return [int(is_higher[(row == each) & truth.is_ahead].sum()) for each in np.unique(row[truth.is_ahead])]
+
+
+def compare_scores(ours: Scores, other: Scores, is_share: bool) -> dict[str, Any]:
+    """Return the mean difference of two predictors in the same predictions, with its interval, and the tenths that are worse.
+
+    is_share: compare the shares of correct answers instead of the log-likelihoods of the true ones.
+    """
+    difference = ours.correct - other.correct if is_share else ours.log_likelihood - other.log_likelihood
+    tenths = find_tenths(ours.progress)
+    by_tenth = [difference[tenths == each] for each in range(TENTHS)]
+    return {
+        'difference': float(difference.mean()),
+        'interval': compute_mean_interval(difference, ours.recording),
+        'worse_tenths': [number for number, each in enumerate(by_tenth, 1) if len(each) and each.mean() < 0.0],
+    }
+
+
+def make_verdict(answer: Mapping[str, Any]) -> list[str]:
+    """Return the sentences about an answer of `evaluate --json`."""
+    questions = [_judge_question(name, each) for name, each in answer['comparisons'].items()]
+    positions = answer['positions']
+    return [*questions, *_judge_positions(positions['displacement_m']), *_judge_region(positions['inside_all'])]
+
+
+def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
+    unit, factor = ('points of 100', 100.0) if name == GAP else ('nat', 1.0)
+    groups: dict[str, list[str]] = {'better than': [], 'not distinguishable from': [], 'worse than': []}
+    for baseline, each in comparisons.items():
+        low, high = each['interval']
+        tenths = ', '.join(map(str, each['worse_tenths']))
+        where = f', worse in tenths {tenths}' if 0 < len(each['worse_tenths']) < TENTHS else ''
+        words = f'{baseline} ({factor * each["difference"]:+.2g} {unit}{where})'
+        groups['better than' if low > 0.0 else 'worse than' if high < 0.0 else 'not distinguishable from'].append(words)
+    judged = '; '.join(f'{verdict} {", ".join(each)}' for verdict, each in groups.items() if each)
+    return f'{SUBJECTS[name]}: {PUBLISHED} is {judged}.'
+
+
+def _judge_positions(errors: Mapping[str, Any]) -> list[str]:
+    """Return a sentence for each horizon with the final errors of the baselines beside ours."""
+    sentences = []
+    for horizon, ours in errors[OURS]['final'].items():
+        others = {name: each['final'][horizon] for name, each in errors.items() if name not in (OURS, 'most likely')}
+        if ours is not None:
+            judged = ', '.join(f'{_judge_error(ours, each)} {name} ({1e3 * each:.0f} mm)' for name, each in others.items())
+            sentences.append(f'Positions {horizon} s ahead: {1e3 * ours:.0f} mm away on average, {judged}.')
+    return sentences
+
+
+def _judge_error(ours: float, other: float) -> str:
+    if abs(ours - other) <= ALIKE * other:
+        return 'like'
+    return 'better than' if ours < other else 'worse than'
+
+
+def _judge_region(inside: Mapping[str, Any]) -> list[str]:
+    share = inside[f'{COVERAGE_LEVEL:g}'][COVERAGE_S]
+    if share is None:
+        return []
+    is_right = abs(share - COVERAGE_LEVEL) <= TOLERANCE
+    judged = 'about right' if is_right else 'too narrow' if share < COVERAGE_LEVEL else 'too wide'
+    return [
+        f'Uncertainty: the region of {100 * COVERAGE_LEVEL:.0f} % holds {100 * share:.0f} % of the true positions {COVERAGE_S} s '
+        f'ahead, so it is {judged}.'
+    ]
+
+
+def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
+    """Yield the tables of an answer of `evaluate --json`."""
+    questions = answer['questions']
+    tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
+    for name, title in GAIN_TITLES.items():
+        if name in questions:
+            by_predictor = questions[name].items()
+            lines = [_format_tenths(predictor, each, 'gain') for predictor, each in by_predictor]
+            yield f'{title}, by tenths of the movement', tenths, lines
+            yield f'{title}, of all', TOTALS, [_format_totals(predictor, each) for predictor, each in by_predictor]
+    if GAP in questions:
+        by_predictor = questions[GAP].items()
+        yield GAP_TITLE, tenths, [_format_tenths(predictor, each, 'right') for predictor, each in by_predictor]
+        halves: list[tuple[str, ...]] = [(predictor, _percent(each['right_from_half_way'])) for predictor, each in by_predictor]
+        yield 'Gap in the next row', ('', 'correct in the second half [%]'), halves
+    yield from _make_position_tables(answer['positions'])
+    yield '', ('', ''), list(_list_facts(answer))
+
+
+def _format_tenths(predictor: str, scores: Mapping[str, Any], score: str) -> tuple[str, ...]:
+    shown = [_percent(each[score], 0) if score == 'right' else _number(each[score], 2) for each in scores['by_tenth']]
+    return (predictor, *shown)
+
+
+def _format_totals(predictor: str, scores: Mapping[str, Any]) -> tuple[str, ...]:
+    numbers = [_number(scores[name], 3) for name in ('gain', 'expected_calibration_error', 'brier')]
+    leads = _percent(scores['leads_for_good_from']), _number(scores['leads_for_good_before_s'], 2)
+    return (predictor, *numbers, _percent(scores['right']), *leads)
+
+
+def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:
+    horizons = list(positions['inside']['0.5'])
+    errors = [
+        (name, *(_number(each if each is None else 1e3 * each, 1) for by in kinds.values() for each in by.values()))
+        for name, kinds in positions['displacement_m'].items()
+    ]
+    columns = ('', *(f'{kind}\n{each} s' for kind in ('average', 'final') for each in horizons))
+    yield 'Displacement error [mm]', columns, errors
+    densities = [(name, *(_number(by[each], 2) for each in horizons)) for name, by in positions['nlpd'].items()]
+    yield 'Negative log-density of the true position [nat, metres]', ('', *(f'{each} s' for each in horizons)), densities
+    inside = [
+        (f'{words}, {100 * float(level):g} %', *(_percent(by[each]) for each in horizons))
+        for name, words in REGIONS.items()
+        for level, by in positions[name].items()
+    ]
+    yield 'True positions inside [%]', ('', *(f'{each} s' for each in horizons)), inside
+
+
+def _list_facts(answer: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield 'recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'
+    yield 'predictions', str(answer['predictions'])
+    for question, by_predictor in answer['settings'].items():
+        for name, setting in by_predictor.items():
+            if setting is not None:
+                yield f'{question}, best setting\n{name}', _format_setting(setting)
+
+
+def _format_setting(setting: Any) -> str:
+    if isinstance(setting, Mapping):
+        return ', '.join(f'{name} {_format_setting(value)}' for name, value in setting.items())
+    if isinstance(setting, Sequence) and not isinstance(setting, str):
+        return ', '.join(_format_setting(value) for value in setting)
+    return f'{setting:.4g}' if isinstance(setting, float) else str(setting)
+
+
+def _number(value: float | None, digits: int) -> str:
+    return '-' if value is None else f'{value:.{digits}f}'
+
+
+def _percent(value: float | None, digits: int = 1) -> str:
+    return _number(None if value is None else 100 * value, digits)

@@ -1,0 +1,350 @@
+"""Parameters that need no prediction: of the estimator, of durations, and the number of candidates.
+
+**Deviations of the Kalman filter** are those under which its innovations are likeliest. A filter with the right deviations leaves
+innovations v that are white and normal, so that with the expected variance S, which both axes share,
+
+    log p(z) = -1/2 sum_k (2 log(2 pi S_k) + |v_k|^2 / S_k)
+
+is exact (Schweppe 1965, doi:10.1109/TIT.1965.1053737).
+
+**Fading.** An acceleration a that fades as exp(-t / tau) displaces a hand of speed v, after t, by
+
+    v t + tau (t - tau (1 - exp(-t / tau))) a,
+
+the model that predictions start from with `estimator.acceleration_time_s` = tau. Where that is 0 the acceleration lasts, and the
+hand moves by v t + a t^2 / 2. The estimate minimises the mean absolute error of the mean velocity until 0.25, 0.5 and 1 s ahead,
+over the samples of a movement and then over the recordings. The acceleration is that of the filter, and so is the noise in it.
+
+**Durations.** Their constants minimise the mean absolute error of the time to go, over the samples of a movement and then over
+the recordings. They are the likeliest values where errors follow Laplace's distribution, so that a few slow movements have little
+weight. With Fitts' law, only distances that differ tell intercept and slope apart; otherwise their ratio is kept.
+
+**The wait** is the mean time to the next movement over all samples at rest. That is the likeliest mean of an exponential
+distribution, which does not depend on how long the hand has waited already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from foc_ros.analysis.evaluation.observations import HORIZONS_S, RecordedPath, find_open_gaps
+from foc_ros.analysis.evaluation.scores import CENTRAL, resample
+from foc_ros.analysis.recordings import Recording
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.classes.rows import find_direction, find_rows, locate_rows
+from foc_ros.core.config import Config, DurationConfig, EstimatorConfig, clip_values, flatten, replace_values
+from foc_ros.core.errors import RecordingError
+from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
+from foc_ros.core.hand.duration import estimate_times_to_go
+from foc_ros.core.hand.kalman import Update, compute_gramian, compute_transition, update
+from foc_ros.core.learning.movements import has_covered_distance
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Record, SampleStatus
+
+from . import Estimate, Findings, SettingTable, clip_to_bounds
+
+MIN_SAMPLES = 10
+POSITION_STDDEV, JERK_DENSITY = 'estimator.position_stddev', 'estimator.jerk_density'
+POSITION_STDDEVS, JERK_DENSITIES = np.geomspace(1e-5, 0.1, 13), np.geomspace(1e-3, 1e4, 22)
+"""Deviations that are tried first [m], [m/s^2.5]; no tracker of hands is better than 10 um."""
+FINE = np.geomspace(0.46, 2.16, 25)
+"""Factors on the best of them that are tried then."""
+FADING = 'estimator.acceleration_time_s'
+FADING_TIMES_S = (0.0, *np.geomspace(0.01, 0.5, 60).tolist())
+"""Times that are tried; 0: the acceleration lasts."""
+CONSTANTS = {model: {f'duration.{name}': power for name, power in powers.items()} for model, powers in MODEL_CONSTANTS.items()}
+"""By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""
+DISTANCE_MODELS = ('fitts',)
+"""Models whose durations depend on the distance."""
+NARROW_BITS = 0.5
+"""Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""
+FACTORS = tuple(2.0 ** (np.arange(-10, 11) / 4.0))
+"""Factors on the given values, 0.18 to 5.7, among which the best is sought first."""
+MIN_TIME_S = 0.1
+"""Least time to the end of a sample that is used, because the end itself is known no better."""
+WAIT = 'duration.wait_s'
+CANDIDATES = 'homotopy.max_candidates'
+MAX_CLASSES = 24
+"""Most path classes that make room for candidates; goals do beyond it. A prediction takes a few ms for each candidate."""
+
+Sample = tuple[HandState, Array, float]
+"""State of the hand, goal (2,) [m], time left [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedHand(Record):
+    """The hand in a recording, as the estimator receives it, and its scene.
+
+    stamps_ns (m,), rising; positions (m, 2) [m]; obstacles at the first stamp; goals (g, 2) [m]; frame_id.
+    """
+
+    name: str
+    stamps_ns: NDArray[np.int64]
+    positions: Array
+    obstacles: Obstacles
+    goals: Array
+    frame_id: str = ''
+
+    @cached_property
+    def times(self) -> Array:
+        """Seconds since the first sample, (m,)."""
+        return np.asarray((self.stamps_ns - self.stamps_ns[0]) / NANOSECONDS)
+
+    @cached_property
+    def path(self) -> RecordedPath:
+        """The path of the hand, which ends where it is nearest to the goal that it reached."""
+        return RecordedPath(self.stamps_ns, self.positions, self.goals)
+
+    def filter(self, config: EstimatorConfig) -> list[Update]:
+        """Return what an estimator makes of each sample: the state, and whether it continues or starts anew."""
+        updates, state = list[Update](), None
+        for stamp_ns, position in zip(self.stamps_ns.tolist(), self.positions, strict=True):
+            updates.append(update(state, HandSample(stamp_ns, position, frame_id=self.frame_id), config))
+            state = updates[-1].state
+        return updates
+
+    def estimate_states(self, config: Config) -> list[HandState]:
+        """Return the state that the estimator of a configuration gives at each sample."""
+        return [each.state for each in self.filter(config.estimator)]
+
+
+def read_hand(recording: Recording, config: Config) -> RecordedHand:
+    """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
+    replayed = Replay(config)
+    samples: list[HandSample] = []
+    for _, status in replayed.take(recording.items()):
+        sample = replayed.intake.sample
+        if status is not None and status.is_taken and sample is not None and (not samples or sample is not samples[-1]):
+            samples = samples if not samples or sample.stamp_ns > samples[-1].stamp_ns else []
+            samples.append(sample)
+    goals = replayed.pipeline.scene.goals
+    if goals is None or not len(goals):
+        raise RecordingError(f'{recording.name}: {replayed.pipeline.not_ready_reason() or "no goal received"}')
+    if len(samples) < MIN_SAMPLES:
+        raise RecordingError(f'{recording.name}: expected at least {MIN_SAMPLES} hand poses, got {len(samples)}')
+    stamps_ns = np.array([sample.stamp_ns for sample in samples])
+    positions = np.array([sample.position for sample in samples])
+    obstacles = replayed.pipeline.scene.obstacles(samples[0].stamp_ns)
+    return RecordedHand(recording.name, stamps_ns, positions, obstacles, goals, samples[0].frame_id)
+
+
+class Innovations:
+    """The recordings side by side, so that one pass filters all of them under all settings.
+
+    Every filter that is tried starts anew where the given one does not continue, so that all are compared by the same samples.
+    """
+
+    def __init__(self, hands: Sequence[RecordedHand], given: EstimatorConfig) -> None:
+        most = max(len(each.times) for each in hands)
+        dt = np.full((most - 1, len(hands)), given.gap_s)
+        self._continues = np.zeros(dt.shape, dtype=bool)
+        self._positions = np.zeros((most, len(hands), 2))
+        for row, each in enumerate(hands):
+            continues = [updated.status is SampleStatus.ACCEPTED for updated in each.filter(given)[1:]]
+            self._continues[: len(continues), row] = continues
+            dt[: len(continues), row] = np.where(continues, np.diff(each.times), given.gap_s)
+            self._positions[: len(each.times), row] = each.positions
+        self._transition = np.array([[compute_transition(each) for each in row] for row in dt])
+        self._gramian = np.array([[compute_gramian(each) for each in row] for row in dt])
+        self._start = compute_gramian(given.gap_s)
+
+    def tabulate(self, position_stddevs: Sequence[float], jerk_densities: Sequence[float]) -> SettingTable:
+        """Return the log-likelihood of the positions of each recording under all combinations of deviations."""
+        deviations = list(product(position_stddevs, jerk_densities))
+        position, jerk = (column[:, None] ** 2 for column in np.array(deviations).T)
+        n = self._positions.shape[1]
+        start = np.zeros((len(deviations), 1, 3, 3))
+        start[..., 1:, 1:] = jerk[..., None, None] * self._start[1:, 1:]
+        start[:, 0, 0, 0] = position[:, 0]
+        mean = np.zeros((len(deviations), n, 3, 2))
+        mean[:, :, 0] = self._positions[0]
+        covariance, total = np.repeat(start, n, axis=1), np.zeros((len(deviations), n))
+        for A, G, continues, z in zip(self._transition, self._gramian, self._continues, self._positions[1:], strict=True):
+            mean, covariance = A @ mean, A @ covariance @ A.swapaxes(1, 2) + jerk[..., None, None] * G
+            S = np.maximum(covariance[..., 0, 0], 0.0) + position
+            v = z - mean[:, :, 0]
+            total -= np.where(continues, np.log(2.0 * np.pi * S) + (v**2).sum(axis=-1) / (2.0 * S), 0.0)
+            gain = covariance[..., 0] / S[..., None]
+            mean = mean + gain[..., None] * v[:, :, None, :]
+            covariance = covariance - gain[..., None] * covariance[..., None, 0, :]
+            if not continues.all():
+                mean[:, ~continues] = 0.0
+                mean[:, ~continues, 0] = z[~continues]
+                covariance[:, ~continues] = start
+        names = POSITION_STDDEV, JERK_DENSITY
+        return SettingTable(total.T, tuple(dict(zip(names, each, strict=True)) for each in deviations))
+
+
+def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> Findings:
+    """Return the deviations of the filter."""
+    innovations, how = Innovations(hands, config.estimator), 'innovations of the filter'
+    given = {POSITION_STDDEV: config.estimator.position_stddev, JERK_DENSITY: config.estimator.jerk_density}
+    ranges = dict(zip(given, (POSITION_STDDEVS, JERK_DENSITIES), strict=True))
+    coarse = innovations.tabulate(*([given[name], *ranges[name]] for name in given))
+    columns, undetermined = coarse.determine(given)
+    best = coarse.settings[coarse.find_best(columns)]
+    finer = {
+        name: [given[name], *(() if name in undetermined else np.clip(best[name] * FINE, ranges[name][0], ranges[name][-1]))]
+        for name in given
+    }
+    fine = innovations.tabulate(*finer.values())
+    return SettingTable(np.hstack([coarse.values, fine.values]), coarse.settings + fine.settings).estimate(given, how)[0]
+
+
+def fit_fading(hands: Sequence[RecordedHand], config: Config) -> Findings:
+    """Return the time in which an acceleration fades."""
+    errors = [each for hand in hands if (each := _compute_fading_errors(hand, config)) is not None]
+    if not errors:
+        return Findings(undetermined={FADING: f'no movement lasts for {min(HORIZONS_S):g} s'})
+    table = SettingTable.from_errors(np.array(errors), [{FADING: time_s} for time_s in FADING_TIMES_S])
+    return table.estimate({FADING: config.estimator.acceleration_time_s}, 'velocities after accelerations')[0]
+
+
+def _compute_fading_errors(hand: RecordedHand, config: Config) -> Array | None:
+    """Return the mean error of a recording for each of `FADING_TIMES_S` [m/s]; None where nothing can be compared."""
+    states, times = hand.estimate_states(config), hand.times
+    is_moving = np.array([state.onset_ns is not None for state in states])
+    mean, fading = np.array([state.mean for state in states]), np.array(FADING_TIMES_S[1:])
+    errors = []
+    for horizon in HORIZONS_S:
+        known = is_moving & (times + horizon <= times[-1])
+        later = np.column_stack([np.interp(times[known] + horizon, times, axis) for axis in hand.positions.T])
+        gained = (later - mean[known, :2]) / horizon - mean[known, 2:4]
+        share = np.append(horizon / 2.0, fading * (1.0 - fading / horizon * (1.0 - np.exp(-horizon / fading))))
+        errors.append(np.hypot(*(gained - share[:, None, None] * mean[known, 4:]).transpose(2, 0, 1)).T)
+    together = np.concatenate(errors)
+    return together.mean(axis=0) if len(together) else None
+
+
+class TimesToGo:
+    """The samples in movement of each recording that reached a goal."""
+
+    def __init__(self, hands: Sequence[RecordedHand], config: Config) -> None:
+        samples = [find_samples(each, config) for each in hands]
+        self.samples = [each for each in samples if each]
+
+    def compute_errors(self, duration: DurationConfig) -> Array:
+        """Return the mean absolute error of the time to go in each recording, (n,) [s]."""
+        return np.array(
+            [
+                np.mean([abs(estimate_times_to_go(hand, goal[None], duration)[0] - left) for hand, goal, left in each])
+                for each in self.samples
+            ]
+        )
+
+    def measure_variety(self, width: float) -> float:
+        """Return the standard deviation of the index of difficulty of the movements [bit]."""
+        distances = [np.hypot(*(each[0][1] - each[0][0].onset_position)) for each in self.samples]  # type: ignore[operator]
+        return float(np.log2(np.array(distances) / width + 1.0).std())
+
+
+def find_samples(hand: RecordedHand, config: Config) -> list[Sample]:
+    """Return the samples in movement of a recording that covered the distance to a goal; none of another one."""
+    path = hand.path
+    if path.goal is None or not has_covered_distance(hand.positions, hand.goals[path.goal]):
+        return []
+    left = [(state, (path.end_ns - state.stamp_ns) / NANOSECONDS) for state in hand.estimate_states(config)]
+    goal = hand.goals[path.goal]
+    return [(state, goal, seconds) for state, seconds in left if state.onset_ns is not None and seconds > MIN_TIME_S]
+
+
+def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
+    """Return the constants of the configured model of duration."""
+    times, powers = TimesToGo(hands, config), CONSTANTS[config.duration.model]
+    names, exponents = tuple(powers), np.array(list(powers.values()))
+    if not times.samples:
+        return Findings(undetermined=dict.fromkeys(names, 'no recording has a movement that ends near a goal'))
+    given = np.array([flatten(config)[name] for name in names], dtype=float)
+
+    def compute_errors(values: Array) -> Array:
+        leaves = [name.partition('.')[2] for name in names]
+        return times.compute_errors(clip_values(config.duration, dict(zip(leaves, values.tolist(), strict=True))))
+
+    tried = [given * factor**exponents for factor in FACTORS]
+    errors = np.array([compute_errors(each) for each in tried])
+    settings = [dict(zip(names, each.tolist(), strict=True)) for each in tried]
+    _, undetermined = SettingTable.from_errors(errors.T, settings).determine(settings[FACTORS.index(1.0)])
+    if undetermined:
+        return Findings(undetermined=undetermined)
+    best, warnings = _find_best_factor(errors), []
+    value = given * best**exponents
+    if len(names) > 1 and (deviation_bits := times.measure_variety(config.duration.target_width)) > NARROW_BITS:
+        value = np.abs(minimize(lambda each: float(compute_errors(np.abs(each)).mean()), value, method='Nelder-Mead').x)
+    elif len(names) > 1:
+        warnings.append(
+            'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
+            f'(indices of difficulty with a standard deviation of {deviation_bits:.2g} bit, {NARROW_BITS:g} are needed): '
+            'their ratio is kept'
+        )
+    factors = np.percentile(resample(lambda rows: _find_best_factor(errors[:, rows]), errors.shape[1]) / best, CENTRAL)
+    estimates = {}
+    for name, each, power in zip(names, value.tolist(), exponents, strict=True):
+        estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, each), each * factors**power, 'time to go')
+    return Findings(estimates, warnings=warnings)
+
+
+def _find_best_factor(errors: Array) -> float:
+    """Return the best factor by errors (f, n), by a parabola through the best of `FACTORS` and its neighbours."""
+    mean = errors.mean(axis=1)
+    index = int(np.clip(mean.argmin(), 1, len(FACTORS) - 2))
+    before, here, after = mean[index - 1 : index + 2]
+    bend = before - 2.0 * here + after
+    shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return float(FACTORS[index] * np.exp(np.log(FACTORS[1] / FACTORS[0]) * np.clip(shift, -1.0, 1.0)))
+
+
+def fit_other_models(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
+    """Return the configuration with each other model of duration that depends on distance, its constants fitted."""
+    others = [replace_values(config, {'duration.model': model}) for model in DISTANCE_MODELS if model != config.duration.model]
+    return [replace_values(each, fit_duration(hands, each).values) for each in others]
+
+
+def fit_wait(hands: Sequence[RecordedHand], config: Config) -> Findings:
+    """Return the mean time that a hand waits."""
+    waits = np.array([mean for each in hands if (mean := _compute_mean_wait(each, config)) is not None])
+    if not len(waits):
+        return Findings(undetermined={WAIT: 'no hand waits before a movement'})
+    value, resampled = clip_to_bounds(WAIT, float(np.mean(waits))), resample(lambda rows: waits[rows].mean(), len(waits))
+    return Findings({WAIT: Estimate.from_resamples(WAIT, value, resampled, 'time until movements begin')})
+
+
+def _compute_mean_wait(hand: RecordedHand, config: Config) -> float | None:
+    """Return the mean time [s] from the samples at rest to the movement that follows, until the goal is reached."""
+    waits, onset_ns = list[float](), None
+    for state in reversed(hand.estimate_states(config)):
+        if state.stamp_ns > hand.path.end_ns:
+            continue
+        if state.onset_ns is not None:
+            onset_ns = state.onset_ns
+        elif onset_ns is not None:
+            waits.append((onset_ns - state.stamp_ns) / NANOSECONDS)
+    return float(np.mean(waits)) if waits else None
+
+
+def fit_max_candidates(hands: Sequence[RecordedHand], config: Config) -> Findings:
+    """Return the number of candidates that has room for every goal and path class, never less than the given one."""
+    classes, goals = max(count_classes(each, config.scene.hand_radius) for each in hands), max(len(each.goals) for each in hands)
+    given = config.homotopy.max_candidates
+    count = int(clip_to_bounds(CANDIDATES, max(given, min(classes, MAX_CLASSES), goals)))
+    warnings = [f'{CANDIDATES}: a recording has {classes} homotopy classes, {count} are followed'] if classes > count else []
+    if count == given:
+        return Findings(warnings=warnings)
+    found = Estimate(CANDIDATES, count, count, count, 'classes and goals in the recordings')
+    return Findings({CANDIDATES: found}, warnings=warnings)
+
+
+def count_classes(hand: RecordedHand, hand_radius: float = 0.0) -> int:
+    """Return how many path classes lead a hand of a radius [m] through the rows between the start and the farthest goal."""
+    start, obstacles = hand.positions[0], hand.obstacles
+    direction = find_direction(start, hand.goals)
+    row = find_rows(obstacles, direction, start, hand.goals)
+    position = locate_rows(obstacles.centre @ direction, row)
+    is_between = (position > start @ direction) & (position < (hand.goals @ direction).max())
+    open_gaps = [len(each) for each in find_open_gaps(obstacles, row, direction, hand_radius)]
+    return int(np.prod(np.array(open_gaps, dtype=float)[is_between]))

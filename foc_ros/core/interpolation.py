@@ -1,0 +1,68 @@
+"""Positions and covariances between the steps of a horizon.
+
+Within a step the position of a plant is the cubic through its positions and velocities at both ends. For the triple integrator,
+whose jerk is constant within a step, this is exact. Variances follow quintics through their values and their first two
+derivatives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def hermite(share: Array) -> Array:
+    """Return the weights (..., 4) of the position and velocity at the beginning and the end of a step, for shares in [0, 1]."""
+    s, left = share, 1.0 - share
+    return np.stack((left**2 * (1.0 + 2.0 * s), left**2 * s, s**2 * (1.0 + 2.0 * left), -(s**2) * left), axis=-1)
+
+
+def hermite_quintic(share: Array) -> Array:
+    """Return the weights (..., 6) of value, rate and second derivative at both ends of a step, for shares in [0, 1]."""
+    s, left = share, 1.0 - share
+    s2, s3, left2, left3 = s * s, s * s * s, left * left, left * left * left
+    begin = left3 * (1.0 + 3.0 * s + 6.0 * s2), left3 * s * (1.0 + 3.0 * s), 0.5 * left3 * s2
+    end = s3 * (1.0 + 3.0 * left + 6.0 * left2), -s3 * left * (1.0 + 3.0 * left), 0.5 * s3 * left2
+    return np.stack((*begin, *end), axis=-1)
+
+
+def pair_steps(motion: Array) -> Array:
+    """Return what is known at both ends of each step, (N, 4, ...), from positions and rates at steps 0..N, (N + 1, 2, ...)."""
+    return np.concatenate((motion[:-1], motion[1:]), axis=1)
+
+
+def locate(times: Array, steps: int) -> tuple[NDArray[np.intp], Array]:
+    """Return the step of `steps` in which each time (...) [steps] lies, and the share of it that has passed."""
+    step = np.minimum(times.astype(np.intp), steps - 1)
+    return step, times - step
+
+
+def interpolate_position(mean: Array, dt: float, times: Array) -> Array:
+    """Return the mean position (..., 2) [m] at times (...) [s] from states (N + 1, n) at steps of dt [s]."""
+    step, share = locate(times / dt, len(mean) - 1)
+    ends = pair_steps(np.stack((mean[:, :2], dt * mean[:, 2:4]), axis=1))
+    position: Array = (hermite(share)[..., None, :] @ ends[step])[..., 0, :]
+    return position
+
+
+def interpolate_covariance(covariance: Array, dt: float, times: Array) -> Array:
+    """Return the covariance (..., 2, 2) of the position [m^2] at times (...) [s] from (N + 1, n, n) at steps of dt [s].
+
+    The derivatives of the covariance of the position p are C' = cov(p, v) + cov(v, p) and C'' = 2 cov(v, v) + cov(p, a) +
+    cov(a, p). A state without the acceleration a does not tell them, and then C changes evenly within a step.
+    """
+    step, share = locate(times / dt, len(covariance) - 1)
+    position = covariance[:, :2, :2]
+    if covariance.shape[1] < 6:
+        share = share[..., None, None]
+        even: Array = (1.0 - share) * position[step] + share * position[step + 1]
+        return even
+    rate, bend = covariance[:, :2, 2:4], covariance[:, :2, 4:6]
+    change = dt * (rate + rate.swapaxes(1, 2))
+    curvature = dt**2 * (2.0 * covariance[:, 2:4, 2:4] + bend + bend.swapaxes(1, 2))
+    known = np.stack((position, change, curvature), axis=1)
+    ends = np.concatenate((known[:-1], known[1:]), axis=1).reshape(-1, 6, 4)
+    found: Array = (hermite_quintic(share)[..., None, :] @ ends[step])[..., 0, :].reshape(*times.shape, 2, 2)
+    return found

@@ -1,0 +1,269 @@
+"""Forecasts, their scores and the regions of positions, against values computed by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from evaluation_samples import TWO_CLASSES, H, make_candidates, observation, recorded
+
+from foc_ros.analysis.evaluation.baselines import UNCERTAINTY, Forecast, power_rule_shares, published_shares
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, TIMES_S, ask, find_relevant_obstacles
+from foc_ros.analysis.evaluation.report import compare_scores, make_verdict
+from foc_ros.analysis.evaluation.scores import (
+    Scores,
+    choose_held_out,
+    compute_position_scores,
+    compute_reliability,
+    find_denser_share,
+    find_final_leads,
+    find_tenths,
+    score_forecasts,
+    summarise,
+)
+from foc_ros.core.config import LikelihoodConfig
+from foc_ros.core.types import LEFT, RIGHT
+
+L, R = LEFT, RIGHT
+TWO_ROWS = {'centre': [(1.0, 0.2), (1.0, -0.2), (2.0, 0.0)], 'row': (0, 0, 1)}
+
+
+def test_rows_of_two_and_one_have_six_classes_and_the_next_row_three_gaps() -> None:
+    observed = observation(make_candidates([[L, L, L], [R, L, R]]), **TWO_ROWS, true_sides=(R, L, R))
+    relevant = find_relevant_obstacles(recorded(observed))
+    path_class, gap = ask(PATH_CLASS, observed, relevant), ask(GAP, observed, relevant)
+    assert path_class.possible == 6 and path_class.answers[path_class.truth] == (R, L, R) and path_class.given.tolist() == [0, 1]
+    assert gap.possible == 3 and gap.answers[gap.truth] == (R, L)
+
+
+def test_passed_and_irrelevant_obstacles_are_not_in_question() -> None:
+    observed = observation(
+        make_candidates([[L, L, L], [R, L, R]]), **TWO_ROWS, true_sides=(R, L, R), is_ahead=[False, False, True]
+    )
+    assert ask(PATH_CLASS, observed, frozenset('012')).answers == ((L,), (R,))
+    assert ask(PATH_CLASS, observed, frozenset('01')) is None
+    assert ask(GOAL, observed, frozenset()) is None
+
+
+def test_an_answer_that_weaves_through_a_row_is_not_possible() -> None:
+    observed = observation(make_candidates([[L, R, L], [R, L, L]]), **TWO_ROWS, true_sides=(R, R, R))
+    found = ask(PATH_CLASS, observed, frozenset('012'))
+    assert dict(zip(found.answers, found.is_possible.tolist(), strict=True)) == {
+        (L, R, L): False,
+        (R, L, L): True,
+        (R, R, R): True,
+    }
+    assert found.unlisted == 4
+
+
+def test_the_goal_is_in_question_where_there_are_several_and_one_was_reached() -> None:
+    goals = [(2.0, 0.0), (2.0, 1.0), (2.0, 2.0)]
+    observed = observation(make_candidates(np.zeros((2, 0)), goal=[2, 0]), centre=(), row=(), true_sides=(), goals=goals, goal=2)
+    found = ask(GOAL, observed, frozenset())
+    assert (found.possible, found.truth, found.given.tolist()) == (3, 2, [2, 0])
+    assert ask(GOAL, observation(TWO_CLASSES, goals=goals, goal=None), frozenset()) is None
+
+
+def ask_class(observed):
+    return ask(PATH_CLASS, observed, frozenset('012'))
+
+
+def test_every_possible_answer_keeps_some_probability() -> None:
+    observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]))
+    forecast = Forecast.from_shares(published_shares(observed), ask_class(observed))
+    np.testing.assert_allclose(forecast.probability, (1.0 - UNCERTAINTY) * np.array([0.8, 0.2]) + UNCERTAINTY / 2.0)
+    np.testing.assert_allclose(Forecast.uniform(ask_class(observed)).probability, [0.5, 0.5])
+    np.testing.assert_allclose(Forecast.from_answer((R,), 0.6, ask_class(observed)).probability, [0.2, 0.8])
+
+
+def test_a_true_answer_that_no_candidate_gives_has_only_the_rest() -> None:
+    observed = observation(make_candidates([[L, L, L], [R, L, R]]), **TWO_ROWS, true_sides=(L, L, R))
+    assert Forecast.from_shares(published_shares(observed), ask_class(observed)).true_probability(
+        ask_class(observed)
+    ) == pytest.approx(UNCERTAINTY / 6.0)
+
+
+def test_an_unsolved_candidate_counts_as_published() -> None:
+    observed = observation(
+        make_candidates([[L, L, L], [R, L, R], [R, L, L]], solved=[True, True, False], likelihood=[0.9, 0.1, 0.0]), **TWO_ROWS
+    )
+    np.testing.assert_allclose(published_shares(observed), [0.9, 0.1, 0.0])
+    assert power_rule_shares(observed, LikelihoodConfig())[2] == 0.0
+
+
+def test_forecasts_sum_to_one() -> None:
+    observed = observation(make_candidates([[L, R, L], [R, L, L]], likelihood=[0.3, 0.7]), **TWO_ROWS, true_sides=(R, R, R))
+    for forecast in (
+        Forecast.from_shares(published_shares(observed), ask_class(observed)),
+        Forecast.uniform(ask_class(observed)),
+        Forecast.from_answer((R, L, L), 0.4, ask_class(observed)),
+    ):
+        assert forecast.probability.sum() + ask_class(observed).unlisted * forecast.each_other == pytest.approx(1.0)
+
+
+def make_scores(confidence, right, recording=None, progress=None) -> Scores:
+    m = len(confidence)
+    zeros = np.zeros(m)
+    recording = zeros.astype(int) if recording is None else np.array(recording)
+    progress = zeros if progress is None else np.array(progress)
+    return Scores(recording, progress, zeros + 2.0, zeros, np.array(confidence), np.array(right, dtype=float), zeros)
+
+
+def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness() -> None:
+    observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]))
+    p = (1.0 - UNCERTAINTY) * 0.8 + UNCERTAINTY / 2.0
+    found = score_forecasts(
+        [
+            (0, 0.5, ask_class(observed), Forecast.from_shares(published_shares(observed), ask_class(observed))),
+            (0, 0.6, ask_class(observed), Forecast.uniform(ask_class(observed))),
+        ]
+    )
+    np.testing.assert_allclose(found.log_likelihood, np.log([p, 0.5]))
+    np.testing.assert_allclose(found.confidence, [p, 0.5])
+    np.testing.assert_allclose(found.correct, [1.0, 0.5])
+    np.testing.assert_allclose(found.brier, [2.0 * (1.0 - p) ** 2, 0.5])
+
+
+def test_the_calibration_error_is_the_distance_of_confidence_and_share_correct() -> None:
+    found = make_scores([0.95, 0.95, 0.95, 0.95, 0.55, 0.55], [1, 1, 1, 0, 0, 0])
+    assert summarise(found)['expected_calibration_error'] == pytest.approx((4 * 0.2 + 2 * 0.55) / 6)
+    assert [each['count'] for each in compute_reliability(found)] == [0, 0, 0, 0, 0, 2, 0, 0, 0, 4]
+    assert summarise(make_scores([0.75] * 4, [1, 1, 1, 0]))['expected_calibration_error'] == pytest.approx(0.0)
+
+
+def test_the_interval_of_a_bin_is_that_of_a_bootstrap_over_recordings() -> None:
+    one = compute_reliability(make_scores([0.95] * 40, [1, 0] * 20, [0] * 40))[9]
+    assert one['interval'] == [0.5, 0.5]
+    two = compute_reliability(make_scores([0.95] * 40, [1] * 20 + [0] * 20, [0] * 20 + [1] * 20))[9]
+    assert two['interval'] == [0.0, 1.0]
+    many = compute_reliability(make_scores([0.95] * 400, [1, 0] * 200, range(400)))[9]
+    # the binomial interval of a share of a half of 400
+    np.testing.assert_allclose(many['interval'], [0.451, 0.549], atol=0.006)
+    assert compute_reliability(make_scores([0.95], [1]))[0]['interval'] is None
+
+
+def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse() -> None:
+    ours = make_scores([0.5] * 40, [1] * 40, range(40), [0.05] * 20 + [0.95] * 20)
+    change = np.where(np.arange(40) < 20, 0.1, -0.5)
+    found = compare_scores(ours, ours._replace(log_likelihood=change), is_share=False)
+    assert found['difference'] == pytest.approx(0.2) and found['worse_tenths'] == [1]
+    assert 0.0 < found['interval'][0] < 0.2 < found['interval'][1]
+    assert compare_scores(ours, ours._replace(correct=np.zeros(40)), is_share=True)['difference'] == 1.0
+
+
+@pytest.mark.parametrize(
+    ('interval', 'words'),
+    [
+        ([0.1, 0.3], 'foc is better than uniform (+0.2 nat, worse in tenths 1).'),
+        ([-0.1, 0.3], 'foc is not distinguishable from uniform (+0.2 nat, worse in tenths 1).'),
+        ([-0.4, -0.1], 'foc is worse than uniform (+0.2 nat, worse in tenths 1).'),
+    ],
+)
+def test_the_verdict_is_by_the_interval(interval: list[float], words: str) -> None:
+    errors = {'likelihood-weighted': 0.04, 'most likely': 0.03, 'constant velocity': 0.05, 'straight minimum jerk': 0.0401}
+    answer = {
+        'comparisons': {PATH_CLASS: {'uniform': {'difference': 0.2, 'interval': interval, 'worse_tenths': [1]}}},
+        'positions': {
+            'displacement_m': {name: {'final': {'0.5': each}} for name, each in errors.items()},
+            'inside_all': {'0.9': {'0.5': 0.7}},
+        },
+    }
+    assert make_verdict(answer) == [
+        f'Homotopy classes: {words}',
+        'Positions 0.5 s ahead: 40 mm away on average, better than constant velocity (50 mm), '
+        'like straight minimum jerk (40 mm).',
+        'Uncertainty: the region of 90 % holds 70 % of the true positions 0.5 s ahead, so it is too narrow.',
+    ]
+
+
+def test_tenths_include_their_lower_bound() -> None:
+    assert find_tenths(np.array([0.0, 0.1, 0.3, 0.7, 0.99, 1.0])).tolist() == [0, 1, 3, 7, 9, 9]
+
+
+def test_the_final_lead_begins_after_the_last_wrong_forecast() -> None:
+    found = make_scores([0.5] * 6, [1, 0, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1], [0.1, 0.4, 0.6, 0.2, 0.5, 0.9])
+    assert find_final_leads(found) == {0: 2, 1: None}
+
+
+def test_a_summary_counts_by_tenths() -> None:
+    found = summarise(make_scores([0.5] * 4, [1, 0, 1, 1], progress=[0.05, 0.06, 0.95, 1.0]), np.array([1.0, 0.9, 0.2, 0.0]))
+    assert [each['predictions'] for each in found['by_tenth']] == [2, 0, 0, 0, 0, 0, 0, 0, 0, 2]
+    assert found['by_tenth'][0]['right'] == 0.5 and found['by_tenth'][1]['right'] is None
+    assert found['right_from_half_way'] == 1.0
+    assert (found['leads_for_good_from'], found['leads_for_good_before_s']) == (0.95, 0.2)
+    assert found['gain'] == pytest.approx(np.log(2.0))
+
+
+def test_a_held_out_recording_gets_the_setting_that_is_best_for_the_others() -> None:
+    table = np.array([[0.0, -1.0, -3.0], [-5.0, 0.0, -3.0], [-9.0, -9.0, -1.0]])
+    assert choose_held_out(table, ['a', 'b', 'c']).tolist() == [2, 2, 1]
+    assert choose_held_out(table, ['a', 'b', 'b']).tolist() == [2, 0, 0]
+    assert choose_held_out(table, ['a', 'a', 'a']).tolist() == [2, 2, 2]
+
+
+def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is_inside() -> None:
+    away = np.column_stack([8.0 * np.array(TIMES_S), np.zeros(len(TIMES_S))])
+    away[-1] = np.nan
+    scores = compute_position_scores([recorded(observation(TWO_CLASSES, positions=away))])
+    likely = scores['displacement_m']['most likely']
+    assert likely['final'] == {'0.25': pytest.approx(2.0), '0.5': pytest.approx(4.0), '1': None}
+    assert likely['average']['0.5'] == pytest.approx(2.5)
+    # with unit covariance, 90 % lie within 2.15 and 50 % within 1.18
+    assert scores['inside'] == {'0.5': {'0.25': 0.0, '0.5': 0.0, '1': None}, '0.9': {'0.25': 1.0, '0.5': 0.0, '1': None}}
+    assert scores['displacement_m']['constant velocity']['final']['0.5'] == pytest.approx(3.5)
+    # two equal candidates of unit covariance, both at the origin
+    flat = np.log(2 * np.pi)
+    assert scores['nlpd']['foc'] == {'0.25': pytest.approx(flat + 2.0), '0.5': pytest.approx(flat + 8.0), '1': None}
+    assert scores['nlpd']['Singer Kalman']['0.5'] > 0.0
+
+
+def test_the_region_of_one_gaussian_is_its_ellipse() -> None:
+    covariance = np.array([[4.0, 1.0], [1.0, 2.0]])
+    root = np.linalg.cholesky(covariance)
+    for level in (0.5, 0.9):
+        border = root @ np.array([0.6, 0.8]) * np.sqrt(-2.0 * np.log(1.0 - level))
+        positions = np.array([3.0, -1.0]) + np.array([0.99, 1.01])[:, None] * border
+        found = find_denser_share(np.ones(1), np.full((1, 2, 2), [3.0, -1.0]), np.tile(covariance, (1, 2, 1, 1)), positions)
+        assert found[0] < level < found[1]
+
+
+@pytest.mark.parametrize('apart', [0.0, 1.5, 10.0])
+def test_the_region_holds_its_share_of_samples(apart: float) -> None:
+    draws, count = np.random.default_rng(5), 4000
+    likelihood = np.array([0.6, 0.3, 0.1])
+    mean = apart * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    covariance = np.array([np.diag([1.0, 1.0]), [[2.0, 0.9], [0.9, 0.5]], np.diag([0.1, 0.1])])
+    component = draws.choice(3, count, p=likelihood)
+    positions = mean[component] + np.einsum(
+        'nij,nj->ni', np.linalg.cholesky(covariance)[component], draws.standard_normal((count, 2))
+    )
+    many = count, 1, 1
+    found = find_denser_share(
+        likelihood, np.tile(mean[:, None], (1, count, 1)), np.tile(covariance[:, None], (1, *many)), positions
+    )
+    for level in (0.5, 0.9):
+        assert np.mean(found < level) == pytest.approx(level, abs=0.03)
+
+
+def test_a_position_in_a_less_likely_class_is_in_the_region_and_not_in_the_ellipse_of_the_likeliest() -> None:
+    two = make_candidates([[LEFT], [RIGHT]], likelihood=[0.6, 0.4])
+    two = replace(two, mean=np.stack([np.zeros((H, 2)), np.full((H, 2), [10.0, 0.0])]))
+    true = np.full((H, 2), [11.6, 0.0])
+    true[-1] = np.nan
+    scores = compute_position_scores([recorded(observation(two, positions=true, true_sides=(RIGHT,)))])
+    assert scores['inside']['0.9'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
+    assert scores['inside_taken']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
+    assert scores['inside_all']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
+    assert scores['inside_all']['0.5'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
+
+
+def test_positions_are_scored_given_what_is_known() -> None:
+    """The unknown share has no path, and so no part in the density of positions."""
+    scores = []
+    for known in (1.0, 0.5):
+        two = make_candidates([[LEFT], [RIGHT]], likelihood=[0.6 * known, 0.4 * known])
+        two = replace(two, mean=np.stack([np.zeros((H, 2)), np.full((H, 2), [1.0, 0.0])]))
+        scores.append(compute_position_scores([recorded(observation(two, positions=np.full((H, 2), [0.5, 0.2])))]))
+    for name in ('nlpd', 'inside_all', 'displacement_m'):
+        assert str(scores[0][name]) == str(scores[1][name])

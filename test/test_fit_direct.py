@@ -1,0 +1,263 @@
+"""Parameters that a fit finds without a prediction, and what a table of settings determines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from evaluation_samples import reach as resting_reach
+from fit_recordings import GOALS, reach, recorded_hand
+
+from foc_ros.analysis.fitting import SettingTable
+from foc_ros.analysis.fitting.direct import (
+    CANDIDATES,
+    FADING,
+    MAX_CLASSES,
+    Innovations,
+    RecordedHand,
+    count_classes,
+    fit_duration,
+    fit_estimator,
+    fit_fading,
+    fit_max_candidates,
+    fit_wait,
+)
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.hand.kalman import compute_gramian, compute_transition, update
+from foc_ros.core.types import Array, HandSample, SampleStatus, make_obstacles
+
+CONFIG = replace_values(Config(), {'estimator.acceleration_time_s': 0.0})
+GOAL = np.array([[0.3, 0.0]])
+VALUES = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0])
+
+
+def _make_table(log_likelihood: Callable[[Array, Array], Array], values: Array = VALUES) -> SettingTable:
+    """Return a table of one recording by exponent and weaving."""
+    grid = [(beta, weaving) for beta in values for weaving in values]
+    settings = tuple({'likelihood.beta': beta, 'likelihood.weaving': weaving} for beta, weaving in grid)
+    return SettingTable(log_likelihood(*np.array(grid).T)[None], settings)
+
+
+GIVEN = {'likelihood.beta': 2.0, 'likelihood.weaving': 4.0}
+
+
+def test_a_sharp_peak_determines_both_parameters() -> None:
+    found = _make_table(lambda beta, weaving: -10.0 * ((beta - 6.0) ** 2 + (weaving - 2.0) ** 2)).estimate(GIVEN, 'how')[0]
+    assert found.values == {'likelihood.beta': 6.0, 'likelihood.weaving': 2.0} and found.undetermined == {}
+
+
+def test_a_flat_profile_determines_nothing() -> None:
+    found = _make_table(lambda beta, weaving: -0.01 * ((beta - 6.0) ** 2 + (weaving - 2.0) ** 2)).estimate(GIVEN, 'how')[0]
+    assert found.estimates == {} and set(found.undetermined) == set(GIVEN)
+    assert found.undetermined['likelihood.beta'] == 'all values tried, 1 to 8, explain the recordings within 2 nat'
+
+
+def test_a_best_value_at_the_end_of_those_tried_determines_nothing() -> None:
+    found = _make_table(lambda beta, weaving: 10.0 * beta - 10.0 * (weaving - 2.0) ** 2).estimate(GIVEN, 'how')[0]
+    assert found.values == {'likelihood.weaving': 2.0}
+    assert found.undetermined == {'likelihood.beta': '8, the end of the values tried, explains the recordings best'}
+
+
+def test_the_bound_of_a_parameter_is_no_end_of_what_was_tried() -> None:
+    values = np.append(0.0, VALUES)
+    found = _make_table(lambda beta, weaving: -10.0 * beta - 10.0 * (weaving - 2.0) ** 2, values).estimate(GIVEN, 'how')[0]
+    assert found.values == {'likelihood.beta': 0.0, 'likelihood.weaving': 2.0}
+
+
+def test_where_only_a_sum_is_determined_one_part_is_kept_and_the_other_follows() -> None:
+    found = _make_table(lambda beta, weaving: -10.0 * (beta + weaving - 7.0) ** 2).estimate(GIVEN, 'how')[0]
+    (name,), (kept,) = found.estimates, found.undetermined
+    assert found.estimates[name].value == 7.0 - GIVEN[kept]
+
+
+def test_resamples_scatter_as_the_mean_of_a_sample_does() -> None:
+    data, tried = np.random.default_rng(6).normal(2.0, 0.5, 400), np.linspace(1.5, 2.5, 501)
+    values = -0.5 * ((data[:, None] - tried) / 0.5) ** 2
+    table = SettingTable(values, tuple({'likelihood.beta': each} for each in tried.tolist()))
+    found = table.estimate({'likelihood.beta': 2.0}, 'how')[0].estimates['likelihood.beta']
+    assert [found.low, found.high] == pytest.approx(data.mean() + 1.96 * data.std() / 20 * np.array([-1, 1]), abs=0.008)
+
+
+def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
+    """Return hands that are driven by white jerk, as the filter expects."""
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.01, 0.03, 200))
+    found = []
+    for number in range(count):
+        state, path = np.zeros((3, 2)), []
+        for dt in np.diff(times, prepend=times[0] - 0.02):
+            state = compute_transition(dt) @ state + density * np.linalg.cholesky(compute_gramian(dt)) @ rng.standard_normal(
+                (3, 2)
+            )
+            path.append(state[0] + rng.normal(0.0, stddev, 2))
+        found.append(recorded_hand(f'{number}', times, np.array(path), make_obstacles(), GOALS))
+    return found
+
+
+def test_innovations_are_those_of_the_estimator() -> None:
+    each = _drifting(1, 1e-3, 3.0, 1)[0]
+    gap = each.stamps_ns.copy()
+    gap[100:] += 1_000_000_000
+    jumped = each.positions + 0.5 * (np.arange(len(gap)) >= 50)[:, None]
+    each = recorded_hand('gap', gap * 1e-9, jumped, each.obstacles, each.goals)
+    config, total, state = Config().estimator, 0.0, None
+    for stamp_ns, position in zip(each.stamps_ns.tolist(), each.positions, strict=True):
+        updated = update(state, HandSample(stamp_ns, position), config)
+        following = updated.state
+        if state is not None and updated.status is SampleStatus.ACCEPTED:
+            dt = (stamp_ns - state.stamp_ns) * 1e-9
+            prior = compute_transition(dt) @ state.covariance[::2, ::2] @ compute_transition(
+                dt
+            ).T + config.jerk_density**2 * compute_gramian(dt)
+            S = prior[0, 0] + config.position_stddev**2
+            v = position - (compute_transition(dt) @ state.mean.reshape(3, 2))[0]
+            total -= np.log(2 * np.pi * S) + v @ v / (2 * S)
+        state = following
+    found = Innovations([each], config).tabulate([config.position_stddev], [config.jerk_density])
+    assert found.values[0] == pytest.approx([total], rel=1e-9)
+
+
+@pytest.mark.parametrize(('stddev', 'density'), [(1e-3, 3.0), (3e-4, 20.0)])
+def test_the_deviations_that_made_the_data_are_found(stddev: float, density: float) -> None:
+    found = fit_estimator(_drifting(2, stddev, density), Config())
+    assert found.undetermined == {}
+    estimates = found.estimates
+    for name, true in (('estimator.position_stddev', stddev), ('estimator.jerk_density', density)):
+        each = estimates[name]
+        assert each.low <= each.value <= each.high
+        assert each.value == pytest.approx(true, rel=0.1)
+        assert 0.8 * each.low < true < 1.2 * each.high
+
+
+def test_noise_below_the_resolution_is_undetermined_and_keeps_its_value() -> None:
+    found = fit_estimator(_drifting(3, 1e-9, 3.0), Config())
+    assert set(found.estimates) == {'estimator.jerk_density'}
+    assert 'the end of the values tried' in found.undetermined['estimator.position_stddev']
+
+
+def _reaches(durations: list[float], goals: np.ndarray) -> list:
+    rng = np.random.default_rng(4)
+    rows = [reach(goal, 0.0, seconds, 100.0, rng, 2e-4) for seconds, goal in zip(durations, goals, strict=True)]
+    return [
+        recorded_hand(f'{k}', each[:, 0], each[:, 1:], make_obstacles(), goal[None])
+        for k, (each, goal) in enumerate(zip(rows, goals, strict=True))
+    ]
+
+
+def test_one_factor_is_fitted_where_distances_are_alike() -> None:
+    config = replace_values(Config(), {'estimator.position_stddev': 2e-4})
+    given = config.duration.fitts_a_s + config.duration.fitts_b_s * np.log2(0.3 / config.duration.target_width + 1)
+    goals = np.tile([0.3, 0.0], (5, 1))
+    found = fit_duration(_reaches([2.0 * given] * 5, goals), config)
+    estimates = found.estimates
+    a, b = estimates['duration.fitts_a_s'], estimates['duration.fitts_b_s']
+    assert a.value / config.duration.fitts_a_s == pytest.approx(b.value / config.duration.fitts_b_s, rel=1e-4)
+    assert a.value / config.duration.fitts_a_s == pytest.approx(2.0, rel=0.2)
+    assert a.low <= a.value <= a.high
+    assert any('too alike to tell intercept and slope apart' in words for words in found.warnings)
+
+
+def test_distances_that_differ_determine_intercept_and_slope() -> None:
+    config = replace_values(Config(), {'estimator.position_stddev': 2e-4})
+    distances = np.array([0.05, 0.1, 0.2, 0.4, 0.8])
+    durations = 0.5 + 0.3 * np.log2(distances / config.duration.target_width + 1)
+    found = fit_duration(_reaches(durations.tolist(), np.column_stack([distances, np.zeros(5)])), config)
+    assert found.warnings == [] and found.undetermined == {}
+    estimates = found.estimates
+    fitted = estimates['duration.fitts_a_s'].value + estimates['duration.fitts_b_s'].value * np.log2(
+        distances / config.duration.target_width + 1
+    )
+    # the filter detects each onset equally late
+    assert (fitted - durations).min() > -0.25 and (fitted - durations).max() < 0.0
+    assert np.ptp(fitted - durations) < 0.05
+
+
+def test_without_a_goal_reached_durations_are_kept() -> None:
+    far = _reaches([1.0], np.array([[0.3, 0.0]]))[0]
+    missed = recorded_hand('missed', far.times, far.positions, far.obstacles, np.array([[0.9, 0.0]]))
+    found = fit_duration([missed], Config())
+    assert found.estimates == {}
+    assert found.undetermined['duration.fitts_a_s'] == 'no recording has a movement that ends near a goal'
+
+
+@pytest.mark.parametrize('fading_s', [0.06, 0.2])
+def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
+    rng, dt = np.random.default_rng(5), 0.005
+    hands = []
+    for number in range(6):
+        state, path = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, 0.0]]), []
+        for _ in range(2000):
+            state = compute_transition(dt) @ state
+            # white jerk drives a fading acceleration
+            state[2] = state[2] * np.exp(-dt / fading_s) + 3.0 * np.sqrt(dt) * rng.standard_normal(2)
+            path.append(state[0])
+        hands.append(recorded_hand(str(number), dt * np.arange(2000.0), np.array(path), make_obstacles(), GOAL))
+    # this filter follows accelerations at once, so that its lag does not affect the estimate
+    config = replace_values(CONFIG, {'estimator.position_stddev': 1e-6, 'estimator.jerk_density': 30.0})
+    found = fit_fading(hands, config).estimates[FADING]
+    assert found.low <= found.value <= found.high
+    assert found.value == pytest.approx(fading_s, rel=0.25)
+
+
+def test_a_lasting_acceleration_is_recognised() -> None:
+    t = np.arange(0.0, 3.0, 0.02)
+    hands = [recorded_hand(str(a), t, np.outer(0.5 * a * t**2, [1.0, 0.0]), make_obstacles(), GOAL) for a in (0.3, 0.5)]
+    assert fit_fading(hands, replace_values(CONFIG, {'estimator.position_stddev': 1e-6})).values == {FADING: 0.0}
+
+
+def test_hands_at_rest_give_no_fading_time() -> None:
+    still = recorded_hand('still', 0.02 * np.arange(50.0), np.zeros((50, 2)), make_obstacles(), GOAL)
+    found = fit_fading([still], CONFIG)
+    assert found.estimates == {} and set(found.undetermined) == {FADING}
+
+
+def _make_resting(rest: float):
+    return recorded_hand('one', *resting_reach(0.0, (0.3, 0.0), rest=rest), make_obstacles([], []), GOAL)
+
+
+def test_half_of_the_wait_is_left_on_average_and_the_stay_at_the_goal_does_not_count() -> None:
+    found = fit_wait([_make_resting(0.6), _make_resting(1.0)], Config()).estimates
+    # the wait includes the first 0.15 s of a movement, until its onset is detected
+    assert found['duration.wait_s'].value == pytest.approx(0.4, abs=0.1)
+    assert found['duration.wait_s'].low < found['duration.wait_s'].value < found['duration.wait_s'].high
+
+
+def test_hands_that_never_rest_give_no_estimate() -> None:
+    times = np.arange(0.0, 1.0, 0.02)
+    moving = recorded_hand('one', times, np.outer(times, [0.3, 0.0]), make_obstacles([], []), GOAL)
+    found = fit_wait([moving], Config()).estimates
+    assert not found or found['duration.wait_s'].value < 0.1
+
+
+def make_hand(centres, goals=((1.0, 0.0),)) -> RecordedHand:
+    positions = np.linspace([0.0, 0.0], [1.0, 0.0], 12)
+    return RecordedHand('one', np.arange(12) * 100_000_000, positions, make_obstacles(centres, 0.02), np.array(goals))
+
+
+TWO_ROWS = [(0.3, -0.1), (0.3, 0.1), (0.6, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ('centres', 'expected'),
+    [([], 1), (TWO_ROWS, 6), ([*TWO_ROWS, (-0.5, 0.0), (1.5, 0.0)], 6), ([(0.1 * k, 0) for k in range(1, 9)], 256)],
+)
+def test_rows_between_start_and_goal_multiply(centres, expected: int) -> None:
+    assert count_classes(make_hand(centres)) == expected
+
+
+@pytest.mark.parametrize(
+    ('found', 'given', 'expected'),
+    [
+        pytest.param(make_hand(TWO_ROWS), 4, 6, id='classes'),
+        pytest.param(make_hand(TWO_ROWS), 8, None, id='enough'),
+        pytest.param(make_hand([], [(1.0, 0.1 * k) for k in range(30)]), 4, 30, id='goals'),
+        pytest.param(make_hand([(0.1 * k, 0) for k in range(1, 9)]), 4, MAX_CLASSES, id='too many'),
+    ],
+)
+def test_there_is_room_for_goals_and_classes_and_never_less_than_given(
+    found: RecordedHand, given: int, expected: int | None
+) -> None:
+    fitted = fit_max_candidates([found], replace_values(Config(), {CANDIDATES: given}))
+    assert fitted.values == ({} if expected is None else {CANDIDATES: expected})
+    assert bool(fitted.warnings) == (expected == MAX_CLASSES)

@@ -1,0 +1,281 @@
+"""Parameters that a fit finds by replays: settings of the predictor in a race, and what widens the covariance."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evaluation_samples import TWO_CLASSES, H, observation, recorded
+from fit_recordings import recorded_hand, write_tables
+
+from foc_ros.analysis.evaluation.observations import TIMES_S
+from foc_ros.analysis.fitting import Findings, search
+from foc_ros.analysis.fitting.direct import fit_duration, fit_other_models
+from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage, find_worse_positions, make_verdict
+from foc_ros.analysis.fitting.search import (
+    DURATIONS,
+    Replays,
+    compute_log_densities,
+    fit_widening,
+    make_eta_settings,
+    make_movement_settings,
+    widen_covariances,
+)
+from foc_ros.analysis.recordings import find_recordings
+from foc_ros.cli.main import main
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.types import Array, make_obstacles
+
+CONFIG = replace_values(
+    Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0, 'estimator.acceleration_time_s': 0.0}
+)
+GOAL = np.array([[0.3, 0.0]])
+ARRIVALS = [CONFIG, replace_values(CONFIG, {'duration.arrival': 'passing'})]
+
+
+class KnownReplays:
+    """Replays with known scores by setting and recording; keeps the number of settings and recordings of each round."""
+
+    def __init__(self, classes: Array, positions: Array | None = None) -> None:
+        self.classes = np.asarray(classes, dtype=float)
+        self.positions = np.zeros_like(self.classes) if positions is None else np.asarray(positions, dtype=float)
+        self.recordings = {str(place): None for place in range(self.classes.shape[1])}
+        self.rounds: list[tuple[int, int]] = []
+
+    def search(self, settings: list[Config]) -> tuple[Config, Findings]:
+        self.settings = settings
+        return search.search_settings('kind', settings, self)  # type: ignore[arg-type]
+
+    def score(self, settings: list[Config], names: list[str], words: str) -> Array:
+        self.rounds.append((len(settings), len(names)))
+        rows, columns = [self.settings.index(each) for each in settings], [int(name) for name in names]
+        return np.array([self.classes[rows][:, columns], self.positions[rows][:, columns]])
+
+
+def test_the_better_choice_is_taken() -> None:
+    config, found = KnownReplays([[0.0] * 8, [0.1, 0.2, 0.1, 0.2, 0.1, 0.2, 0.1, -0.1]]).search(ARRIVALS)
+    assert found.chosen == {'duration.arrival': 'passing'} and config.duration.arrival == 'passing'
+    assert found.warnings == [] and found.undetermined == {}
+
+
+@pytest.mark.parametrize('scores', [[1.5, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2, 0.0], [0.5, 1.5], [1.0]])
+def test_a_choice_that_is_better_by_chance_only_is_undetermined(scores: list[float]) -> None:
+    config, found = KnownReplays([[0.0] * len(scores), scores]).search(ARRIVALS)
+    assert config == CONFIG and found.chosen == {}
+    assert found.undetermined['duration.arrival'].startswith('no other value tried is better by more than chance')
+
+
+def test_the_given_setting_is_kept_where_scores_are_equal() -> None:
+    config, found = KnownReplays(np.zeros((2, 8))).search(ARRIVALS)
+    assert config == CONFIG and found.chosen == {}
+
+
+def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, 'PLAINLY_WORSE', 1e6)
+    settings = [replace_values(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(20)]
+    quality = -np.abs(np.arange(20.0) - 13.0)[:, None] + 0.1 * np.random.default_rng(3).standard_normal((20, 40))
+    replays = KnownReplays(quality)
+    config, found = replays.search(settings)
+    assert replays.rounds == [(20, 6), (11, 12), (7, 24), (5, 40)], 'half of them, and the given one'
+    assert config == settings[13]
+    each = found.estimates['foc.eta']
+    assert each.low <= each.value == settings[13].foc.eta <= each.high
+
+
+def test_plainly_worse_settings_leave_at_once() -> None:
+    spread = 0.2 * np.random.default_rng(4).standard_normal((6, 24))
+    replays = KnownReplays(np.array([-1.0, 0.0, 0.05, -1.1, -1.2, 0.1])[:, None] + spread)
+    config, _ = replays.search([replace_values(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(6)])
+    assert replays.rounds == [(6, 6), (3, 12), (3, 24)]
+    assert config.foc.eta in (0.52, 0.54, 0.6)
+
+
+def test_the_number_of_replayed_recordings_is_bounded() -> None:
+    replays = KnownReplays(np.zeros((2, 500)))
+    replays.search(ARRIVALS)
+    assert replays.rounds[-1] == (2, search.MAX_RECORDINGS)
+
+
+def test_classes_decide_and_positions_where_classes_are_alike() -> None:
+    positions = np.array([[0.0, 0.0], [5.0, 5.0], [1.0, 1.0]])
+    assert search.rank(np.array([[[1.0, 1.2], [0.5, 0.8], [0.9, 1.4]], positions])) == [2, 0, 1]
+    assert search.rank(np.array([[[1.0, 1.2], [0.7, 1.55], [0.9, 1.4]], positions])) == [1, 2, 0]
+    assert search.rank(np.array([np.zeros((3, 2)), positions])) == [1, 2, 0]
+
+
+def test_worse_positions_have_a_warning() -> None:
+    config, found = KnownReplays([[0.0] * 8, [1.0] * 8], [[0.0] * 8, [-0.3] * 8]).search(ARRIVALS)
+    assert config.duration.arrival == 'passing'
+    assert [words for words in found.warnings if 'predicts positions worse' in words and '0.3 nat' in words]
+
+
+def test_models_durations_arrivals_and_fading_are_tried_in_all_combinations() -> None:
+    reaches, fading = _reaches(CONFIG), replace_values(CONFIG, {'estimator.acceleration_time_s': 0.06})
+    for config, accelerations in ((CONFIG, {0.0}), (fading, {0.06, 0.0})):
+        tried = make_movement_settings(reaches, config)
+        assert tried[0] == config
+        assert len(set(tried)) == len(tried) == (1 + len(DURATIONS)) * 2 * len(accelerations)
+        assert {each.duration.model for each in tried} == {'fitts'}
+        assert {each.estimator.acceleration_time_s for each in tried} == accelerations
+        factors = {round(each.duration.fitts_a_s / CONFIG.duration.fitts_a_s, 6) for each in tried}
+        assert factors == {1.0, *DURATIONS}
+
+
+def _reaches(config: Config) -> list:
+    t = np.arange(0.0, 1.61, 0.02)
+    s = np.clip((t - 0.1) / 1.5, 0.0, 1.0)
+    path = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, None] * GOAL
+    return [recorded_hand(str(number), t, path, make_obstacles(), GOAL) for number in range(3)]
+
+
+def test_the_other_models_of_duration_come_with_their_constants_fitted() -> None:
+    assert not fit_other_models(_reaches(CONFIG), CONFIG)
+    given = replace_values(CONFIG, {'duration.model': 'fixed'})
+    assert [each.duration.model for each in fit_other_models(_reaches(CONFIG), given)] == ['fitts']
+    assert fit_duration(_reaches(CONFIG), given).estimates
+
+
+def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recordings = find_recordings(write_tables(tmp_path / 'data', count=4, hz=30.0))
+    names = list(recordings)
+    hopeless = replace_values(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': math.inf})
+    replays = Replays(recordings, {})
+    scores = replays.score([hopeless, CONFIG], names, 'both')
+    assert scores.shape == (2, 2, 4) and scores[0, 1].mean() > scores[0, 0].mean() + 0.1
+    monkeypatch.setattr('foc_ros.analysis.fitting.search._score_replay', None)
+    assert np.array_equal(replays.score([CONFIG, hopeless], names, 'again'), scores[:, ::-1])
+
+
+def test_eta_is_lowered_only_if_that_is_allowed() -> None:
+    assert {each.foc.eta for each in make_eta_settings(CONFIG, may_be_lower=False)} == {0.9, 0.95}
+    assert {each.foc.eta for each in make_eta_settings(CONFIG, may_be_lower=True)} == {0.9, 0.95, 0.7, 0.5}
+
+
+def test_worse_positions_are_named_with_both_errors() -> None:
+    comparison = {
+        'class_gain': {'before': 0.5, 'after': 0.1},
+        'error_m 0.25': {'before': 0.010, 'after': 0.011},
+        'error_m 0.5': {'before': 0.063, 'after': 0.096},
+        'error_m 1': {'before': None, 'after': 0.2},
+    }
+    words = 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm'
+    assert find_worse_positions(comparison) == [words]
+    (sentence,) = make_verdict({'comparison': {name: comparison[name] for name in ('error_m 0.5', 'error_m 1')}})
+    assert sentence == 'Worse with the fitted parameters: error of positions 0.5 s ahead [mm] 63.0 to 96.0.'
+
+
+@pytest.mark.parametrize(('options', 'code'), [([], 2), (['--allow', 'positions'], 0)])
+def test_without_a_terminal_worse_positions_are_written_only_if_allowed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: list[str], code: int
+) -> None:
+    fit, output = Fit(CONFIG), tmp_path / 'operator.yaml'
+    fit.comparison = {'error_m 0.5': {'before': 0.063, 'after': 0.096}}
+    monkeypatch.setattr('foc_ros.analysis.fitting.fit.fit_parameters', lambda *_, **__: fit)
+    data = write_tables(tmp_path / 'data', count=1)
+    assert main(['fit', str(data), '--output', str(output), '--workers', '1', *options]) == code
+    error = capsys.readouterr().err
+    assert 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm\n' in error
+    assert output.exists() == (code == 0)
+    assert (f'{output} is not written; --allow positions writes it all the same' in error) == (code == 2)
+
+
+@pytest.mark.parametrize(('answer', 'is_written'), [('y', True), ('Yes ', True), ('', False), ('no', False)])
+def test_a_terminal_is_asked_before_worse_positions_are_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], answer: str, is_written: bool
+) -> None:
+    asked = []
+
+    def ask(question: str) -> str:
+        assert 'become worse' in capsys.readouterr().err and not output.exists()
+        asked.append(question)
+        return answer
+
+    output, fit = tmp_path / 'operator.yaml', Fit(CONFIG)
+    fit.comparison = {'error_m 0.5': {'before': 0.063, 'after': 0.096}}
+    monkeypatch.setattr('foc_ros.analysis.fitting.fit.fit_parameters', lambda *_, **__: fit)
+    monkeypatch.setattr(sys.stdin, 'isatty', lambda: True)
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
+    monkeypatch.setattr('builtins.input', ask)
+    data = write_tables(tmp_path / 'data', count=1)
+    code = main(['fit', str(data), '--output', str(output), '--workers', '1'])
+    assert (code, output.exists()) == ((0, True) if is_written else (2, False))
+    assert asked == [f'Write {output} all the same? [y/N] ']
+
+
+@pytest.mark.parametrize(
+    ('held_out', 'before', 'after', 'words'),
+    [
+        ((0.92, 0.81), 0.9, 0.9, 'of recordings held out 0.5 s ahead with the fitted parameters: 81 % instead of 92 %'),
+        ((None, None), 0.93, 0.85, 'true positions 0.5 s ahead with the fitted parameters: 85 % instead of 93 %'),
+        ((0.8, 0.9), 0.9, 0.9, None),
+        ((None, None), None, None, None),
+    ],
+)
+def test_a_lower_coverage_is_told_in_one_sentence(
+    held_out: tuple[float | None, float | None], before: float | None, after: float | None, words: str | None
+) -> None:
+    fit = Fit(CONFIG, comparison={'inside_90': {'before': before, 'after': after}})
+    fit.scores = {'inside_all_90': dict(zip(('as given', 'without the recording'), held_out, strict=True))}
+    found = find_lower_coverage(fit)
+    assert len(found) == (words is not None) and all(each.endswith(words) for each in found)
+
+
+S, NONE = np.array(TIMES_S), (0.0, 0.0, 0.0)
+TO_GOAL = 10 * S**3 - 15 * S**4 + 6 * S**5
+LATE = 9.0 * (S**3 * (1 - S) ** 2)[:, None] * [1.0, 0.0]
+CANDIDATES = replace(TWO_CLASSES, covariance=np.tile(1e-8 * np.eye(2), (2, H, 1, 1)), duration_sensitivity=np.stack([LATE, LATE]))
+
+
+def _make_recordings(endpoint: float, spread: float) -> list:
+    """Return twelve recordings of eight movements of 1 s each, with scattered ends and durations."""
+    draws = np.random.default_rng(3)
+    moved = [
+        np.outer(TO_GOAL, draws.normal(0.0, endpoint, 2)) - draws.normal(0.0, spread) * LATE + draws.normal(0.0, 1e-4, (H, 2))
+        for _ in range(96)
+    ]
+    observed = [observation(CANDIDATES, positions=each) for each in moved]
+    return [recorded(*observed[8 * number : 8 * number + 8], name=str(number)) for number in range(12)]
+
+
+@pytest.mark.parametrize(('endpoint', 'spread'), [(0.006, 0.0), (0.002, 0.3)])
+def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoint: float, spread: float) -> None:
+    recordings = _make_recordings(endpoint, spread)
+    found, scores = fit_widening(recordings, Config())
+    assert found.undetermined == {} or set(found.undetermined) == {'foc.process_noise'}
+    found = found.estimates
+    assert found['foc.endpoint_stddev'].value == pytest.approx(endpoint, rel=0.4)
+    assert found['duration.spread'].value == pytest.approx(spread, abs=0.11)
+    for each in found.values():
+        assert each.low <= each.value <= each.high
+    assert scores['inside_90']['motor noise alone'] < 0.1
+    for kind in ('inside_90', 'inside_all_90'):
+        assert scores[kind]['fitted'] == pytest.approx(0.9, abs=0.08)
+        assert scores[kind]['without the recording'] == pytest.approx(0.9, abs=0.08)
+
+
+def test_the_density_is_that_of_the_widened_mixture() -> None:
+    observed, widening = _make_recordings(0.006, 0.3)[0].observations[0], (0.5, 0.004, 0.2)
+    found = compute_log_densities(observed, np.array([0.3, 0.7]), Config(), [NONE, widening])
+    rows = [TIMES_S.index(each) for each in (0.25, 0.5, 1.0)]
+    for value, each in zip(found, (NONE, widening), strict=True):
+        covariance = widen_covariances(observed, [each], Config())[0, 0, rows]
+        offset = observed.truth.positions[rows]
+        squared = np.einsum('hi,hij,hj->h', offset, np.linalg.inv(covariance), offset)
+        logs = -0.5 * (squared + np.log(np.linalg.det(covariance))) - np.log(2 * np.pi)
+        assert value == pytest.approx(np.maximum(logs, -30.0).mean())
+
+
+def test_a_hand_at_rest_does_not_count() -> None:
+    assert compute_log_densities(observation(CANDIDATES, movement_age_s=0.0), np.array([0.5, 0.5]), Config(), [NONE]) is None
+
+
+def test_a_value_at_the_end_of_those_tried_is_not_taken() -> None:
+    found, _ = fit_widening(_make_recordings(0.3, 0.0), Config())
+    assert 'foc.endpoint_stddev' not in found.estimates
+    assert found.undetermined['foc.endpoint_stddev'] == '0.16, the end of the values tried, explains the recordings best'

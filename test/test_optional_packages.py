@@ -1,0 +1,135 @@
+"""The node needs what `package.xml` names and nothing else; whatever needs more says in one sentence what is missing."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import pytest
+import ros_helpers
+from ros_helpers import Graph
+
+ROOT = Path(__file__).parents[1]
+OPTIONAL = ('cyclopts', 'distributed', 'jinja2', 'joblib', 'matplotlib', 'mcap', 'pydantic', 'rich', 'rosbags', 'tornado')
+"""Packages that are blocked below: as where only package.xml was installed."""
+BLOCK = f"""
+import sys
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition('.')[0] in {OPTIONAL!r}:
+            raise ModuleNotFoundError(f'{{name}} is blocked', name=name.partition('.')[0])
+
+sys.meta_path.insert(0, Blocker())
+import importlib.util
+find, importlib.util.find_spec = importlib.util.find_spec, lambda name: None if name in {OPTIONAL!r} else find(name)
+"""
+
+
+def read_requirements() -> dict[str, set[str]]:
+    """Return the names of what setup.py requires: `''` for all, otherwise by extra, in small letters."""
+    setup = ast.parse((ROOT / 'setup.py').read_text('utf-8'))
+    constants = {node.targets[0].id: node.value for node in setup.body if isinstance(node, ast.Assign)}
+    call = next(node.value for node in setup.body if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call))
+    given = {keyword.arg: keyword.value for keyword in call.keywords}
+    lists = {'': given['install_requires']}
+    lists |= {key.value: value for key, value in zip(given['extras_require'].keys, given['extras_require'].values, strict=True)}
+
+    def read(node: ast.expr) -> set[str]:
+        if isinstance(node, ast.Name):
+            return read(constants[node.id])
+        if isinstance(node, ast.Starred):
+            return read(node.value)
+        if isinstance(node, ast.List):
+            return set().union(*map(read, node.elts))
+        return {re.match(r'[A-Za-z0-9-]+', node.value).group().lower()}
+
+    return {extra: read(value) for extra, value in lists.items()}
+
+
+def list_keys() -> set[str]:
+    """Return the keys of package.xml for Python packages as names of the package index."""
+    keys = {node.text for node in ET.parse(ROOT / 'package.xml').getroot().findall('exec_depend')}
+    names = {key.removeprefix('python3-').removesuffix('-pip') for key in keys if key.startswith('python3-')}
+    return {name.replace('yaml', 'pyyaml') for name in names}
+
+
+def test_package_xml_and_the_optional_packages_are_all_requirements() -> None:
+    required = read_requirements()
+    assert list_keys() == {'numpy', 'piqp', 'pyyaml', 'qpsolvers', 'scipy'}
+    assert not list_keys() & set(OPTIONAL)
+    assert required[''] | required['report'] | required['play'] | required['cluster'] == list_keys() | set(OPTIONAL)
+
+
+def test_only_the_solvers_have_keys_of_pip() -> None:
+    """A release on the build farm, which installs nothing by pip, lacks these two and nothing else."""
+    keys = {node.text for node in ET.parse(ROOT / 'package.xml').getroot() if node.tag.endswith('depend')}
+    assert {key for key in keys if key.endswith('-pip')} == {'python3-piqp-pip', 'python3-qpsolvers-pip'}
+
+
+def run(program: str) -> subprocess.CompletedProcess[str]:
+    """Run a program in a Python without the optional packages."""
+    return subprocess.run([sys.executable, '-c', BLOCK + program], capture_output=True, text=True, timeout=100, check=False)
+
+
+@pytest.mark.parametrize('package', OPTIONAL)
+def test_the_blocked_packages_cannot_be_imported(package: str) -> None:
+    assert f'{package} is blocked' in run(f'import {package}').stderr
+
+
+def test_a_command_names_the_packages_that_it_needs() -> None:
+    result = run("from foc_ros.__main__ import main\nsys.exit(main(['solve', 'scene.yaml']))")
+    assert result.returncode == 2
+    names = 'cyclopts joblib mcap rich rosbags'
+    assert result.stderr == f'foc_ros: this command needs packages that are not installed: pip install {names}\n'
+
+
+def test_a_recording_and_a_picture_name_the_packages_that_they_need() -> None:
+    programs = {
+        "list(foc_ros.replay('x.mcap'))": 'pip install mcap rosbags',
+        'foc_ros.solve((0.0, 0.0), (0.3, 0.0)).plot()': "pip install 'foc_ros[report]'",
+    }
+    for program, words in programs.items():
+        result = run(f'import foc_ros\ntry:\n    {program}\nexcept foc_ros.FocError as error:\n    print(error)')
+        assert result.returncode == 0, result.stderr
+        assert len(result.stdout.splitlines()) == 1
+        assert words in result.stdout
+
+
+def test_predictions_and_guidance_work_without_them() -> None:
+    program = """
+import foc_ros
+predictor = foc_ros.Predictor(foc_ros.Config())
+predictor.set_goals([(0.3, 0.0)])
+predictor.set_obstacles([foc_ros.Circle((0.15, 0.01), radius=0.03)])
+for tick in range(31):
+    t = 0.01 * tick
+    prediction = predictor.update(t=t, position=(t**3, 0.1 * t**2))
+print(len(prediction.candidates))
+foc_ros.Guidance(foc_ros.Config())
+"""
+    result = run(program)
+    assert result.returncode == 0, result.stderr
+    assert int(result.stdout) == 2
+
+
+@pytest.mark.parametrize('name', ['foc_node', 'node'])
+def test_the_node_predicts_without_them(ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """Started as by `ros2 run` and `ros2 launch`, by a file in `lib/foc_ros`."""
+    ros_helpers.require_ros()
+    from test_node_process import ended, feed, running
+
+    (tmp_path / 'sitecustomize.py').write_text(BLOCK)
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join([str(tmp_path), str(ROOT)]), prepend=os.pathsep)
+    command = [sys.executable, str(ROOT / 'scripts' / 'ros2_run' / name)]
+    with running(ros, command) as process:
+        heard: Any = feed(ros, lambda player: bool(player.predictions), 'a prediction')
+        code, errors = ended(process, 2)
+    assert code == 0, errors
+    assert heard.predictions[0].width > 0
