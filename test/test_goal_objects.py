@@ -63,3 +63,11 @@ def test_a_goal_refuses_names_that_are_none(field: str) -> None:
     assert foc_ros.Goal((0.2, 0.0), object='front').object == 'front'
     with pytest.raises(SceneError, match=rf'goal\.{field}: expected a text that is not empty'):
         foc_ros.Goal((0.2, 0.0), **{field: ' '})  # type: ignore[arg-type]
+
+
+def test_the_predictor_takes_the_object_of_a_goal() -> None:
+    predictor = foc_ros.Predictor(Config().with_values({'budget_s': 0.0}))
+    predictor.set_obstacles([foc_ros.Circle((0.2, 0.0), 0.03, name='cup')])
+    for given, label in ((None, 'goal0:+cup'), ('cup', 'goal0:')):
+        predictor.set_goals([foc_ros.Goal((0.25, 0.001), object=given)])
+        assert label in [each.label for each in predictor.update(0.0 if given is None else 10.0, (0.0, 0.0)).candidates]
