@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from logging import getLogger
 from queue import SimpleQueue
 from threading import Thread
 from time import monotonic
@@ -19,7 +18,7 @@ from foc_ros.core.predict import warm_up
 from foc_ros.core.types import Prediction
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND
-from foc_ros.ros.guidance_loop import GuidanceLoop
+from foc_ros.ros.guidance import GuidanceLoop
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.encode_guidance import Place
 
@@ -58,7 +57,7 @@ class Predictor:
         self._queue: SimpleQueue[tuple[str, Any] | Config | None] = SimpleQueue()
         self._error = ''
         self._recent: deque[Prediction] = deque(maxlen=REMEMBERED)
-        self._guidance = GuidanceLoop(config, self._send_guidance, self._note_error, getLogger(__name__).warning)
+        self._guidance = GuidanceLoop(config, self._send_guidance, self._note_error)
         self._thread = Thread(target=self._run, name='prediction', daemon=True)
 
     def start(self) -> None:

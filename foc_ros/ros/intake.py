@@ -75,16 +75,12 @@ class Intake:
                 raise message
             status = self._handlers[role](message)
         except MessageError as error:
-            self.refuse(role, error)
+            self._counts['hand_lost' if isinstance(error, LostHandError) else f'{role}_invalid'] += 1
+            self.last_refusal = f'{role}: {error}'
             return None
         if self.pipeline.refused > refused_before:
             self.last_refusal = '; '.join(filter(None, [self.pipeline.last_refusal, transform_error]))
         return status
-
-    def refuse(self, role: str, error: MessageError) -> None:
-        """Count a message that cannot be decoded."""
-        self._counts['hand_lost' if isinstance(error, LostHandError) else f'{role}_invalid'] += 1
-        self.last_refusal = f'{role}: {error}'
 
     def describe_still_hand(self) -> str:
         """Return in words for how long all poses have had the same position; empty if that is less than `STILL_S`."""
@@ -103,11 +99,6 @@ class Intake:
         if count:
             self._counts[f'{role}{DROPPED}{reason}'] += count
 
-    def count_skipped(self) -> SampleStatus:
-        """Count a hand pose that is skipped."""
-        self._counts['hand_skipped'] += 1
-        return SampleStatus.SKIPPED
-
     def remove_source(self, source: str) -> None:
         """Forget the obstacles of one source, such as 'cloud' or 'markers', as if none of its messages had been received."""
         self.pipeline.remove_source(source)
@@ -118,7 +109,8 @@ class Intake:
 
     def _take_hand(self, message: Any) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
-            return self.count_skipped()
+            self._counts['hand_skipped'] += 1
+            return SampleStatus.SKIPPED
         self.sample = sample = decode_hand_sample(message, self.pipeline.config.plane)
         status = self.pipeline.add_hand_sample(sample)
         still = self._still

@@ -17,8 +17,8 @@ from .parameters import check_parameters
 SPIN_S = 0.1
 """Longest time between two checks of the stop flag [s]."""
 SWITCH_S = 0.0002
-"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]. An update of guidance
-gives the interpreter away several times, so with 0.001 it took up to 12 ms (`scripts/stress.py rates`)."""
+"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]: an update of guidance
+gives the interpreter away several times."""
 END_S = 0.5
 """Time after which a prediction that is still being computed does not delay the end of the process [s]."""
 
@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except FocError as error:
         return _reject(error)
     import rclpy
-    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.executors import ExternalShutdownException
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
@@ -105,21 +105,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sys.setswitchinterval(SWITCH_S)
     gc.collect()
     gc.freeze()  # these objects stay alive: a full collection over them would delay a prediction by 80 ms
-    executor = SingleThreadedExecutor(context=context)
+    executor = create_executor(context)
     executor.add_node(node)
     while not stop.is_requested and context.ok():
         try:
-            node.polling.spin_once(executor, SPIN_S)
+            executor.spin_once(timeout_sec=SPIN_S)
         except ExternalShutdownException:
             break
         except Exception as error:
             node.report(error)
-    executor.shutdown()
+    executor.remove_node(node)
     node.destroy_node()
+    executor.shutdown()
     context.try_shutdown()
     if node.is_busy_after(END_S):
         os._exit(0)  # otherwise the interpreter waits for the computation
     return 0
+
+
+def create_executor(context: Any) -> Any:
+    """Return an executor whose costs do not grow with the number of its topics, where rclpy has it (since 7.1.4).
+
+    A hand at 1 kHz costs the other one several times as much (`scripts/stress.py rates`).
+    """
+    try:
+        from rclpy.experimental.events_executor import EventsExecutor
+    except ImportError:
+        from rclpy.executors import SingleThreadedExecutor
+
+        return SingleThreadedExecutor(context=context)
+    return EventsExecutor(context=context)
 
 
 def _join_graph(context: Any) -> Any:

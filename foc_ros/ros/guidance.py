@@ -1,8 +1,7 @@
-"""The thread of guidance: updates at `guidance.rate_hz` by the steady clock, whatever the executor and the predictions do.
+"""Guidance of the node: updates at `guidance.rate_hz` by the steady clock in a thread of their own, and their topics.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the
-other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted: the thread
-sleeps after each update, so that others run as well. While guidance is disabled, the thread waits without updates.
+other. While guidance is disabled, the thread waits without updates. The loop needs no ROS; `play` uses it too.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import monotonic
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,12 +18,16 @@ from foc_ros.core.config import Config
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.hand.kalman import FilterState
 from foc_ros.core.types import Prediction
+from foc_ros.io.topics import COMMAND
 
-from .messages.encode_guidance import Place
-from .realtime import ThreadPriority
+from .health import THROTTLE_S
+from .messages.decode_poses import decode_frame
+from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, Place, blend_twist, encode_guidance_markers
+from .messages.types import MessageTypes, RclpyTypes
 
-LEAST_SLEEP = 0.1
-"""Part of the period that the thread sleeps after an update that was late: it must not keep a processor for itself."""
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
 ZEROS = 2
 """Number of outputs without any force that are published after the hand has been released."""
 END_S = 1.0
@@ -64,22 +68,15 @@ class GuidanceLoop:
         Called in the thread with each output and the place where it holds.
     report
         Called in the thread with an exception of an update, after which guidance begins anew with a force of zero.
-    warn
-        Called in the thread with a text if it may not have its priority.
     """
 
     def __init__(
-        self,
-        config: Config,
-        publish: Callable[[GuidanceOutput, Place], None],
-        report: Callable[[Exception], None],
-        warn: Callable[[str], None],
+        self, config: Config, publish: Callable[[GuidanceOutput, Place], None], report: Callable[[Exception], None]
     ) -> None:
         self.newest = Newest(config)
         self.output: GuidanceOutput | None = None
         self.place: Place | None = None
-        self._publish, self._report, self._warn = publish, report, warn
-        self._priority = 0
+        self._publish, self._report = publish, report
         self._state, self._zeros = GuidanceState(), ZEROS
         self._end, self._enabled = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
@@ -130,7 +127,6 @@ class GuidanceLoop:
             'authority': f'{output.authority:.3f}',
             'tank_J': f'{output.tank:.4f}',
             'force_N': f'{float((output.force @ output.force) ** 0.5):.3f}',
-            'realtime_priority': str(self._priority),
         }
 
     def update(self, now_s: float) -> None:
@@ -160,23 +156,86 @@ class GuidanceLoop:
 
     def _run(self) -> None:
         """Update once in a period; a late update shifts the following ones."""
-        due_s, priority = monotonic(), ThreadPriority(self._warn)
+        due_s = monotonic()
         while not self._end.wait(max(due_s - monotonic(), 0.0)):
             if self._zeros >= ZEROS and not self._enabled.is_set():
-                priority.set(0)
                 self._enabled.wait()
                 self._state = GuidanceState()
                 continue
-            priority.set(self.newest.config.guidance.realtime_priority)
-            self._priority = priority.priority
             try:
                 self.update(monotonic())
             except Exception as error:
                 self._state = GuidanceState()
                 self._report(error)
-            period_s = 1.0 / self.newest.config.guidance.rate_hz
-            due_s = max(due_s + period_s, monotonic() + LEAST_SLEEP * period_s)
+            due_s = max(due_s + 1.0 / self.newest.config.guidance.rate_hz, monotonic())
 
 
 def _has_ended(output: GuidanceOutput) -> bool:
     return output.status is not GuidanceStatus.GUIDING and not output.force.any() and not output.authority
+
+
+class GuidanceTopics:
+    """Publishes guidance for a node between `create` and `destroy`.
+
+    Attributes: loop, which has to be told what is new; publishers, by the name of the topic below the node's name.
+
+    Parameters
+    ----------
+    node
+        The node to which the topics belong.
+    config
+        All parameters.
+    report
+        Called in the thread of guidance with an exception of an update.
+    """
+
+    def __init__(self, node: Node, config: Config, report: Callable[[Exception], None]) -> None:
+        self._node = node
+        self._thread_types = RclpyTypes()  # messages of the thread of guidance; no other thread uses them
+        self.publishers: dict[str, Any] = {}
+        self.loop = GuidanceLoop(config, self._publish_output, report)
+
+    def create(self) -> None:
+        """Create the publishers and begin to update."""
+        from .endpoints import create_guidance_publishers  # needs rclpy, and the loop does not
+
+        self.publishers = create_guidance_publishers(self._node)
+        self.loop.start()
+
+    def destroy(self) -> None:
+        """End the updates and destroy the publishers."""
+        self.loop.stop()
+        for publisher in self.publishers.values():
+            self._node.destroy_publisher(publisher)
+        self.publishers = {}
+
+    def encode_markers(self, types: MessageTypes) -> list[Any]:
+        """Return the markers of the last output, none if guidance is disabled or has no hand."""
+        output, newest = self.loop.output, self.loop.newest
+        if output is None or newest.place is None or not newest.config.guidance.enabled:
+            return []
+        return encode_guidance_markers(output, newest.place, types)
+
+    def blend_command(self, command: Any, types: MessageTypes) -> None:
+        """Publish the operator's command with the share of guidance in it, or as it is where there is no guidance."""
+        output, place, config = self.loop.output, self.loop.place, self.loop.newest.config
+        if not config.guidance.enabled:
+            return
+        if output is not None and place is not None and monotonic() - output.t <= config.guidance.hold_s:
+            frame_id = decode_frame(command.header)
+            if frame_id == place.frame_id:
+                command = blend_twist(output, command, config.plane, types)
+            else:
+                text = f'{COMMAND}: frame {frame_id!r} is not the working frame {place.frame_id!r}: not blended'
+                self._node.get_logger().warning(text, throttle_duration_sec=THROTTLE_S)
+        self._publish(TWIST, command)
+
+    def _publish_output(self, output: GuidanceOutput, place: Place) -> None:
+        """Publish an output; this happens in the thread of guidance."""
+        for name, (_, encode) in GUIDANCE_OUTPUTS.items():
+            if self.publishers[name].get_subscription_count():
+                self._publish(name, encode(output, place, self._thread_types))
+
+    def _publish(self, name: str, message: Any) -> None:
+        if self._node.context.ok():
+            self.publishers[name].publish(message)
