@@ -16,8 +16,7 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import HeightTrajectory, Prediction
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.decode_markers import MarkerTable
-from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
+from foc_ros.ros.messages.decode_objects import CollisionTable, MarkerTable, decode_detections
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
 from foc_ros.ros.messages.plane import lift

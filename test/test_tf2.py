@@ -23,8 +23,7 @@ from rclpy.time import Time  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 
-from foc_ros.ros.transform_tree import TransformTree  # noqa: E402
-from foc_ros.ros.transforms import TransformUnavailableError  # noqa: E402
+from foc_ros.ros.transforms import TransformTree, TransformUnavailableError  # noqa: E402
 
 
 def transform(parent: str, child: str, stamp_ns: int, position: Any, quaternion: Any = (0.0, 0.0, 0.0, 1.0)) -> Any:

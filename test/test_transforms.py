@@ -19,8 +19,7 @@ from ros_helpers import Graph  # noqa: E402
 from foc_ros.core.config import Config, replace_values  # noqa: E402
 from foc_ros.core.obstacles.geometry import measure_offsets  # noqa: E402
 from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
-from foc_ros.ros.transform_tree import TransformTree  # noqa: E402
-from foc_ros.ros.transforms import Transforms, TransformUnavailableError  # noqa: E402
+from foc_ros.ros.transforms import Transforms, TransformTree, TransformUnavailableError  # noqa: E402
 
 QUARTER = {'x': 0.0, 'y': 0.0, 'z': np.sqrt(0.5), 'w': np.sqrt(0.5)}
 

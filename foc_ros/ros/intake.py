@@ -13,8 +13,7 @@ from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
-from .messages.decode_markers import MarkerTable
-from .messages.decode_objects import CollisionTable, decode_detections
+from .messages.decode_objects import CollisionTable, MarkerTable, decode_detections
 from .messages.decode_point_cloud import decode_point_cloud
 from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample, decode_stamp
 from .transforms import Arrival
@@ -75,12 +74,16 @@ class Intake:
                 raise message
             status = self._handlers[role](message)
         except MessageError as error:
-            self._counts['hand_lost' if isinstance(error, LostHandError) else f'{role}_invalid'] += 1
-            self.last_refusal = f'{role}: {error}'
+            self.refuse(role, error)
             return None
         if self.pipeline.refused > refused_before:
             self.last_refusal = '; '.join(filter(None, [self.pipeline.last_refusal, transform_error]))
         return status
+
+    def refuse(self, role: str, error: MessageError) -> None:
+        """Count a message that cannot be decoded."""
+        self._counts['hand_lost' if isinstance(error, LostHandError) else f'{role}_invalid'] += 1
+        self.last_refusal = f'{role}: {error}'
 
     def describe_still_hand(self) -> str:
         """Return in words for how long all poses have had the same position; empty if that is less than `STILL_S`."""

@@ -8,13 +8,20 @@ their order. Node and replay share this: times are those of the steady clock in 
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import partial
+from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
 from foc_ros.core.config import Config
-from foc_ros.core.types import NANOSECONDS
+from foc_ros.core.errors import MessageError
+from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.topics import HAND
 
 from .messages.decode_poses import check_hand_pose, decode_frame, decode_stamp
@@ -22,6 +29,8 @@ from .messages.transform_messages import Transform, transform_message
 
 MOST_HELD = 1000
 """Largest number of messages of one input that are held: 1 s of a hand at 1 kHz."""
+KEPT_NS = 10 * NANOSECONDS
+"""Time for which transforms are kept, that of tf2 [ns]; one that is older than that means that the recording starts again."""
 
 
 class TransformUnavailableError(Exception):
@@ -127,3 +136,107 @@ class Transforms:
                 text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
                 raise TransformUnavailableError(f'{text} (frames.tolerance_s is {tolerance_s:g})') from None
             return newest
+
+
+@dataclass
+class _Frame:
+    """A frame with its parent and its poses in it, rotation and position (3,) [m], by stamp [ns]; a static one has one pose."""
+
+    parent: str
+    is_static: bool
+    stamps: list[int] = field(default_factory=list)
+    poses: list[tuple[Rotation, Array]] = field(default_factory=list)
+
+    def add(self, stamp_ns: int, rotation: Rotation, position: Array) -> None:
+        """Keep a pose, and forget those that are too old."""
+        if self.is_static or (self.stamps and stamp_ns < self.stamps[-1] - KEPT_NS):
+            self.stamps, self.poses = [], []
+        place = bisect_right(self.stamps, stamp_ns)
+        self.stamps.insert(place, stamp_ns)
+        self.poses.insert(place, (rotation, position))
+        old = bisect_right(self.stamps, self.stamps[-1] - KEPT_NS)
+        del self.stamps[:old], self.poses[:old]
+
+    def find(self, name: str, stamp_ns: int) -> tuple[Rotation, Array]:
+        """Return the pose at a stamp; raise TransformUnavailableError outside the known stamps."""
+        after = bisect_right(self.stamps, stamp_ns)
+        if self.is_static or (after and self.stamps[after - 1] == stamp_ns):
+            return self.poses[after - 1]
+        if not 0 < after < len(self.stamps):
+            nearest_ns = self.stamps[min(after, len(self.stamps) - 1)]
+            relation = 'after the newest' if after else 'before the oldest'
+            distance = f'{abs(stamp_ns - nearest_ns) / NANOSECONDS:.3g} s'
+            raise TransformUnavailableError(f'the stamp is {distance} {relation} transform from {name} to {self.parent}')
+        (earlier, start), (later, end) = self.poses[after - 1 : after + 1]
+        share = (stamp_ns - self.stamps[after - 1]) / (self.stamps[after] - self.stamps[after - 1])
+        turn = Slerp([0.0, 1.0], Rotation.concatenate([earlier, later]))
+        return turn(share), (1.0 - share) * start + share * end
+
+
+class TransformTree:
+    """The frames of a recording, looked up as tf2 does, without ROS; a `TransformSource`.
+
+    A frame has one parent. Between the stamps of two messages the translation is interpolated linearly, the rotation along the
+    shortest arc.
+    """
+
+    def __init__(self) -> None:
+        self._frames: dict[str, _Frame] = {}
+
+    def add(self, message: Any, *, is_static: bool) -> int:
+        """Add the transforms of a tf2_msgs/TFMessage, and return how many are left out.
+
+        These have a wrong stamp, a number that is not finite, no rotation, or one frame as both parent and child.
+        """
+        left_out = 0
+        for each in message.transforms:
+            position = np.array([getattr(each.transform.translation, axis) for axis in 'xyz'], dtype=float)
+            quaternion = np.array([getattr(each.transform.rotation, axis) for axis in 'xyzw'], dtype=float)
+            child, parent = str(each.child_frame_id).lstrip('/'), decode_frame(each.header)
+            try:
+                stamp_ns = decode_stamp(each.header)
+            except MessageError:
+                stamp_ns = -1
+            if stamp_ns < 0 or not (np.isfinite([*position, *quaternion]).all() and quaternion.any()) or child == parent:
+                left_out += 1
+                continue
+            frame = self._frames.get(child)
+            if frame is None or (frame.parent, frame.is_static) != (parent, is_static):
+                frame = self._frames[child] = _Frame(parent, is_static)
+            frame.add(stamp_ns, Rotation.from_quat(quaternion), position)
+        return left_out
+
+    def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
+        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.
+
+        Raises TransformUnavailableError.
+        """
+        up, down = self._list_ancestors(source), self._list_ancestors(target)
+        common = next((name for name in up if name in down), None)
+        if common is None:
+            known = ', '.join(sorted({*self._frames, *(each.parent for each in self._frames.values())})) or 'none'
+            raise TransformUnavailableError(f'{source} and {target} are not connected; known frames: {known}')
+        chain, back = up[: up.index(common)], down[: down.index(common)]
+        if not stamp_ns:
+            frames = [self._frames[name] for name in (*chain, *back)]
+            stamp_ns = min((frame.stamps[-1] for frame in frames if not frame.is_static), default=0)
+        rotation, position = self._compose(chain, stamp_ns)
+        inverse, offset = self._compose(back, stamp_ns)
+        inverse = inverse.inv()
+        found = (inverse * rotation).as_quat().tolist(), inverse.apply(position - offset).tolist()
+        return Transform(*(SimpleNamespace(**dict(zip('xyzw', each, strict=False))) for each in found), stamp_ns)
+
+    def _list_ancestors(self, name: str) -> list[str]:
+        """Return a frame and the frames above it, its parent first."""
+        names = [name]
+        while (frame := self._frames.get(names[-1])) is not None and frame.parent not in names:
+            names.append(frame.parent)
+        return names
+
+    def _compose(self, chain: list[str], stamp_ns: int) -> tuple[Rotation, Array]:
+        """Return the pose of the first frame of a chain in the parent of the last one."""
+        rotation, position = Rotation.identity(), np.zeros(3)
+        for name in chain:
+            turn, shift = self._frames[name].find(name, stamp_ns)
+            rotation, position = turn * rotation, turn.apply(position) + shift
+        return rotation, position

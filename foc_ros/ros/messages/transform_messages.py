@@ -12,7 +12,7 @@ from foc_ros.core.errors import MessageError
 from foc_ros.core.types import Array
 from foc_ros.io.topics import CLOUD, DETECTIONS, GOALS, MARKERS
 
-from .decode_markers import ADD
+from .decode_objects import ADD
 from .decode_point_cloud import read_table
 from .decode_poses import decode_frame
 from .plane import compute_rotation, lift, project
