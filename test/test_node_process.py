@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import signal
 import subprocess
 import sys
@@ -42,19 +41,6 @@ LAUNCHES = {
     'command': [sys.executable, '-m', 'foc_ros', 'node'],
     'entry point': [entry_point('foc_node')],
 }
-
-
-SLOW_IMPORT = """
-import sys, time
-
-class Slow:
-    def find_spec(self, name, *_):
-        if name == 'foc_ros.ros.node':
-            time.sleep(60.0)
-
-sys.meta_path.insert(0, Slow())
-"""
-"""Loaded by a process at its start: as on a machine whose disk is slow, it takes long to load the node."""
 
 
 @contextmanager
@@ -154,21 +140,6 @@ def test_a_node_says_what_it_waits_for_and_when_it_predicts(ros: Graph) -> None:
     ]
 
 
-def test_dds_connects_the_process_while_it_loads_and_a_stop_then_leaves_no_trace(
-    ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / 'sitecustomize.py').write_text(SLOW_IMPORT)
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path), prepend=os.pathsep)
-    watcher = ros.node('watcher')
-    with running(ros, 'module') as process:
-        ros.spin_until(lambda: '_foc_start' in watcher.get_node_names(), 'the process', 30.0)
-        assert 'foc' not in watcher.get_node_names(), 'it is still loading'
-        code, errors = ended(process, signal.SIGTERM)
-    assert code == 0
-    assert [line for line in errors.splitlines() if not line.startswith('[INFO]')] == []
-    ros.spin_until(lambda: '_foc_start' not in watcher.get_node_names(), 'the end, without waiting for the lease', 10.0)
-
-
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph, number: signal.Signals) -> None:
     watcher = ros.node('watcher')
@@ -240,7 +211,6 @@ def test_a_stopped_node_leaves_no_files_and_no_trace_in_the_graph(ros: Graph, tm
     environment = ros.environment | {'ROS_LOG_DIR': str(tmp_path / 'log'), 'PYTHONPATH': str(ROOT)}
     with subprocess.Popen(command, cwd=tmp_path, env=environment) as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
-        ros.spin_until(lambda: '_foc_start' not in watcher.get_node_names(), 'the end of the hidden node')
         process.send_signal(signal.SIGTERM)
         assert process.wait(30) == 0
     deadline = time.monotonic() + 30

@@ -20,7 +20,7 @@ from ros_helpers import Graph
 from foc_ros.core.config import Config, flatten, list_parameters, replace_values
 from foc_ros.core.errors import FocError, FocWarning, ParameterError, RecordingError
 from foc_ros.ros import parameters as module
-from foc_ros.ros.parameters import check_parameters, dump_parameter_file, load_parameter_file
+from foc_ros.ros.parameters import check_parameter_files, dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).parents[1]
 NAMES = [parameter.name for parameter in list_parameters()]
@@ -168,24 +168,6 @@ def node_with(ros: Graph, **overrides: object) -> Any:
     return ros.node('foc', parameter_overrides=given_values, automatically_declare_parameters_from_overrides=True)
 
 
-@pytest.mark.parametrize(
-    'arguments',
-    [
-        ['-p', 'arm:rate_hz:=-1.0'],
-        ['-p', 'rate_hz:={'],
-        ['-p', 'budget_s:=1e-3', '-p', 'likelihood.shortfall:=.inf'],
-        ['-p', 'frame_id:=2026-11-24'],
-        ['-p', 'frame_id:=1_0'],
-        ['-p', 'frame_id:=~'],
-    ],
-)
-def test_what_depends_on_the_name_of_the_node_is_left_to_the_node(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    check_parameters(['foc_node', '--ros-args', *arguments])
-
-
 SECTIONS = ['/**', '/*', 'foc', '/foc', '/**/foc', '/*/foc', '/**/**', '/arm/foc', '/arm/*', '/arm/**', 'arm/foc', '/arm/left/*']
 
 
@@ -221,10 +203,10 @@ def test_a_section_that_does_not_apply_is_named(tmp_path: Path) -> None:
         assert load_parameter_file(file).rate_hz == 6.0
     arguments = ['foc_node', '--ros-args', '--params-file', str(file)]
     with pytest.warns(FocWarning, match='does not apply to the node /foc$'):
-        check_parameters(arguments)
+        check_parameter_files(arguments)
     for others in (['-r', '__ns:=/left'], ['-r', '__node:=arm'], ['--remap', '__name:=arm']):
         with pytest.warns(FocWarning, match='/arm/foc does not apply to the node /(left/foc|arm)$'):
-            check_parameters([*arguments, *others])
+            check_parameter_files([*arguments, *others])
 
 
 @pytest.mark.parametrize(
@@ -243,26 +225,18 @@ def test_a_section_that_does_not_apply_is_named(tmp_path: Path) -> None:
 def test_node_and_commands_refuse_the_same_files(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / 'params.yaml'
     file.write_text(text)
-    for read in (load_parameter_file, lambda each: check_parameters(['--ros-args', '--params-file', str(each)])):
+    for read in (load_parameter_file, lambda each: check_parameter_files(['--ros-args', '--params-file', str(each)])):
         with pytest.raises(FocError, match=re.escape(words.replace('"', ''))):
             read(file)
 
 
 def test_a_node_needs_no_parameters_in_a_file(tmp_path: Path) -> None:
     (tmp_path / 'params.yaml').write_text('# nothing yet\n')
-    check_parameters(['--ros-args', '--params-file', str(tmp_path / 'params.yaml')])
+    check_parameter_files(['--ros-args', '--params-file', str(tmp_path / 'params.yaml')])
 
 
 def test_a_section_may_be_below_the_root(tmp_path: Path) -> None:
     assert load(tmp_path, '/: {foc: {ros__parameters: {rate_hz: 5.0}}}').rate_hz == 5.0
-
-
-def test_a_later_argument_replaces_an_earlier_one(tmp_path: Path) -> None:
-    file = tmp_path / 'foc.yaml'
-    file.write_text('foc: {ros__parameters: {rate_hz: -1.0}}')
-    check_parameters(['--ros-args', '--params-file', str(file), '-p', 'rate_hz:=5.0'])
-    with pytest.raises(ParameterError, match='rate_hz'):
-        check_parameters(['--ros-args', '-p', 'rate_hz:=5.0', '--params-file', str(file)])
 
 
 def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:
