@@ -32,12 +32,6 @@ def predicted(bench: Bench, poses: list[Any]) -> int:
     return int(figures(bench.health()).get('count predictions', 0)) - before
 
 
-def test_a_node_starts_active(ros: Graph) -> None:
-    bench = Bench(ros, outputs=[])
-    assert state_of(bench) == 'active'
-    assert figures(bench.health())['state'] == 'active'
-
-
 def test_a_managed_node_waits_for_configuration_and_activation(ros: Graph) -> None:
     bench = Bench(ros, outputs=[], connected=False, parameters={'autostart': False})
     assert state_of(bench) == 'unconfigured'

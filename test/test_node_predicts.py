@@ -10,7 +10,7 @@ import ros_helpers
 
 ros_helpers.require_ros()
 
-from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
+from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped  # noqa: E402
 from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
@@ -67,17 +67,6 @@ def test_every_output_carries_the_stamp_and_frame_of_the_hand(ros: Graph) -> Non
     assert path
     heights = [pose.pose.position.z for pose in path]
     assert heights[0] == pytest.approx(0.25) and heights[-1] == pytest.approx(0.0, abs=1e-9), 'from the hand to the goal'
-
-
-def test_markers_and_a_single_goal_make_a_scene(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.deliver(
-        'obstacle_markers', marker_array(TYPES, marker(TYPES, (0.15, 0.02, 0.0), (0.06, 0.06, 0.06), stamp_ns=10 * SECOND))
-    )
-    bench.deliver('goal_pose', pose_stamped(TYPES, GOALS[0]))
-    bench.move(hand_path(2))
-    table = bench.wait_for('likelihoods', 1)[0]
-    assert 'a/0' in table.layout.dim[0].label
 
 
 def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros: Graph) -> None:
@@ -181,17 +170,6 @@ def test_reset_forgets_the_movement_and_keeps_the_scene(ros: Graph) -> None:
     assert bench.node.pipeline.hand_state is None
     bench.move(hand_path(1, start_s=9.9))
     assert stamps(bench.wait_for('prediction', 3))[-1] == round(9.9 * SECOND)
-
-
-def test_two_arms_in_two_namespaces_are_independent(ros: Graph) -> None:
-    left, right = Bench(ros, namespace='left', parameters={}), Bench(ros, namespace='right', parameters={})
-    left.publish_scene()
-    right.publish_scene()
-    left.publishers['hand_pose'].publish(hand_path(1)[0])
-    left.wait_for('prediction', 1)
-    ros.spin_for(0.2)
-    assert not right.received['prediction']
-    assert (left.health().name, right.health().name) == ('left/foc: prediction', 'right/foc: prediction')
 
 
 def test_a_scene_published_once_is_received_later_with_transient_local_durability(ros: Graph) -> None:

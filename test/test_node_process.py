@@ -118,8 +118,9 @@ def feed(ros: Graph, is_enough: Callable[[Player], bool], what: str, hand: str =
     return player
 
 
-@pytest.mark.parametrize('launch', LAUNCHES)
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ('launch', 'number'), [('module', signal.SIGTERM), ('command', signal.SIGINT), ('entry point', signal.SIGTERM)]
+)
 def test_a_working_node_stops_without_an_error(ros: Graph, launch: str, number: signal.Signals) -> None:
     with running(ros, launch) as process:
         feed(ros, lambda player: bool(player.predictions), 'a prediction')
@@ -145,17 +146,8 @@ def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph, number
     watcher = ros.node('watcher')
     with running(ros, 'module') as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
-        code, errors = ended(process, number)
-    assert code == 0
-    assert [line for line in errors.splitlines() if not line.startswith('[INFO]')] == []
-
-
-def test_a_second_signal_has_no_effect(ros: Graph) -> None:
-    watcher = ros.node('watcher')
-    with running(ros, 'module') as process:
-        ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
         process.send_signal(signal.SIGTERM)
-        code, errors = ended(process, signal.SIGINT)
+        code, errors = ended(process, number)  # a second one has no effect
     assert code == 0
     assert [line for line in errors.splitlines() if not line.startswith('[INFO]')] == []
 
@@ -218,11 +210,3 @@ def test_a_stopped_node_leaves_no_files_and_no_trace_in_the_graph(ros: Graph, tm
         assert time.monotonic() < deadline
         ros.executor.spin_once(timeout_sec=0.05)
     assert [each.name for each in tmp_path.iterdir()] == ['log']
-
-
-def test_a_node_receives_every_pose_of_a_tracker(ros: Graph) -> None:
-    count = 200
-    with running(ros, 'module', '--ros-args', '-p', 'foc.steps:=20') as process:
-        player = feed(ros, lambda player: player.sent == count, f'{count} poses sent')
-        ros.spin_until(lambda: player.figure('hand_pose refused') == f'0 of {count}', f'{count} poses in the diagnostics')
-        assert ended(process, signal.SIGTERM)[0] == 0

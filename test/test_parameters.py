@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -30,13 +28,6 @@ def load(folder: Path, text: str) -> Config:
     file = folder / 'params.yaml'
     file.write_text(text, 'utf-8')
     return load_parameter_file(file)
-
-
-def test_the_shipped_file_is_current() -> None:
-    made = subprocess.run(
-        [sys.executable, '-m', 'foc_ros.ros.parameters'], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout
-    assert made == (ROOT / 'config' / 'foc.yaml').read_text('utf-8'), 'run: python -m foc_ros.ros.parameters > config/foc.yaml'
 
 
 def test_the_shipped_file_holds_the_defaults() -> None:
@@ -275,13 +266,6 @@ def test_a_node_starts_with_its_parameter_overrides(ros: Graph) -> None:
     assert isinstance(node.get_parameter('rate_hz').value, float)
 
 
-def test_a_node_does_not_start_with_a_value_out_of_bounds(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import declare_parameters
-
-    with pytest.raises(ParameterError, match=re.escape('foc.eta: expected a number in [0, 0.999], got 2.0')):
-        declare_parameters(node_with(ros, foc__eta=2.0), Config())
-
-
 def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
     from ros_helpers import graph
 
@@ -292,13 +276,6 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
         assert declare_parameters(node_with(ros), Config()) == config == load_parameter_file(file)
-
-
-def test_an_unknown_parameter_of_a_node_is_refused_with_a_similar_one(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import declare_parameters
-
-    with pytest.raises(ParameterError, match=r'foc\.etta: expected a known parameter \(did you mean foc\.eta\?\), got 0\.5'):
-        declare_parameters(node_with(ros, foc__etta=0.5), Config())
 
 
 def test_names_in_the_file_are_the_names_of_the_node() -> None:

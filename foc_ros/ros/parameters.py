@@ -1,12 +1,8 @@
-"""The parameters of `foc_ros.core.config` as a ROS 2 parameter file, which the node and the commands read alike.
-
-`python -m foc_ros.ros.parameters > config/foc.yaml` writes the file with every default.
-"""
+"""The parameters of `foc_ros.core.config` as a ROS 2 parameter file, which the node and the commands read alike."""
 
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -150,7 +146,3 @@ def _describe(parameter: Parameter) -> str:
     if bound.read_only:
         parts.append('fixed once the node runs')
     return '; '.join(parts)
-
-
-if __name__ == '__main__':
-    sys.stdout.write(dump_parameter_file(Config()))
