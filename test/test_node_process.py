@@ -23,6 +23,9 @@ from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stam
 from node_helpers import GOALS, ROWS, TYPES, figures  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
+from foc_ros.ros.isolated_node import reserve_domain  # noqa: E402
+from foc_ros.ros.main import main  # noqa: E402
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -170,10 +173,16 @@ def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph, number
         (['--fast'], 'foc_node: unrecognized arguments: --fast (those of ROS follow --ros-args)\n'),
     ],
 )
-def test_a_node_that_cannot_start_prints_the_reason_in_one_line(ros: Graph, arguments: list[str], words: str) -> None:
-    with running(ros, 'module', *arguments) as process:
-        _, errors = process.communicate(timeout=30)
-    assert process.returncode == 2
+def test_a_node_that_cannot_start_prints_the_reason_in_one_line(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
+) -> None:
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with reserve_domain() as domain:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+        assert main(arguments) == 2
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    errors = capfd.readouterr().err
     lines = [line for line in errors.splitlines() if line.startswith('foc_node: ')]
     assert len(lines) == 1
     assert words in errors
