@@ -257,11 +257,13 @@ def test_obstacles_are_heard_from_a_best_effort_publisher(ros: Graph) -> None:
 
 
 def test_a_publisher_that_cannot_be_heard_is_named(ros: Graph) -> None:
+    from rclpy.event_handler import PublisherEventCallbacks
     from rclpy.qos import qos_profile_sensor_data
     from visualization_msgs.msg import MarkerArray
 
     bench, perception = Bench(ros, outputs=[]), ros.node('perception')
-    publisher = perception.create_publisher(MarkerArray, 'obstacle_markers', qos_profile_sensor_data)
+    silent = PublisherEventCallbacks(use_default_callbacks=False)
+    publisher = perception.create_publisher(MarkerArray, 'obstacle_markers', qos_profile_sensor_data, event_callbacks=silent)
     ros.spin_until(lambda: len(bench.node.get_publishers_info_by_topic('obstacle_markers')) == 2, 'the publisher')
     status = bench.health()
     assert status.level == b'\x01'

@@ -102,6 +102,17 @@ def test_cleaning_up_forgets_all_but_the_parameters(ros: Graph) -> None:
     assert predicted(bench, hand_path(2)) == 1
 
 
+def test_messages_that_wait_when_the_node_is_cleaned_up_are_left(ros: Graph) -> None:
+    bench = Bench(ros, outputs=[])
+    bench.publish_scene()
+    bench.send('hand_pose', *hand_path(50))
+    bench.send('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+    bench.node.trigger_deactivate()
+    bench.node.trigger_cleanup()
+    ros.spin_for(0.2)
+    assert not bench.node.pipeline.scene.sources
+
+
 @pytest.mark.parametrize('label', ['activate', 'cleanup', 'no such transition'])
 def test_an_impossible_transition_is_refused_by_an_answer(ros: Graph, label: str) -> None:
     bench = Bench(ros, outputs=[])

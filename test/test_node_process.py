@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import signal
 import subprocess
 import sys
@@ -130,6 +131,16 @@ def test_a_working_node_stops_without_an_error(ros: Graph, launch: str, number: 
         code, errors = ended(process, number)
     assert code == 0, errors
     assert 'Traceback' not in errors
+
+
+def test_a_node_works_with_an_rclpy_that_has_only_its_plain_executor(
+    ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / 'sitecustomize.py').write_text("import sys\nsys.modules['rclpy.experimental.events_executor'] = None\n")
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path), prepend=os.pathsep)
+    with running(ros, 'module') as process:
+        feed(ros, lambda player: bool(player.predictions), 'a prediction')
+        assert ended(process, signal.SIGTERM)[0] == 0
 
 
 def test_a_node_says_what_it_waits_for_and_when_it_predicts(ros: Graph) -> None:

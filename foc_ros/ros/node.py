@@ -208,16 +208,13 @@ class FocNode(LifecycleNode):
 
         Markers are taken one message at a time, because every message counts and takes time; the hand has its turn in between.
         """
+        if role not in self._inputs:
+            return  # the executor still held messages when the node was cleaned up
         waiting = [] if role == MARKERS else take_queued(self._inputs[role])
         now_s = monotonic()
         for each in (*messages, *waiting):
             self._transforms.add(role, each, now_s)
         self._take_released(role)
-
-    def _take_waiting_poses(self) -> None:
-        """Take the hand poses for which the executor had no time yet."""
-        if HAND in self._inputs:
-            self._receive(HAND)
 
     def _take_held(self) -> None:
         """Take the held messages whose transform has arrived, or will not arrive any more."""
@@ -292,7 +289,7 @@ class FocNode(LifecycleNode):
             self._publish_prediction(ended)
         except Exception as error:
             self._recover(error)
-        self._take_waiting_poses()  # the next prediction is made from the newest one
+        self._receive(HAND)  # the next prediction is made from the newest pose, though the executor had no time for it yet
         if self.pipeline.is_due:
             self._predict()
 
@@ -329,7 +326,7 @@ class FocNode(LifecycleNode):
         self._guidance.loop.note_hand(None, monotonic())
 
     def _publish_health(self) -> None:
-        self._take_waiting_poses()  # a hand whose poses wait here is not silent
+        self._receive(HAND)  # a hand whose poses wait here is not silent
         self._report_missing_packages()
         clock_reason, present = self._find_clock_reason(), self._worker.present
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
