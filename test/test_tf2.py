@@ -113,4 +113,4 @@ def test_the_transforms_of_a_recording_are_those_of_tf2() -> None:
             wanted = expected.transform
             np.testing.assert_allclose(found.translation, [getattr(wanted.translation, axis) for axis in 'xyz'], atol=1e-9)
             turn = Rotation.from_quat([getattr(wanted.rotation, axis) for axis in 'xyzw'])
-            assert (turn.inv() * Rotation.from_quat(found.rotation)).magnitude() < 1e-9
+            assert (turn.inv() * Rotation.from_matrix(found.rotation)).magnitude() < 1e-9

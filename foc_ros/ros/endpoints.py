@@ -7,6 +7,7 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
+import numpy as np
 from rclpy.duration import Infinite
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -27,7 +28,7 @@ from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS
 
 from .messages.encode_guidance import GUIDANCE_OUTPUTS, TWIST, TWIST_TYPE
 from .messages.encode_prediction import OUTPUTS
-from .messages.transform_messages import Transform
+from .messages.plane import Transform, compute_rotation
 from .messages.types import find_message_class
 from .transforms import TransformUnavailableError
 
@@ -184,7 +185,9 @@ class TfListener:
             found = self._buffer.lookup_transform(target, source, Time(nanoseconds=stamp_ns))
         except self._unavailable as error:
             raise TransformUnavailableError(' '.join(str(error).split())) from None
-        return Transform(found.transform.rotation, found.transform.translation, Time.from_msg(found.header.stamp).nanoseconds)
+        shift = found.transform.translation
+        translation = np.array([shift.x, shift.y, shift.z])
+        return Transform(compute_rotation(found.transform.rotation), translation, Time.from_msg(found.header.stamp).nanoseconds)
 
     def set_transform(self, transform: Any, authority: str) -> None:
         """Take a transform from the listener."""

@@ -12,8 +12,6 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
-from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -22,10 +20,11 @@ from scipy.spatial.transform import Rotation, Slerp
 from foc_ros.core.config import Config
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import NANOSECONDS, Array
-from foc_ros.io.topics import HAND
+from foc_ros.io.topics import HAND, MARKERS
 
-from .messages.decode_poses import check_hand_pose, decode_frame, decode_stamp
-from .messages.transform_messages import Transform, transform_message
+from .messages.decode_objects import ADD
+from .messages.decode_poses import Place, check_hand_pose, decode_frame, decode_stamp, stay
+from .messages.plane import Transform
 
 MOST_HELD = 1000
 """Largest number of messages of one input that are held: 1 s of a hand at 1 kHz."""
@@ -50,12 +49,13 @@ class TransformSource(Protocol):
 class Arrival(NamedTuple):
     """A message that can be taken.
 
-    message: in the working frame, or unchanged; received_s: when it arrived [s]; error: why it could not be transformed, empty if
-    it could or did not have to be; is_inexact: whether the newest transform was taken instead of that for its stamp.
+    received_s: when it arrived [s]; place: gives the frame and the transform of its headers; error: why it is not in the working
+    frame, empty if it is; is_inexact: whether the newest transform was taken instead of that for its stamp.
     """
 
     message: Any
     received_s: float
+    place: Place = stay
     error: str = ''
     is_inexact: bool = False
 
@@ -94,48 +94,58 @@ class Transforms:
             message, received_s = queue[0]
             is_overdue = now_s - received_s >= config.frames.tolerance_s or len(queue) > MOST_HELD
             try:
-                transformed, is_inexact = self._transform(role, message, frame_id, config, is_overdue)
-                arrival = Arrival(transformed, received_s, is_inexact=is_inexact)
+                place, is_inexact = self._find_place(role, message, frame_id, config, is_overdue)
+                arrival = Arrival(message, received_s, place, is_inexact=is_inexact)
             except TransformUnavailableError as error:
                 if not is_overdue:
                     break
-                arrival = Arrival(message, received_s, f'no transform to {frame_id}: {error}')
-            except Exception as error:  # the message is not checked yet
-                arrival = Arrival(message, received_s, f'cannot be transformed to {frame_id}: {" ".join(str(error).split())}')
+                arrival = Arrival(message, received_s, error=f'no transform to {frame_id}: {error}')
+            except Exception:  # the message is not checked yet, and will be refused
+                arrival = Arrival(message, received_s)
             queue.popleft()
             yield arrival
 
-    def _transform(self, role: str, message: Any, frame_id: str | None, config: Config, is_overdue: bool) -> tuple[Any, bool]:
-        """Return a message in the working frame, and whether the newest transform was taken for it."""
+    def _find_place(self, role: str, message: Any, frame_id: str | None, config: Config, is_overdue: bool) -> tuple[Place, bool]:
+        """Return the transforms for the headers of a message, and whether the newest one was taken for one of them."""
         is_unneeded = role == HAND and self._is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
-            return message, False
+            return stay, False
         if role == HAND:
-            check_hand_pose(message.pose)  # a transform would move the position 0
-        try:
-            return transform_message(role, message, frame_id, config.plane, partial(self._find, frame_id)), False
-        except TransformUnavailableError:
-            if not is_overdue:
-                raise
-        find = partial(self._find_newest, frame_id, config.frames.tolerance_s)
-        return transform_message(role, message, frame_id, config.plane, find), True
+            check_hand_pose(message.pose)  # one without data does not wait for a transform
+        # markers that delete others have no position and often no frame
+        headers = [each.header for each in message.markers if each.action == ADD] if role == MARKERS else [message.header]
+        found: dict[tuple[str, int], Transform] = {}
+        is_inexact = False
+        for given in map(_identify, headers):
+            if given[0] == frame_id or given in found:
+                continue
+            try:
+                found[given] = self._source.look_up(frame_id, *given)
+            except TransformUnavailableError as reason:
+                if not is_overdue:
+                    raise
+                found[given], is_inexact = self._find_newest(frame_id, *given, config.frames.tolerance_s, reason), True
 
-    def _find(self, frame_id: str, header: Any) -> Transform:
+        def place(header: Any) -> tuple[str, Transform]:
+            transform = found.get(_identify(header))
+            return stay(header) if transform is None else (frame_id, transform)
+
+        return place, is_inexact
+
+    def _find_newest(self, target: str, source: str, stamp_ns: int, tolerance_s: float, reason: Exception) -> Transform:
+        """Return the newest transform instead of that for a stamp [ns], if its stamp differs by the tolerance [s] at most."""
         assert self._source is not None
-        return self._source.look_up(frame_id, decode_frame(header), decode_stamp(header))
+        newest = self._source.look_up(target, source, 0)
+        late_s = (stamp_ns - newest.stamp_ns) / NANOSECONDS
+        if abs(late_s) > tolerance_s:
+            text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
+            raise TransformUnavailableError(f'{text} (frames.tolerance_s is {tolerance_s:g})') from None
+        return newest
 
-    def _find_newest(self, frame_id: str, tolerance_s: float, header: Any) -> Transform:
-        """Return the transform for a header or else the newest one, if its stamp differs by the tolerance [s] at most."""
-        try:
-            return self._find(frame_id, header)
-        except TransformUnavailableError as reason:
-            assert self._source is not None
-            newest = self._source.look_up(frame_id, decode_frame(header), 0)
-            late_s = (decode_stamp(header) - newest.stamp_ns) / NANOSECONDS
-            if abs(late_s) > tolerance_s:
-                text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
-                raise TransformUnavailableError(f'{text} (frames.tolerance_s is {tolerance_s:g})') from None
-            return newest
+
+def _identify(header: Any) -> tuple[str, int]:
+    """Return frame and stamp [ns] of a header."""
+    return decode_frame(header), decode_stamp(header)
 
 
 @dataclass
@@ -223,8 +233,7 @@ class TransformTree:
         rotation, position = self._compose(chain, stamp_ns)
         inverse, offset = self._compose(back, stamp_ns)
         inverse = inverse.inv()
-        found = (inverse * rotation).as_quat().tolist(), inverse.apply(position - offset).tolist()
-        return Transform(*(SimpleNamespace(**dict(zip('xyzw', each, strict=False))) for each in found), stamp_ns)
+        return Transform((inverse * rotation).as_matrix(), inverse.apply(position - offset), stamp_ns)
 
     def _list_ancestors(self, name: str) -> list[str]:
         """Return a frame and the frames above it, its parent first."""

@@ -21,8 +21,8 @@ from foc_ros.core.obstacles.shapes import make_hull_polygon
 from foc_ros.core.types import NANOSECONDS, UNKNOWN_HEIGHTS, Array, Obstacles, make_obstacles
 
 from .decode_point_cloud import MAX_ROWS, DecodedCloud
-from .decode_poses import MAX_COORDINATE, check_coordinate, decode_frame, decode_stamp
-from .plane import compute_rotation, make_heights, project, project_box
+from .decode_poses import MAX_COORDINATE, Place, check_coordinate, decode_frame, decode_stamp, stay
+from .plane import Transform, compute_rotation, make_heights, project, project_box
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
 """Actions of a marker."""
@@ -63,7 +63,7 @@ class MarkerTable:
     stamp_ns: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
 
-    def with_message(self, message: Any, now_ns: int, plane: str, radius_stddev: float) -> MarkerTable:
+    def with_message(self, message: Any, now_ns: int, plane: str, radius_stddev: float, place: Place = stay) -> MarkerTable:
         """Return the table after a MarkerArray.
 
         now_ns: start of the lifetime of an unstamped marker; 0 if unknown, and the marker does not expire. radius_stddev: [m].
@@ -92,11 +92,11 @@ class MarkerTable:
             elif marker.action == DELETE or reason == 'not_a_shape':
                 held.pop(key, None)
             elif reason is None:
-                given = decode_frame(marker.header)
+                given, transform = place(marker.header)
                 if held and given != frame_id:
                     raise MessageError(f'{name}.header.frame_id', f"'{frame_id}', as the other markers", f"'{given}'")
                 frame_id = given
-                outline = _outline_marker(marker, name, plane)
+                outline = _outline_marker(marker, name, plane, transform)
                 held[key] = outline, radius_stddev, _find_expiry(marker, name, stamp_ns or now_ns)
         if len(held) > MAX_ROWS:
             raise MessageError('markers', f'at most {MAX_ROWS} obstacles held at a time', len(held))
@@ -126,14 +126,15 @@ def _find_reason_to_drop(marker: Any) -> str | None:
     return None if all(map(math.isfinite, numbers)) else 'not_finite'
 
 
-def _outline_marker(marker: Any, name: str, plane: str) -> Outline:
-    place, size = _read(marker.pose.position, 'xyz'), _read(marker.scale, 'xyz')
-    for axis, value, length in zip('xyz', place, size, strict=True):
+def _outline_marker(marker: Any, name: str, plane: str, transform: Transform) -> Outline:
+    position, size = transform.apply(_read(marker.pose.position, 'xyz')), _read(marker.scale, 'xyz')
+    for axis, value, length in zip('xyz', position.tolist(), size, strict=True):
         check_coordinate(f'{name}.pose.position.{axis}', value)
         _check_size(f'{name}.scale.{axis}', length)
     if marker.type == BOX:
-        return _outline_box(np.array(place), size, compute_rotation(marker.pose.orientation), plane, f'{name}.scale')
-    centre, height = project(place, plane)
+        rotation = transform.rotation @ compute_rotation(marker.pose.orientation)
+        return _outline_box(Transform(rotation, position), size, plane, f'{name}.scale')
+    centre, height = project(position, plane)
     if marker.type == SPHERE:
         return Outline(centre, POINT, float(max(size)) / 2.0, UNKNOWN_HEIGHTS)
     return Outline(centre, POINT, float(max(size[:2])) / 2.0, make_heights(height, size[2]))
@@ -146,23 +147,12 @@ def _find_expiry(marker: Any, name: str, start_ns: int) -> float:
     return start_ns + lifetime_ns if lifetime_ns and start_ns else math.inf
 
 
-class Pose(NamedTuple):
-    """A place (3,) [m] and a rotation (3, 3)."""
-
-    place: Array
-    rotation: Array
-
-    def apply(self, inner: Pose) -> Pose:
-        """Return a pose that is given relative to this one."""
-        return Pose(self.place + self.rotation @ inner.place, self.rotation @ inner.rotation)
-
-
 @dataclass(frozen=True)
 class CollisionObject:
     """The primitives of an object: kind, dimensions [m] and pose of each relative to the pose of the object."""
 
-    pose: Pose
-    primitives: tuple[tuple[int, tuple[float, ...], Pose], ...]
+    pose: Transform
+    primitives: tuple[tuple[int, tuple[float, ...], Transform], ...]
 
 
 @dataclass(frozen=True)
@@ -177,14 +167,15 @@ class CollisionTable:
     stamp_ns: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
 
-    def with_message(self, message: Any) -> CollisionTable:
+    def with_message(self, message: Any, place: Place = stay) -> CollisionTable:
         """Return the table after a CollisionObject.
 
         ADD replaces an object, APPEND adds primitives to it, MOVE changes its pose, REMOVE removes it, or all if the id is empty.
         Boxes, spheres and cylinders are obstacles; other primitives, meshes and planes are counted. Raises MessageError, and then
         nothing is changed, for a wrong operation, number of dimensions or poses, size or coordinate, or another frame.
         """
-        stamp_ns, frame_id, name = decode_stamp(message.header), decode_frame(message.header), str(message.id)
+        stamp_ns, name = decode_stamp(message.header), str(message.id)
+        frame_id, transform = place(message.header)
         operation = message.operation[0] if isinstance(message.operation, bytes) else int(message.operation)
         held = dict(self.objects)
         if operation == REMOVE:
@@ -194,7 +185,7 @@ class CollisionTable:
             raise MessageError('operation', 'ADD (0), REMOVE (1), APPEND (2) or MOVE (3)', operation)
         if held and frame_id != self.frame_id:
             raise MessageError('header.frame_id', f"'{self.frame_id}', as the other objects", f"'{frame_id}'")
-        pose, dropped = _read_pose('pose', message.pose), Counter[str]()
+        pose, dropped = transform.compose(_read_pose('pose', message.pose)), Counter[str]()
         if operation == MOVE:
             if name not in held:
                 raise MessageError('id', 'an object that was added before it is moved', repr(name))
@@ -210,14 +201,14 @@ class CollisionTable:
     def obstacles(self, plane: str, radius_stddev: float) -> Obstacles:
         """Return the primitives as obstacles; the name of one is the id of its object and its number in it."""
         outlines = {
-            encode_name(name, str(number)): _outline_primitive(kind, size, each.pose.apply(pose), plane)
+            encode_name(name, str(number)): _outline_primitive(kind, size, each.pose.compose(pose), plane)
             for name, each in self.objects.items()
             for number, (kind, size, pose) in enumerate(each.primitives)
         }
         return _collect(outlines, outlines.values(), radius_stddev)
 
 
-def _read_primitives(message: Any, dropped: Counter[str]) -> tuple[tuple[int, tuple[float, ...], Pose], ...]:
+def _read_primitives(message: Any, dropped: Counter[str]) -> tuple[tuple[int, tuple[float, ...], Transform], ...]:
     if len(message.primitive_poses) != len(message.primitives):
         raise MessageError('primitive_poses', f'{len(message.primitives)}, one for each primitive', len(message.primitive_poses))
     dropped['not_a_shape'] += len(message.meshes) + len(message.planes)
@@ -230,52 +221,53 @@ def _read_primitives(message: Any, dropped: Counter[str]) -> tuple[tuple[int, tu
         size = tuple(float(length) for length in primitive.dimensions)
         if len(size) != DIMENSIONS[kind]:
             raise MessageError(name, f'{DIMENSIONS[kind]} numbers for a primitive of type {kind}', len(size))
-        for place, length in enumerate(size):
-            _check_size(f'{name}[{place}]', length)
+        for axis, length in enumerate(size):
+            _check_size(f'{name}[{axis}]', length)
         if not any(size):
             raise MessageError(name, 'a size > 0 m', '0')
         found.append((kind, size, _read_pose(f'primitive_poses[{number}]', pose)))
     return tuple(found)
 
 
-def _outline_primitive(kind: int, size: tuple[float, ...], pose: Pose, plane: str) -> Outline:
+def _outline_primitive(kind: int, size: tuple[float, ...], pose: Transform, plane: str) -> Outline:
     """Return a primitive in the plane: a sphere is a circle of unknown height, a cylinder all within its radius of its axis."""
     if kind == SPHERE:
-        return Outline(project(pose.place, plane)[0], POINT, size[0], UNKNOWN_HEIGHTS)
+        return Outline(project(pose.translation, plane)[0], POINT, size[0], UNKNOWN_HEIGHTS)
     if kind == CYLINDER:
         upright = float(project(pose.rotation[:, 2], plane)[1])
-        ends = pose.place + np.outer([0.5, -0.5], size[0] * pose.rotation[:, 2])
+        ends = pose.translation + np.outer([0.5, -0.5], size[0] * pose.rotation[:, 2])
         extent = size[0] * abs(upright) + 2.0 * size[1] * math.sqrt(max(1.0 - upright**2, 0.0))
-        heights = make_heights(project(pose.place, plane)[1], extent)
+        heights = make_heights(project(pose.translation, plane)[1], extent)
         return Outline(*make_hull_polygon(project(ends, plane)[0]), size[1], heights)
-    return _outline_box(pose.place, size, pose.rotation, plane, 'primitives')
+    return _outline_box(pose, size, plane, 'primitives')
 
 
-def decode_detections(message: Any, plane: str, radius_stddev: float) -> DecodedCloud:
+def decode_detections(message: Any, plane: str, radius_stddev: float, place: Place = stay) -> DecodedCloud:
     """Decode the boxes of a Detection3DArray, the whole scene; the name of one is its id, or its row if it has none.
 
     A detection with a number that is not finite is dropped and counted; of several with one id the last is used. Raises
     MessageError for a negative size, a box without an extent in the plane, a coordinate beyond MAX_COORDINATE, another frame than
     that of the array, or too many detections.
     """
-    stamp_ns, frame_id = decode_stamp(message.header), decode_frame(message.header)
+    stamp_ns, given = decode_stamp(message.header), decode_frame(message.header)
+    frame_id, transform = place(message.header)
     if len(message.detections) > MAX_ROWS:
         raise MessageError('detections', f'at most {MAX_ROWS} obstacles', len(message.detections))
     outlines: dict[str, Outline] = {}
     dropped = Counter[str]()
     for row, each in enumerate(message.detections):
         label, own_frame = f'detections[{row}]', decode_frame(each.header)
-        if own_frame not in ('', frame_id):
-            raise MessageError(f'{label}.header.frame_id', f"'{frame_id}', as the array", f"'{own_frame}'")
+        if own_frame not in ('', given):
+            raise MessageError(f'{label}.header.frame_id', f"'{given}', as the array", f"'{own_frame}'")
         centre, size = each.bbox.center, _read(each.bbox.size, 'xyz')
         if not all(map(math.isfinite, (*_read(centre.position, 'xyz'), *_read(centre.orientation, 'xyzw'), *size))):
             dropped['not_finite'] += 1
             continue
         for axis, length in zip('xyz', size, strict=True):
             _check_size(f'{label}.bbox.size.{axis}', length)
-        name, pose = encode_name(str(each.id) or str(row)), _read_pose(f'{label}.bbox.center', centre)
+        name, pose = encode_name(str(each.id) or str(row)), transform.compose(_read_pose(f'{label}.bbox.center', centre))
         dropped['duplicate_id'] += outlines.pop(name, None) is not None
-        outlines[name] = _outline_box(pose.place, size, pose.rotation, plane, f'{label}.bbox.size')
+        outlines[name] = _outline_box(pose, size, plane, f'{label}.bbox.size')
     obstacles = _collect(outlines, outlines.values(), radius_stddev)
     return DecodedCloud(obstacles, stamp_ns, frame_id, dict(+dropped))
 
@@ -289,11 +281,11 @@ def _read(vector: Any, axes: str) -> list[float]:
     return [getattr(vector, axis) for axis in axes]
 
 
-def _read_pose(name: str, pose: Any) -> Pose:
+def _read_pose(name: str, pose: Any) -> Transform:
     for part, axes in (('position', 'xyz'), ('orientation', 'xyzw')):
         for axis, value in zip(axes, _read(getattr(pose, part), axes), strict=True):
             check_coordinate(f'{name}.{part}.{axis}', value)
-    return Pose(np.array(_read(pose.position, 'xyz'), dtype=float), compute_rotation(pose.orientation))
+    return Transform(compute_rotation(pose.orientation), np.array(_read(pose.position, 'xyz'), dtype=float))
 
 
 def _check_size(name: str, length: float) -> None:
@@ -301,8 +293,8 @@ def _check_size(name: str, length: float) -> None:
         raise MessageError(name, f'a size in [0, {MAX_COORDINATE:g}] m', f'{length:g}')
 
 
-def _outline_box(place: Array, size: Iterable[float], rotation: Array, plane: str, name: str) -> Outline:
-    centre, polygon, heights = project_box(place, [*size], rotation, plane)
+def _outline_box(pose: Transform, size: Iterable[float], plane: str, name: str) -> Outline:
+    centre, polygon, heights = project_box(pose.translation, [*size], pose.rotation, plane)
     if len(polygon) == 1:
         given = ' x '.join(f'{length:g}' for length in size)
         raise MessageError(name, 'a size > 0 m along an axis of the plane', f'{given} m')
