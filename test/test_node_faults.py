@@ -14,7 +14,7 @@ import ros_helpers
 ros_helpers.require_ros()
 
 from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path, list_labels  # noqa: E402
+from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, begin, figures, hand_path, list_labels  # noqa: E402
 from rcl_interfaces.srv import SetParametersAtomically  # noqa: E402
 from ros_helpers import Graph, graph  # noqa: E402
 
@@ -126,8 +126,7 @@ def test_the_newest_valid_scene_of_the_queue_is_used(ros: Graph) -> None:
 
 
 def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
-    bench = Bench(ros, parameters={'scene.timeout_s': 500.0, 'estimator.gap_s': 60.0, 'rate_hz': 0.1})
-    bench.publish_scene()
+    bench = begin(ros, parameters={'scene.timeout_s': 500.0, 'estimator.gap_s': 60.0, 'rate_hz': 0.1})
     bench.move(pose_stamped(TYPES, (0, 0, 0), (10 + 100 * i) * SECOND) for i in range(9))
     status = bench.health()
     assert len(bench.received['prediction']) == 6
@@ -138,9 +137,7 @@ def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
 @pytest.mark.parametrize('is_moving', [True, False])
 def test_stamps_that_repeat_are_no_silence(ros: Graph, is_moving: bool) -> None:
     """As of a clock of whole seconds, and of a driver that repeats its last message."""
-    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.05})
-    bench.publish_scene()
-    bench.move(hand_path(2))
+    bench = begin(ros, 2, parameters={'estimator.hand_timeout_s': 0.05})
     for i in range(1, 12):
         bench.deliver('hand_pose', pose_stamped(TYPES, (0.01 * i * is_moving, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns))
         ros.spin_for(0.01)
@@ -153,9 +150,7 @@ def test_stamps_that_repeat_are_no_silence(ros: Graph, is_moving: bool) -> None:
 
 
 def test_a_pose_without_data_is_a_lost_hand(ros: Graph) -> None:
-    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.05})
-    bench.publish_scene()
-    bench.move(hand_path(2))
+    bench = begin(ros, 2, parameters={'estimator.hand_timeout_s': 0.05})
     for i in range(1, 12):
         lost = pose_stamped(TYPES, (0.0, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns + i * SECOND // 50)
         lost.pose.orientation.w = 0.0
@@ -167,8 +162,7 @@ def test_a_pose_without_data_is_a_lost_hand(ros: Graph) -> None:
 
 
 def test_a_hand_that_does_not_move_is_told(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.publish_scene()
+    bench = begin(ros)
     start = hand_path(1)[0]
     stamp_ns = start.header.stamp.sec * SECOND + start.header.stamp.nanosec
     bench.move(pose_stamped(TYPES, (0.01, 0.0, 0.0), stamp_ns + i * SECOND // 10) for i in range(15))
@@ -295,8 +289,7 @@ def test_a_subscription_that_cannot_receive_an_output_is_named(ros: Graph, wante
 
 
 def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) -> None:
-    bench, poses = Bench(ros), hand_path(20)
-    bench.publish_scene()
+    bench, poses = begin(ros), hand_path(20)
     bench.move(poses[:10])
     assert set_on(bench, foc__eta=0.7, likelihood__beta=1, homotopy__max_candidates=1).successful
     bench.move(poses[10:])
@@ -330,8 +323,7 @@ def test_a_refused_value_changes_nothing_and_names_the_reason(working: Bench, va
 
 
 def test_the_node_predicts_while_parameters_change_with_every_pose(ros: Graph) -> None:
-    bench, poses = Bench(ros), hand_path(40)
-    bench.publish_scene()
+    bench, poses = begin(ros), hand_path(40)
     client = bench.player.create_client(SetParametersAtomically, 'foc/set_parameters_atomically')
     ros.spin_until(client.service_is_ready, 'parameter service')
     futures = []

@@ -18,7 +18,7 @@ tf2_ros = pytest.importorskip('tf2_ros', reason='optional message package: tf2_r
 
 from geometry_msgs.msg import TransformStamped  # noqa: E402
 from message_helpers import SECOND, cloud, obstacle_table  # noqa: E402
-from node_helpers import TYPES, Bench, figures, hand_path  # noqa: E402
+from node_helpers import TYPES, Bench, begin, figures, hand_path  # noqa: E402
 from rclpy.time import Time  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
@@ -45,8 +45,7 @@ def is_followed(ros: Graph, bench: Bench) -> Any:
 
 def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> None:
     """A hand and obstacles in the frame of a camera on a moving arm, each sent before the transform for its stamp."""
-    bench = Bench(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 10.0})
-    bench.publish_scene()
+    bench = begin(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 10.0})
     broadcaster, rows = is_followed(ros, bench), obstacle_table([(0.2, 0.02, 0.0, 0.03)])
     broadcaster.sendTransform(transform('world', 'camera', 10 * SECOND - 1, (0.0, 0.0, 0.0)))
     for i, pose in enumerate(hand_path(40)):

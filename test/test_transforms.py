@@ -13,7 +13,7 @@ import ros_helpers
 ros_helpers.require_ros()
 
 from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import GOALS, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
+from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures, hand_path  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 
@@ -88,9 +88,7 @@ def seen(bench: Bench) -> np.ndarray:
 
 @pytest.mark.usefixtures('tf2')
 def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.publish_scene()
-    bench.move(hand_path(1))
+    bench = begin(ros, 1)
     columns = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'vx', 'vy', 'vz')]
     moving = obstacle_table([(0.2, 0.3, 0.4, 0.05, 1.0, 0.0, 0.0)], columns)
     bench.deliver('obstacles', cloud(TYPES, moving, 10 * SECOND, 'camera'))
@@ -117,9 +115,7 @@ BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', '
 
 @pytest.mark.usefixtures('tf2')
 def test_boxes_are_turned(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.publish_scene()
-    bench.move(hand_path(1))
+    bench = begin(ros, 1)
     bench.deliver('obstacles', cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)], BOX), 10 * SECOND, 'camera'))
     turned = {'z': np.sin(0.15), 'w': np.cos(0.15)}
     cube = marker(TYPES, (0.1, 0.0, 0.0), (0.2, 0.1, 0.05), type=1, frame_id='camera', turned=turned)
@@ -148,9 +144,7 @@ def test_boxes_that_cannot_be_turned_are_refused(ros: Graph, columns: list[Any],
 
 @pytest.mark.usefixtures('tf2')
 def test_rows_that_are_not_finite_are_dropped_from_a_transformed_scene(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.publish_scene()
-    bench.move(hand_path(1))
+    bench = begin(ros, 1)
     table = obstacle_table([(0.2, 0.3, 0.0, 0.05), (np.inf, 0.0, 0.0, 0.05), (3e38, 3e38, 0.0, 0.05), (0.0, 0.0, 0.0, 0.05)])
     table['y'].view('<u4')[3] = 0x7FA00000  # a signalling NaN
     bench.deliver('obstacles', cloud(TYPES, table, 10 * SECOND, 'camera'))
@@ -162,9 +156,7 @@ def test_rows_that_are_not_finite_are_dropped_from_a_transformed_scene(ros: Grap
 
 @pytest.mark.usefixtures('tf2')
 def test_a_frame_unknown_to_tf2_is_refused_with_both_names(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.publish_scene()
-    bench.move(hand_path(1))
+    bench = begin(ros, 1)
     scene = bench.node.pipeline.scene
     bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'))
     assert bench.node.pipeline.scene is scene
@@ -183,9 +175,7 @@ def test_a_wrong_message_in_another_frame_is_refused_with_its_reason(ros: Graph)
 
 @pytest.mark.usefixtures('no_tf2')
 def test_without_tf2_other_frames_are_refused(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.publish_scene()
-    bench.move(hand_path(2))
+    bench = begin(ros, 2)
     bench.wait_for('prediction', 1)
     bench.deliver('goals', pose_array(TYPES, GOALS, 'camera'))
     assert "the working frame 'world', got 'camera'" in figures(bench.health())['last refusal']
