@@ -53,11 +53,11 @@ def test_a_publisher_that_dies_during_a_movement(ros: Graph) -> None:
 
 @pytest.mark.parametrize('topic', ['obstacles', 'obstacle_markers'])
 def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros: Graph, topic: str) -> None:
-    """Three messages of thousands of obstacles for each pose: every pose is received, and predictions continue."""
+    """Three messages of many obstacles for each pose: every pose is received, and predictions continue."""
     if topic == 'obstacles':
         flood = cloud(TYPES, obstacle_table(CROWD), 10 * SECOND)
     else:
-        kept = enumerate(CROWD[:2000])
+        kept = enumerate(CROWD[:400])
         flood = marker_array(TYPES, *[marker(TYPES, row[:3], (0.008,) * 3, id=i, stamp_ns=10 * SECOND) for i, row in kept])
     bench, poses = begin(ros), hand_path(10)
     for pose in poses:
@@ -68,7 +68,7 @@ def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros: Graph, topic: str
     status = bench.health()
     values = figures(status)
     assert (status.level, values['hand_pose refused']) == (OK, '0 of 10')
-    assert int(values['note culled']) > 1000
+    assert int(values['note culled']) > 300
 
 
 @pytest.mark.parametrize(

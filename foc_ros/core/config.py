@@ -222,6 +222,9 @@ class GuidanceConfig:
 
     enabled: bool = _p(False, 'whether the node publishes guidance; without it the node is a predictor only')
     rate_hz: float = _p(200.0, 'updates of guidance per second, independent of the predictions', 'Hz', 1.0, 1000.0)
+    realtime_priority: int = _p(
+        50, 'priority of the thread of guidance under SCHED_FIFO, while it is enabled and if permitted; 0: ordinary', '', 0, 99
+    )
     mode: str = _p(
         'path', 'path: no force along the path, the operator sets the pace; trajectory: also along it', choices=GUIDANCE_MODES
     )

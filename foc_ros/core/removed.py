@@ -24,7 +24,6 @@ REMOVED = {
     'scene.height_stddevs': 'it is 2',
     'foc.algorithm1_delta': 'it is foc.lv_delta',
     'foc.algorithm1_xi': 'it is 1 m^2/s^6, as in the paper',
-    'guidance.realtime_priority': 'the thread of guidance has the priority of the process',
     'guidance.precision_low': 'it is 100 1/m^2',
     'guidance.precision_high': 'it is 2500 1/m^2',
     'guidance.position_stddev': 'it is 2 mm',

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from logging import getLogger
 from queue import SimpleQueue
 from threading import Thread
 from time import monotonic
@@ -57,7 +58,7 @@ class Predictor:
         self._queue: SimpleQueue[tuple[str, Any] | Config | None] = SimpleQueue()
         self._error = ''
         self._recent: deque[Prediction] = deque(maxlen=REMEMBERED)
-        self._guidance = GuidanceLoop(config, self._send_guidance, self._note_error)
+        self._guidance = GuidanceLoop(config, self._send_guidance, self._note_error, getLogger(__name__).warning)
         self._thread = Thread(target=self._run, name='prediction', daemon=True)
 
     def start(self) -> None:

@@ -1,11 +1,13 @@
 """Guidance of the node: updates at `guidance.rate_hz` by the steady clock in a thread of their own, and their topics.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the
-other. While guidance is disabled, the thread waits without updates. The loop needs no ROS; `play` uses it too.
+other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted; while it is
+disabled, the thread waits without updates. The loop needs no ROS; `play` uses it too.
 """
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -28,6 +30,9 @@ from .messages.types import MessageTypes, RclpyTypes
 if TYPE_CHECKING:
     from rclpy.node import Node
 
+REMEDY = 'allow it with `rtprio` in /etc/security/limits.d, or set guidance.realtime_priority to 0'
+LEAST_SLEEP = 0.1
+"""Part of the period that the thread sleeps after an update that was late: it must not keep a processor for itself."""
 ZEROS = 2
 """Number of outputs without any force that are published after the hand has been released."""
 END_S = 1.0
@@ -68,15 +73,22 @@ class GuidanceLoop:
         Called in the thread with each output and the place where it holds.
     report
         Called in the thread with an exception of an update, after which guidance begins anew with a force of zero.
+    warn
+        Called in the thread with a text if it may not have its priority, the first time.
     """
 
     def __init__(
-        self, config: Config, publish: Callable[[GuidanceOutput, Place], None], report: Callable[[Exception], None]
+        self,
+        config: Config,
+        publish: Callable[[GuidanceOutput, Place], None],
+        report: Callable[[Exception], None],
+        warn: Callable[[str], None],
     ) -> None:
         self.newest = Newest(config)
         self.output: GuidanceOutput | None = None
         self.place: Place | None = None
-        self._publish, self._report = publish, report
+        self._publish, self._report, self._warn = publish, report, warn
+        self._priority, self._wanted_priority, self._has_warned = 0, 0, False
         self._state, self._zeros = GuidanceState(), ZEROS
         self._end, self._enabled = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
@@ -127,6 +139,7 @@ class GuidanceLoop:
             'authority': f'{output.authority:.3f}',
             'tank_J': f'{output.tank:.4f}',
             'force_N': f'{float((output.force @ output.force) ** 0.5):.3f}',
+            'realtime_priority': str(self._priority),
         }
 
     def update(self, now_s: float) -> None:
@@ -159,15 +172,32 @@ class GuidanceLoop:
         due_s = monotonic()
         while not self._end.wait(max(due_s - monotonic(), 0.0)):
             if self._zeros >= ZEROS and not self._enabled.is_set():
+                self._set_priority(0)
                 self._enabled.wait()
                 self._state = GuidanceState()
                 continue
+            self._set_priority(self.newest.config.guidance.realtime_priority)
             try:
                 self.update(monotonic())
             except Exception as error:
                 self._state = GuidanceState()
                 self._report(error)
-            due_s = max(due_s + 1.0 / self.newest.config.guidance.rate_hz, monotonic())
+            period_s = 1.0 / self.newest.config.guidance.rate_hz
+            due_s = max(due_s + period_s, monotonic() + LEAST_SLEEP * period_s)
+
+    def _set_priority(self, priority: int) -> None:
+        """Give this thread a priority of SCHED_FIFO, 0 for an ordinary one; threads that it starts have an ordinary one."""
+        if priority == self._wanted_priority:
+            return
+        self._wanted_priority = priority
+        try:
+            policy = (os.SCHED_FIFO if priority else os.SCHED_OTHER) | os.SCHED_RESET_ON_FORK
+            os.sched_setscheduler(0, policy, os.sched_param(priority))
+            self._priority = priority
+        except (OSError, AttributeError) as error:  # Python has these on Linux only
+            if not self._has_warned:
+                self._warn(f'the real-time priority {priority} of guidance is not permitted ({error}): {REMEDY}')
+                self._has_warned = True
 
 
 def _has_ended(output: GuidanceOutput) -> bool:
@@ -193,7 +223,7 @@ class GuidanceTopics:
         self._node = node
         self._thread_types = RclpyTypes()  # messages of the thread of guidance; no other thread uses them
         self.publishers: dict[str, Any] = {}
-        self.loop = GuidanceLoop(config, self._publish_output, report)
+        self.loop = GuidanceLoop(config, self._publish_output, report, node.get_logger().warning)
 
     def create(self) -> None:
         """Create the publishers and begin to update."""

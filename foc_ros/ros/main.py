@@ -87,6 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     while not stop.is_requested and context.ok():
         try:
             executor.spin_once(timeout_sec=SPIN_S)
+            node.rest()
         except ExternalShutdownException:
             break
         except Exception as error:

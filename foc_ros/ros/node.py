@@ -57,6 +57,8 @@ from .worker import Computation, Worker
 
 RETRY_S = 0.01
 """Time between two checks of messages that are held until their transform is known [s]."""
+REST_S = 0.004
+"""Time for which the poses of a fast hand gather before they are taken together [s], that between two poses of a slow one."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
 """Inputs of which each message replaces the one before: of several in the queue, the newest that is accepted is used."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -76,7 +78,7 @@ class FocNode(LifecycleNode):
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
         self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
-        self._has_predicted = False
+        self._has_predicted, self._is_hand_fast, self._hand_s = False, False, 0.0
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._guidance = GuidanceTopics(self, self._live_parameters.config, self.report)
@@ -137,6 +139,15 @@ class FocNode(LifecycleNode):
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Return to the unconfigured state."""
         return self.on_cleanup(state)
+
+    def rest(self) -> None:
+        """Wait after a pose of a fast hand, so that several are taken at once; the end of a prediction ends the wait.
+
+        To wake up for each pose at 1 kHz would cost more than to use it, and would delay the threads of guidance and prediction.
+        """
+        if self._is_hand_fast:
+            self._is_hand_fast = False
+            self._worker.wait(REST_S)
 
     def report(self, error: Exception) -> None:
         """Count and log an internal error."""
@@ -214,6 +225,9 @@ class FocNode(LifecycleNode):
         now_s = monotonic()
         for each in (*messages, *waiting):
             self._transforms.add(role, each, now_s)
+        if role == HAND and messages:
+            self._is_hand_fast = bool(waiting) or now_s - self._hand_s < REST_S / 2.0
+            self._hand_s = now_s
         self._take_released(role)
 
     def _take_held(self) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from time import sleep
 
 from rclpy.node import Node
 
@@ -60,6 +61,13 @@ class Worker:
             return None
         ended, self.present = self.present, None
         return ended
+
+    def wait(self, seconds: float) -> None:
+        """Wait for the end of the present computation, at most for some seconds; for so many if there is none."""
+        if self.present is None:
+            sleep(seconds)
+        else:
+            wait([self.present.result], seconds)
 
     def is_busy_after(self, seconds: float) -> bool:
         """Wait for the present computation for at most so many seconds; return whether it has not ended then."""

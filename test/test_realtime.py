@@ -1,0 +1,118 @@
+"""The real-time priority of the thread of guidance."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from foc_ros.core.config import Config
+from foc_ros.ros.guidance_loop import GuidanceLoop
+from foc_ros.ros.realtime import ThreadPriority
+
+GUIDED = Config().with_values({'guidance.enabled': True, 'guidance.realtime_priority': 7})
+
+
+def run_in_thread(function: Callable[[], Any]) -> Any:
+    """Return what a function returns in a thread of its own."""
+    found: list[Any] = []
+    thread = threading.Thread(target=lambda: found.append(function()))
+    thread.start()
+    thread.join(10.0)
+    return found[0]
+
+
+def get_policy() -> tuple[int, int]:
+    """Return policy and priority of this thread."""
+    return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getparam(0).sched_priority
+
+
+def is_permitted() -> bool:
+    """Return whether a thread of this process may have a real-time priority."""
+    return bool(run_in_thread(lambda: try_priority(7)).priority)
+
+
+def try_priority(priority: int) -> ThreadPriority:
+    """Set the priority of this thread and return it."""
+    tried = ThreadPriority(lambda _: None)
+    tried.set(priority)
+    return tried
+
+
+def test_the_priority_holds_for_the_thread_alone_and_can_be_given_back() -> None:
+    if not is_permitted():
+        pytest.skip('this user may not set a real-time priority (rtprio)')
+
+    def set_and_back() -> list[tuple[int, int]]:
+        priority = try_priority(7)
+        found = [get_policy(), run_in_thread(get_policy)]
+        priority.set(0)
+        return [*found, get_policy()]
+
+    ordinary = os.SCHED_OTHER, 0
+    assert run_in_thread(set_and_back) == [(os.SCHED_FIFO, 7), ordinary, ordinary]
+    assert get_policy() == ordinary
+
+
+@pytest.mark.parametrize('error', [PermissionError(1, 'Operation not permitted'), AttributeError('not on this system')])
+def test_a_priority_that_is_not_permitted_is_told_once(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
+    def refuse(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    told: list[str] = []
+    priority = ThreadPriority(told.append)
+    for each in (0, 50, 50, 60):
+        priority.set(each)
+    assert priority.priority == 0
+    assert len(told) == 1
+    assert all(word in told[0] for word in ('50', 'not permitted', 'rtprio', 'guidance.realtime_priority'))
+
+
+def test_the_thread_of_guidance_has_it_while_guidance_is_enabled(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, int]] = []
+    monkeypatch.setattr(
+        os, 'sched_setscheduler', lambda _, __, to: asked.append((threading.current_thread().name, to.sched_priority))
+    )
+    loop = GuidanceLoop(GUIDED, lambda *_: None, lambda _: None, lambda _: None)
+
+    def wait_for(*priorities: int) -> None:
+        end = time.monotonic() + 10.0
+        while asked != [('guidance', each) for each in priorities]:
+            assert time.monotonic() < end, f'asked for {asked}, not for {priorities}'
+            time.sleep(0.001)
+
+    loop.start()
+    try:
+        wait_for(7)
+        loop.reconfigure(Config())
+        wait_for(7, 0)
+        loop.reconfigure(GUIDED)
+        wait_for(7, 0, 7)
+    finally:
+        loop.stop()
+
+
+def test_a_late_update_leaves_the_processor_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread has a priority before all others, so that it must sleep between updates that take longer than their period."""
+    updates: list[tuple[float, float]] = []
+
+    def update_slowly(_: GuidanceLoop, now_s: float) -> None:
+        time.sleep(0.02)  # four periods
+        updates.append((now_s, time.monotonic()))
+
+    monkeypatch.setattr(GuidanceLoop, 'update', update_slowly)
+    loop = GuidanceLoop(GUIDED, lambda *_: None, lambda _: None, lambda _: None)
+    loop.start()
+    end = time.monotonic() + 10.0
+    while len(updates) < 5 and time.monotonic() < end:
+        time.sleep(0.001)
+    loop.stop()
+    assert len(updates) >= 5
+    pauses = [began - ended for (_, ended), (began, _) in itertools.pairwise(updates)]
+    assert min(pauses) > 0.09 / GUIDED.guidance.rate_hz
