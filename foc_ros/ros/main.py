@@ -102,9 +102,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def create_executor(context: Any) -> Any:
-    """Return an executor whose costs do not grow with the number of its topics, where rclpy has it (since 7.1.4).
+    """Return rclpy's executor that is called for each event, where rclpy has it (since 7.1.4), and its plain one elsewhere.
 
-    A hand at 1 kHz costs the other one several times as much (`scripts/stress.py rates`).
+    The plain one looks at every topic, service and timer of the node for each message.
     """
     try:
         from rclpy.experimental.events_executor import EventsExecutor

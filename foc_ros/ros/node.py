@@ -57,8 +57,8 @@ from .worker import Computation, Worker
 
 RETRY_S = 0.01
 """Time between two checks of messages that are held until their transform is known [s]."""
-REST_S = 0.004
-"""Time for which the poses of a fast hand gather before they are taken together [s], that between two poses of a slow one."""
+REST_S, LONGEST_REST_S = 0.004, 0.02
+"""Shortest and longest time for which the poses of a fast hand gather before they are taken together [s]."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
 """Inputs of which each message replaces the one before: of several in the queue, the newest that is accepted is used."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -147,7 +147,8 @@ class FocNode(LifecycleNode):
         """
         if self._is_hand_fast:
             self._is_hand_fast = False
-            self._worker.wait(REST_S)
+            unneeded_s = 0.0 if self.pipeline.config.guidance.enabled else self.pipeline.until_due_s
+            self._worker.wait(min(max(unneeded_s, REST_S), LONGEST_REST_S))
 
     def report(self, error: Exception) -> None:
         """Count and log an internal error."""
