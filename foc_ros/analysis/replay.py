@@ -18,8 +18,7 @@ from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
 from foc_ros.ros.intake import DROPPED, Intake
-from foc_ros.ros.transform_tree import TransformTree
-from foc_ros.ros.transforms import Transforms
+from foc_ros.ros.transforms import Transforms, TransformTree
 
 
 @dataclass(frozen=True)
