@@ -49,7 +49,6 @@ LONG = (
     'test_node_hostile.py::test_a_node_that_is_killed_and_started_again',
     'test_node_hostile.py::test_the_node_keeps_its_promises_in_a_hostile_scene',
     'test_node_process.py::test_a_*work*without_an_error',
-    'test_node_process.py::test_a_node_*every_pose_of_a_tracker',
     'test_node_rates.py::*',
 )
 
