@@ -103,6 +103,16 @@ def test_bad_input_is_refused_with_its_reason_and_changes_nothing(working: Bench
     working.wait_for('prediction', count + 1)
 
 
+def test_bytes_that_are_no_message_are_dropped(working: Bench, poses: Iterator[Any]) -> None:
+    count = len(working.received['prediction'])
+    for role in ('hand_pose', 'obstacles'):
+        working.publishers[role].publish(b'\0\1\0\0junk')
+    working.ros.spin_for(0.1)
+    working.move(islice(poses, 2))
+    working.wait_for('prediction', count + 1)
+    assert 'count internal_errors' not in figures(working.health())
+
+
 def test_dropped_rows_are_reported(ros: Graph) -> None:
     bench = Bench(ros)
     bench.deliver('obstacles', cloud(TYPES, obstacle_table([*ROWS, (NAN, 0, 0, 1)]), 10 * SECOND))
