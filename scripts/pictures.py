@@ -34,14 +34,11 @@ from foc_ros.io.bags import BagReader
 from foc_ros.io.scene_file import guess_path, load_scene
 from foc_ros.reporting import draw
 from foc_ros.reporting.draw import compute_bounds, draw_scene, get_class_style, open_figure, save_figure
+from foc_ros.reporting.figures import draw_snapshot
+from foc_ros.reporting.legend import draw_legend
 from foc_ros.reporting.report import ReportCollector
-from foc_ros.reporting.views import (
-    HandTrajectory,
-    Snapshot,
-    build_candidate_tracks,
-    build_candidate_views,
-    build_hand_trajectory,
-)
+from foc_ros.reporting.tracks import build_candidate_tracks
+from foc_ros.reporting.views import HandTrajectory, Snapshot, build_candidate_views, build_hand_trajectory
 from foc_ros.ros.parameters import dump_parameter_file
 
 sys.path.append(str(ROOT / 'test'))
@@ -84,14 +81,13 @@ def scene(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
     span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
     snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
-    snapshot = snapshot.begin_at(hand.position_at(snapshot.stamp_ns))
     bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
     with open_figure(7.6, 6.6) as figure:
         axes = figure.subplots()
         draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
         draw.draw_candidates(axes, snapshot, draw.number_labels(snapshot.candidates))
         draw.draw_hand(axes, hand, snapshot.stamp_ns, span)
-        draw.draw_legend(axes)
+        draw_legend(axes)
     return figure
 
 
@@ -107,7 +103,6 @@ def pictures(
         rows = np.unique(np.linspace(0, len(tracks.snapshots) - 1, PICTURES).round().astype(int))
         for row in rows:
             snapshot = tracks.snapshots[row]
-            snapshot = snapshot.begin_at(hand.position_at(snapshot.stamp_ns))
             with open_figure(8.4, 4.2) as figure:
                 scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
                 draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
@@ -259,7 +254,7 @@ def classes() -> Figure:
     candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
     with open_figure(7.4, 5.6) as figure:
         snapshot = Snapshot(0, scene.obstacles, scene.goals, candidates, None, hand=scene.hand.mean[:2])
-        draw.draw_snapshot(figure.subplots(), snapshot, compute_bounds(scene.obstacles, scene.goals, candidates))
+        draw_snapshot(figure.subplots(), snapshot, compute_bounds(scene.obstacles, scene.goals, candidates))
     return figure
 
 

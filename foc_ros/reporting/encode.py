@@ -16,7 +16,8 @@ from foc_ros.core.obstacles.geometry import find_limits
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
 
 from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, Span, compute_bounds, compute_ellipse_axes
-from .views import CandidateTracks, CandidateView, HandTrajectory, Snapshot, UnsolvedView
+from .tracks import CandidateTracks
+from .views import CandidateView, HandTrajectory, Snapshot, UnsolvedView
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
 """Units [m], [m/s], [s]."""

@@ -1,5 +1,5 @@
 // The drawing of a scene on a canvas, for reports and for `play`. One line style means one thing: a solid line is a path, dotted one
-// that avoids the obstacles less surely than wanted, dashed a total uncertainty; a pale wide line is a ghost, which is no proper prediction.
+// that is not known to avoid the obstacles as surely as wanted, dashed a total uncertainty; a pale wide line is a ghost, which is no proper prediction.
 'use strict';
 const FULL = 2 * Math.PI;
 const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9'];
@@ -206,7 +206,7 @@ const SIGNS = {
   past: ['<path d="M2 7H26" stroke="var(--ink)" stroke-width="3"/>', 'hand before'],
   later: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="1.5"/>', 'hand later, which was not known to the prediction'],
   path: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="4"/>', 'predicted path, the thicker the more likely'],
-  compromised: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="3" stroke-dasharray="3 4"/>', 'dotted: avoids the obstacles less surely than wanted'],
+  compromised: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="3" stroke-dasharray="3 4"/>', 'dotted: not known to avoid the obstacles as surely as wanted'],
   ghost: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="7" opacity=".3"/>', 'pale: no proper prediction, for the reason beside it'],
   motor: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="#0072B2" fill-opacity=".3" stroke="#0072B2"/>', 'motor noise, which η is about: one standard deviation'],
   total: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="none" stroke="#0072B2" stroke-dasharray="4 3"/>', 'total uncertainty of the most likely path, likewise'],
