@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from browser_helpers import check_report, chromium, screenshot, show
+from browser_helpers import MOVE, check_report, chromium, screenshot, show
 from report_samples import START_NS, predictions, samples
 
 from foc_ros.core.obstacles.geometry import measure_offsets
@@ -135,6 +135,7 @@ def test_a_candidate_can_be_highlighted(browser: Any, report: Path) -> None:
 
 def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_the_pointer(browser: Any, report: Path) -> None:
     show(browser, report / 'index.html')
+    assert browser.execute_script(MOVE, 0) == 0
     paths = browser.execute_script('return report.scene.paths.map((each) => [each.kind, each.text, each.points])')
     assert [kind for kind, _, _ in paths].count('ghost') == 2
     begins = np.array([points[0] for _, _, points in paths])

@@ -15,6 +15,7 @@ from foc_ros.reporting.evaluation_report import _draw_reliability
 from foc_ros.reporting.fit_report import write_report
 
 ANSWER = {
+    'recordings': 2,
     'parameters': {
         'likelihood.beta': {'value': 0.5, 'interval': [0.4, 0.7], 'how': 'classes taken', 'given': 1.0},
         'foc.noise_x': {'value': 0.08, 'interval': [None, None], 'how': 'spread', 'given': 0.05},

@@ -23,7 +23,7 @@ from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 
 from .legend import describe_in_legend
 from .tracks import CandidateTracks
-from .views import COLOURS, SLOTS, CandidateView, HandTrajectory, Snapshot, UnsolvedView
+from .views import COLOURS, LIKELY, SLOTS, CandidateView, HandTrajectory, Snapshot, UnsolvedView
 
 try:
     import matplotlib as mpl
@@ -169,7 +169,8 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
 def draw_candidates(axes: Any, snapshot: Snapshot, slots: Mapping[str, int]) -> None:
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
-    Motor noise is filled; only the most likely candidate has its total uncertainty, too. Ghosts have their reasons beside them.
+    Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
+    has its total uncertainty, too. Ghosts have their reasons beside them.
     """
     ghosts = [(lost.path, describe_in_legend(lost), snapshot.describe_ghost(lost)) for lost in snapshot.unsolved]
     for rank, each in reversed(list(enumerate(snapshot.candidates))):
@@ -179,7 +180,8 @@ def draw_candidates(axes: Any, snapshot: Snapshot, slots: Mapping[str, int]) -> 
             ghosts.append((each.curve, describe_in_legend(each, letter, reason), reason))
         else:
             style = get_candidate_style(slots.get(each.label), each.likelihood, each.is_compromised)
-            _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
+            if rank == 0 or each.likelihood >= LIKELY:
+                _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
             axes.plot(*each.curve.T, zorder=3, label=describe_in_legend(each, letter), **style)
             draw_tag(axes, each.path[int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))], letter, style['color'])
     for number, (curve, label, reason) in enumerate(ghosts):
@@ -246,7 +248,7 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
     if unknown.any():
         look = {'facecolor': 'none', 'edgecolor': '0.6', 'hatch': '////', 'linewidth': 0.0, 'step': 'mid'}
         axes.fill_between(times, 1.0 - unknown, 1.0, label='share of what is unknown', **look)
-        axes.legend(loc='lower left', fontsize=7)
+        axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, frameon=False, fontsize=7)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)
 

@@ -13,11 +13,11 @@ LONGEST_WORDS = 60
 """Number of characters in the words of a class beyond which the legend has its label only."""
 SIZE_PT, NARROW_IN = 8.0, 3.5
 """Size of the text, where there is room for it [pt], and the width below which lines are shorter and signs in one column [in]."""
-COLUMNS, NARROW_COLUMNS = 62, 40
+COLUMNS, NARROW_COLUMNS = 70, 40
 """Characters in a line of a candidate."""
 LABELS_IN = 0.5
 """Height of the labels below axes [in]."""
-LINE = 1.35
+LINE = 1.28
 """Height of a line, in parts of the size of its text."""
 SIGNS = 6
 """Signs of a scene at most, but for those of a hand that moves."""
@@ -54,7 +54,7 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
     is_narrow = width_in < NARROW_IN
     columns = NARROW_COLUMNS if is_narrow else COLUMNS
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    candidates = sorted((label for label in named if '%  ' in label), key=_read_share, reverse=True)
+    candidates = sorted((label for label in named if '%  ' in label), key=lambda label: (-_read_share(label), label))
     signs = [label for label in named if label not in candidates]
     texts = [fill(label, columns, subsequent_indent=' ' * 10) for label in candidates]
     sign_columns = 1 if is_narrow else 2

@@ -26,8 +26,8 @@ from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
 COLOURS, SLOTS = 6, 12
 """Numbers of colours, and of the letters that tell candidates apart: the letters beyond F have the same colours again."""
-NOTED = 0.01
-"""Likelihood from which a candidate is worth mentioning."""
+NOTED, LIKELY = 0.01, 0.05
+"""Likelihoods from which a candidate is worth mentioning, and from which its ellipses are drawn."""
 GRAZE_M = 1e-3
 """Depth [m] up to which a path within an obstacle counts as one along its boundary."""
 Sides = dict[str, int]
@@ -123,6 +123,13 @@ class Snapshot(Record):
     def is_late(self) -> bool:
         """Whether time ran out before a path that is worth mentioning was found to its end."""
         return any(each.status is Status.DEADLINE and each.likelihood >= NOTED for each in self.candidates)
+
+    @property
+    def likely_paths(self) -> float:
+        """Number of likely paths: exp of the entropy of the likelihoods that are at least LIKELY."""
+        shares = np.array([each.likelihood for each in self.candidates if each.likelihood >= LIKELY])
+        shares = shares / max(shares.sum(), LIKELY)
+        return float(np.exp(-(shares * np.log(shares)).sum())) if len(shares) else 0.0
 
     def find_entered(self, view: CandidateView) -> str:
         """Return the name of the first obstacle that a path leads through, empty if it leads through none.
