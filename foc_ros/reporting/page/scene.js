@@ -6,7 +6,9 @@ const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9
 const LIT = '#E69F00';
 const letterOf = (slot) => (slot === null || slot === undefined ? '' : String.fromCharCode(65 + slot));
 const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot % COLOURS.length]);
-const percent = (share) => (share === null ? '' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
+const percent = (share) => (share === null ? '' : share < 0.0005 ? '< 0.1 %' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
+// Likelihood below which a path has no letter: letters of paths that hardly anybody takes would cover the others.
+const NOTED = 0.01;
 // Lengths come as whole tenths of a millimetre, and a list of them as the first value and then the differences.
 const LENGTH = 1e-4;
 const sums = (steps, unit) => { let sum = 0; return steps.map((step) => unit * (sum += step)); };
@@ -149,7 +151,7 @@ class Scene {
     }
     this.trace(path);
     this.stroke(colour, width, compromised ? [1.2 * width, 1.5 * width] : [], alpha);
-    if (slot === null || slot === undefined) return;
+    if (slot === null || slot === undefined || likelihood < NOTED) return;
     this.disc(middle, 9 * this.unit, ink('--page'), { filled: 1, width: 0 });
     this.disc(middle, 9 * this.unit, colour);
     this.text(letterOf(slot), middle, ink('--ink'));
