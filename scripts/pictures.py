@@ -37,8 +37,7 @@ from foc_ros.io.bags import BagReader
 from foc_ros.io.scene_file import guess_path, load_scene
 from foc_ros.reporting import draw
 from foc_ros.reporting.draw import compute_bounds, draw_scene, get_class_style, open_figure, save_figure
-from foc_ros.reporting.figures import draw_snapshot
-from foc_ros.reporting.legend import draw_legend
+from foc_ros.reporting.figures import draw_snapshot, make_moment_figure
 from foc_ros.reporting.report import ReportCollector
 from foc_ros.reporting.tracks import build_candidate_tracks
 from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_candidate_views, build_hand_trajectory
@@ -85,14 +84,7 @@ def scene(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
     span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
     snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
-    bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
-    with open_figure(7.6, 6.2) as figure:
-        axes = figure.subplots()
-        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
-        draw.draw_candidates(axes, snapshot, draw.number_labels(snapshot.candidates))
-        draw.draw_hand(axes, hand, snapshot.stamp_ns, span)
-        draw_legend(axes)
-    return figure
+    return make_moment_figure(hand, snapshot, span)
 
 
 def pictures(

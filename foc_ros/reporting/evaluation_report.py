@@ -53,7 +53,8 @@ EXPLANATIONS = {
     'final': 'this distance at that time alone.',
     'Negative log-density': 'how improbable the true position was. Less is better: both a wrong place and a wrong width count.',
     'inside': 'how often the true position is in the region that should hold this share of them. The share itself is best.',
-    'best setting': 'of what can be fitted. Scores are held out: each recording is scored with what fits the others best.',
+    'held out': 'each recording is scored with the settings that fit the others best, so that none has been learnt by heart.',
+    'best setting': 'the one that fits all recordings best.',
 }
 """What the words in headings and columns mean."""
 

@@ -11,8 +11,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError
 from foc_ros.core.types import NANOSECONDS
 
-from .draw import compute_bounds, draw_candidates, draw_hand, draw_scene, number_labels, open_figure
-from .legend import draw_legend
+from .figures import make_moment_figure
 from .page import render_figure, render_pictures
 from .report import ONSET_SPEED, ReportCollector
 from .views import HandTrajectory, Snapshot, build_hand_trajectory
@@ -21,7 +20,6 @@ MOST_ITEMS = 3_000
 """Messages of a recording that are read at most."""
 ON_THE_WAY = 0.15, 0.6
 """Parts of a movement between which a moment is chosen."""
-WIDTH_IN, HEIGHT_IN = 6.4, 6.0
 FEW = 20
 """Number of recordings below which the page warns."""
 
@@ -57,12 +55,6 @@ def _choose_moment(hand: HandTrajectory, snapshots: list[Snapshot]) -> tuple[Sna
 
 
 def _render_moment(name: str, hand: HandTrajectory, snapshot: Snapshot, span: tuple[int, int]) -> str:
-    bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
-    with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
-        axes = figure.subplots()
-        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
-        draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
-        draw_hand(axes, hand, snapshot.stamp_ns, span)
-        draw_legend(axes)
     seconds = (snapshot.stamp_ns - span[0]) / NANOSECONDS
-    return render_pictures([render_figure(figure, f'{name}, {seconds:.2f} s after the hand began to move.')])
+    caption = f'{name}, {seconds:.2f} s after the hand began to move.'
+    return render_pictures([render_figure(make_moment_figure(hand, snapshot, span), caption)])

@@ -129,6 +129,18 @@ def make_snapshot_figure(hand: HandTrajectory, tracks: CandidateTracks, row: int
     return figure
 
 
+def make_moment_figure(hand: HandTrajectory, snapshot: Snapshot, span: Span) -> Figure:
+    """Return a figure of one snapshot with the hand during a movement, whose start and end [ns] are span."""
+    bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
+    with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
+        axes = figure.subplots()
+        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
+        draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
+        draw_hand(axes, hand, snapshot.stamp_ns, span)
+        draw_legend(axes)
+    return figure
+
+
 def _compute_scene_bounds(snapshot: Snapshot) -> Bounds:
     hand = [] if snapshot.hand is None else [snapshot.hand[None]]
     return compute_bounds(snapshot.obstacles, snapshot.goals, (*snapshot.candidates, *snapshot.unsolved), *hand)
