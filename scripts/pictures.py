@@ -14,6 +14,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +71,7 @@ CURVE = np.arange(0.0, 27.0, 0.1)
 """Points s of the curve with rows at the steps."""
 
 
+@cache
 def replayed() -> tuple[HandTrajectory, list[Snapshot]]:
     """Return the hand's trajectory and all predictions of the recording."""
     collected = ReportCollector()
@@ -123,12 +125,12 @@ def select_likely(snapshot: Snapshot) -> tuple[CandidateView, ...]:
 
 def make_signs() -> list[tuple[Any, str]]:
     """Return what the signs of the animation mean: of each an example, and words."""
-    (colour, _), look = get_class_style(0), {'linestyle': ''}
+    colour, _ = get_class_style(0)
     return [
-        (Line2D([], [], marker='o', color='black', **look), 'hand'),
+        (Line2D([], [], marker='o', color='black', linestyle=''), 'hand'),
         (Line2D([], [], color='black', linewidth=2.0), 'hand before'),
         (Line2D([], [], color='0.55', linewidth=1.4), 'hand later'),
-        (Line2D([], [], marker='*', markersize=12, color='black', markerfacecolor='white', **look), 'goal'),
+        (Line2D([], [], marker='*', markersize=12, color='black', markerfacecolor='white', linestyle=''), 'goal'),
         (Line2D([], [], color=colour, linewidth=3.0), 'predicted path'),
         (Line2D([], [], color=colour, linestyle=':', linewidth=2.0), 'less surely clear'),
         (Patch(facecolor=to_rgba(colour, 0.3), edgecolor=colour), 'its motor noise'),

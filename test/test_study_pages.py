@@ -120,10 +120,12 @@ def test_words_are_explained_once_where_they_stand_first() -> None:
 
 
 def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
-    assert warn_of_few(FEW, 'recordings') == [] and warn_of_few(FEW - 1, 'recordings')[0].startswith(f'Only {FEW - 1} recordings')
+    assert warn_of_few(FEW, 'recordings') == [] and warn_of_few(FEW - 1, 'recordings')[0].startswith(
+        f'Few recordings ({FEW - 1})'
+    )
     write_report(tmp_path, 'x', ANSWER)
     page = (tmp_path / 'fit.html').read_text(encoding='utf-8')
-    assert '<p class="warning">Only 2 recordings' in page and 'held out: scored on' in page
+    assert '<p class="warning">Few recordings (2)' in page and 'held out: scored on' in page
     assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
 
 

@@ -26,7 +26,7 @@ FEW = 20
 
 def warn_of_few(count: int, what: str) -> list[str]:
     """Return a warning where recordings or trials are few."""
-    words = f'Only {count} {what}: intervals are wide, and differences may be chance. {FEW} or more tell more.'
+    words = f'Few {what} ({count}): intervals are wide, and differences may be chance. {FEW} or more tell more.'
     return [words] if count < FEW else []
 
 

@@ -94,7 +94,7 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
         errors = np.maximum(np.abs(bounds.T - means), 0.0)
         axes.errorbar(at, means, errors, fmt='o', markersize=4, capsize=2, color=get_class_style(number)[0], label=rule)
     axes.set_xticks(range(len(operators)), [name.replace('_', '\n') for name in operators])
-    axes.set(ylabel=heading)
+    axes.set(ylabel=heading, xlim=(-0.5, len(operators) - 0.5))
     axes.set_ylim(bottom=0.0)
 
 
