@@ -191,12 +191,6 @@ class HandTrajectory(Record):
         """Return the rows with start_ns <= stamp <= end_ns."""
         return slice(int(np.searchsorted(self.stamps_ns, start_ns)), int(np.searchsorted(self.stamps_ns, end_ns, side='right')))
 
-    def position_at(self, stamp_ns: int) -> Array:
-        """Return the position (2,) [m] at a stamp: the last one until then, the first one before all."""
-        row = int(np.searchsorted(self.stamps_ns, stamp_ns, side='right')) - 1
-        position: Array = self.positions[max(row, 0)]
-        return position
-
     def find_movements(self, onset_speed: float, gap_s: float = 0.15, least_m: float = 0.03) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement.
 
