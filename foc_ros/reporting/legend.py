@@ -17,7 +17,7 @@ COLUMNS, NARROW_COLUMNS = 70, 40
 """Characters in a line of a candidate."""
 LABELS_IN = 0.5
 """Height of the labels below axes [in]."""
-LINE = 1.28
+LINE = 1.35
 """Height of a line, in parts of the size of its text."""
 SIGNS = 6
 """Signs of a scene at most, but for those of a hand that moves."""
