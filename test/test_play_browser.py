@@ -281,8 +281,9 @@ def test_bars_have_the_colours_of_their_paths_and_paths_to_one_goal_differ_in_wo
 
 
 def test_the_status_line_is_not_green_while_something_is_refused(page: Any) -> None:
-    page.execute_script("document.getElementById('record').click(); document.getElementById('fit').disabled = false")
-    click(page, 'fit')
+    click(page, 'record')
+    wait_for(page, "document.getElementById('session').innerText.startsWith('Recording to ')", 'a recording')
+    page.execute_script("document.getElementById('fit').disabled = false; document.getElementById('fit').click()")
     wait_for(page, "document.getElementById('status').className === 'status failing'", 'the status line')
     assert text_of(page, 'status').startswith('refused: job: expected a session that has ended')
     wait_for(page, "document.getElementById('status').className === 'status well'", 'the status line is green again')
