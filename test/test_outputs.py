@@ -15,7 +15,7 @@ from report_samples import START_NS, prediction, predictions, samples, scene
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
 from foc_ros.io.outputs import check_replaceable, check_report
-from foc_ros.reporting.draw import plot_outcomes
+from foc_ros.reporting.figures import plot_outcomes
 from foc_ros.reporting.page import write_page
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
