@@ -10,7 +10,7 @@ from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.scene import ReachingScene
 from foc_ros.core.types import HandState, Status
 
-SCENES = {'optimal': 40, 'lv': 3}
+SCENES = {'optimal': 30, 'lv': 2}
 """Scenes of a batch: `lv` takes a hundred times as long."""
 DURATION_S = 0.9
 

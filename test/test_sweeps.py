@@ -61,11 +61,11 @@ UNSETTLED = {'circles-eta', 'circles-place', 'circles-speed', 'circles-start', '
 @pytest.mark.parametrize('sweep', SWEEPS)
 @pytest.mark.parametrize('scene', SCENES)
 def test_effort_and_likelihood_have_no_jumps(scene, sweep, request):
-    """Of 40 points, no two neighbours differ by more than 3 %, unless bisection shrinks the difference."""
+    """Of 25 points, no two neighbours differ by more than 3 %, unless bisection shrinks the difference."""
     if request.node.callspec.id in UNSETTLED:
         request.applymarker(pytest.mark.xfail(reason='a class does not settle at every point', strict=False))
     low, high, find = SWEEPS[sweep]
-    values = np.linspace(low, high, 40).tolist()
+    values = np.linspace(low, high, 25).tolist()
     answers, jumps = [find(SCENES[scene], value) for value in values], []
     for i in range(len(values) - 1):
         (left, one), (right, other) = (values[i], answers[i]), (values[i + 1], answers[i + 1])
@@ -85,7 +85,7 @@ def test_effort_and_likelihood_have_no_jumps(scene, sweep, request):
 
 @pytest.mark.parametrize('yaw', [0.0, 0.3])
 @pytest.mark.parametrize('radius', [0.0, 0.005], ids=['sharp', 'rounded'])
-@pytest.mark.parametrize('gap_mm', [1, 2, 5, 10, 20, 30])
+@pytest.mark.parametrize('gap_mm', [1, 5, 30])
 def test_beside_a_box_before_a_hand_at_rest_eta_is_met(gap_mm, radius, yaw):
     """However near it is, with all defaults."""
     centre = ((0.02 + radius + gap_mm / 1000) / np.cos(yaw), 0.0)
