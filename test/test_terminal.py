@@ -27,7 +27,7 @@ def find_widest(printed: str) -> int:
     'arguments',
     [
         ['solve', 'scene.yaml', '--monte-carlo', '100'],
-        ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap')],
+        ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'), '--params', 'slow.yaml'],
         ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1'],
         ['evaluate', 'data', '--workers', '1'],
     ],
@@ -38,6 +38,7 @@ def test_the_output_of_a_command_fits(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path('scene.yaml').write_text(SCENE)
+    Path('slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}')
     if 'data' in arguments:
         write_tables(Path('data'), count=2)
     assert main(arguments) == 0
