@@ -13,7 +13,7 @@ from evaluation_samples import reach, write_tables
 from foc_ros.analysis.evaluation.evaluate import find_label_mismatches
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.questions import GAP, PATH_CLASS, ask_all
-from foc_ros.analysis.recordings import find_recordings
+from foc_ros.analysis.recordings import TableRecording, find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
@@ -103,6 +103,15 @@ def test_a_wrong_table_is_named(folder: Path, text: str, words: str) -> None:
     with pytest.raises(RecordingError) as caught:
         find_recordings(folder)
     assert words in str(caught.value)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/hlp_reaching is not there')
+def test_every_recording_of_the_data_set_is_read() -> None:
+    found = find_recordings(SHARED)
+    assert len(found) == 209
+    for each in found.values():
+        assert isinstance(each, TableRecording)
+        assert len(each.scene.boxes) >= 6 and len(each.scene.goals) == 1
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/hlp_reaching is not there')

@@ -71,6 +71,11 @@ def list_commands(clone: Path, target: str) -> str:
     return result.stdout
 
 
+def test_it_says_what_it_does(clone: Path) -> None:
+    told = re.findall(r'echo [\'"](setup: \w+)', list_commands(clone, 'setup'))
+    assert told == ['setup: creating', 'setup: installing', 'setup: ready']
+
+
 def test_linters_and_peers_are_installed_by_their_targets_only(clone: Path) -> None:
     extras = {
         target: re.findall(r"'\.\[([\w,]+)\]'", list_commands(clone, target)) for target in ('setup', 'lint', 'doc', 'bench')

@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED
+from foc_ros.core.errors import InputError
 from foc_ros.reporting.draw import open_figure
 from foc_ros.reporting.evaluation_report import _draw_reliability
 from foc_ros.reporting.fit_report import write_report
@@ -39,6 +40,14 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path: Path) -> 
     assert row in page and 'Better with the fitted parameters: positions in the region of 90 %' in page
     assert '&lt;b&gt;few&lt;/b&gt; recordings' in page and 'x.mcap: no hand' in page
     assert page.count('<img') == 1
+
+
+def test_a_fit_without_parameters_has_tables_only_and_a_folder_that_cannot_be_written_is_rejected(tmp_path: Path) -> None:
+    write_report(tmp_path, 'x', ANSWER | {'parameters': {}})
+    assert '<img' not in (tmp_path / 'fit.html').read_text(encoding='utf-8')
+    (tmp_path / 'file').write_text('mine')
+    with pytest.raises(InputError, match='--report'):
+        write_report(tmp_path / 'file', 'x', ANSWER)
 
 
 BINS = [

@@ -6,15 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from report_samples import START_NS, prediction, samples, scene
+from report_samples import START_NS, prediction, predictions, samples, scene, widen
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.types import LEFT, RIGHT, Prediction, Status, describe_class, make_obstacles
+from foc_ros.core.types import LEFT, RIGHT, HandSample, Prediction, Status, describe_class, make_obstacles
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.views import (
     CandidateView,
     HandTrajectory,
     Snapshot,
+    assign_slots,
+    build_candidate_tracks,
     build_hand_trajectory,
     build_snapshot,
     is_same_prediction,
@@ -48,6 +50,35 @@ def test_a_snapshot_holds_the_numbers_of_its_prediction_and_names_classes_in_wor
     one = build_snapshot(replace(made, goals=made.goals[:1]))
     assert [each.description for each in (*one.candidates[:1], *one.unsolved)] == ['left of 1', 'left of 1, left of post']
     assert describe_class(()) == 'direct'
+
+
+def test_the_unknown_share_is_that_of_the_prediction() -> None:
+    assert build_snapshot(replace(prediction(START_NS, NOWHERE), unknown=0.25)).unknown_share == 0.25
+
+
+def test_the_motor_noise_is_kept_beside_the_total_uncertainty() -> None:
+    made = prediction(START_NS, NOWHERE)
+    assert not build_snapshot(made).candidates[0].is_widened
+    view = build_snapshot(widen(made)).candidates[0]
+    assert view.is_widened
+    np.testing.assert_array_equal(view.covariance, 3.0 * view.motor_covariance)
+
+
+def test_a_trajectory_leaves_late_samples_out_and_knows_where_the_hand_was() -> None:
+    made = samples()
+    hand = build_hand_trajectory([*made[:20], made[5], made[19], *made[20:]])
+    assert list(hand.stamps_ns) == [sample.stamp_ns for sample in made]
+    for stamp_ns, row in ((made[0].stamp_ns - 5, 0), (made[70].stamp_ns + 1, 70), (made[-1].stamp_ns, -1)):
+        np.testing.assert_array_equal(hand.position_at(stamp_ns), made[row].position)
+
+
+def test_velocity() -> None:
+    stamps = START_NS + np.cumsum(np.random.default_rng(1).integers(5, 80, 40)) * 1_000_000
+    positions = np.outer((stamps - START_NS) * 1e-9, [0.3, -0.2])
+    np.testing.assert_allclose(HandTrajectory(stamps, positions).velocity, np.tile([0.3, -0.2], (40, 1)), atol=1e-9)
+    np.testing.assert_array_equal(build_hand_trajectory([HandSample(5, np.ones(2))]).velocity, np.zeros((1, 2)))
+    empty = build_hand_trajectory([])
+    assert (empty.velocity.shape, empty.find_movements(0.05)) == ((0, 2), [])
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none() -> None:
@@ -117,3 +148,40 @@ def snapshot(number: int, *labels: str, goals: tuple[tuple[float, float], ...] =
 )
 def test_a_label_is_split_into_goal_and_sides(label: str, goal: str, sides: dict[str, int]) -> None:
     assert parse_label(label, IDS) == (goal, sides)
+
+
+def test_simultaneous_tracks_have_different_letters_and_different_colours_while_there_are_any() -> None:
+    """With fewer slots than tracks, the least likely of the tracks that begin together have none."""
+    labels = ('goal0:+1', 'goal0:-1', 'goal1:+1', 'goal1:-1', 'goal1:-12')
+    snapshots = [snapshot(number, *labels[number % 3 : number % 3 + 3]) for number in range(12)]
+    tracks = build_candidate_tracks(snapshots).tracks
+    for count in (2, 3, 5):
+        slots = assign_slots(snapshots, tracks, count, count)
+        assert set(slots.values()) == set(range(count))
+        for numbers in tracks:
+            used = [slots[track] for track in numbers.values() if track in slots]
+            assert len(used) == len(set(used))
+    assert list(assign_slots(snapshots, tracks, 5, 5).values())[:3] == [0, 1, 2]
+    snapshots = [snapshot(0, *labels[:2]), snapshot(1, labels[0]), snapshot(2, labels[0], labels[2]), snapshot(3, *labels[:4])]
+    tracks = build_candidate_tracks(snapshots).tracks
+    slots = assign_slots(snapshots, tracks, 6, 3)
+    assert [slots[track] for track in tracks[2].values()] == [0, 2]
+    assert len({slots[track] % 3 for track in list(tracks[3].values())[:3]}) == 3
+
+
+def test_a_letter_is_reused_as_late_as_possible() -> None:
+    alone = [snapshot(number, f'goal{number}:+1') for number in (0, 51, 102, 153)]
+    tracks = build_candidate_tracks(alone).tracks
+    assert list(assign_slots(alone, tracks, 3, 3).values()) == [0, 1, 2, 0]
+
+
+def test_tracks_are_numbered_from_0_whatever_the_classes_are_called() -> None:
+    """The rows of a report's tracks are their numbers, and its recording may begin after the classes were numbered."""
+    renamed = [
+        replace(each, candidates=tuple(replace(view, way=view.way + 70) for view in each.candidates))
+        for each in (snapshot(0, 'goal0:+1', 'goal0:-1'), snapshot(1, 'goal0:-1', 'goal1:'))
+    ]
+    tracks = build_candidate_tracks(renamed)
+    assert [dict(each) for each in tracks.tracks] == [{'goal0:+1': 0, 'goal0:-1': 1}, {'goal0:-1': 1, 'goal1:': 2}]
+    assert list(tracks.likelihoods()) == [0, 1, 2]
+    assert [build_snapshot(each).stamp_ns for each in predictions(samples())] == [each.stamp_ns for each in samples()[::4]]
