@@ -1,4 +1,4 @@
-"""The packaged recording equals the output of its script, is small, and can be read by other tools."""
+"""The packaged recording equals the output of its script."""
 
 from __future__ import annotations
 

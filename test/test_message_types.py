@@ -1,4 +1,4 @@
-"""Messages made for rclpy and for rosbags: the same fields, the right containers, and the same bytes."""
+"""Messages made for rclpy and for rosbags have the same bytes, and stamps stay in range."""
 
 from __future__ import annotations
 

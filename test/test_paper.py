@@ -1,4 +1,4 @@
-"""`examples/paper`: trends appear, files are reproducible, and an output that cannot be written is rejected."""
+"""`examples/paper`: the trends appear, the files hold the numbers, and an output that cannot be written is rejected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The search for classes under a deadline: it returns what it has, goals take turns, and steady candidates stay."""
+"""The search for classes under a deadline: it returns what it has, goals take turns, and candidates of before stay."""
 
 import numpy as np
 from homotopy_scenes import CLEARANCE, find

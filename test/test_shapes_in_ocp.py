@@ -1,4 +1,4 @@
-"""Boxes, capsules and hulls in the optimal control problem: noisy movements, shapes that are the same, frames, derivatives."""
+"""Boxes, capsules and hulls in the optimal control problem: noisy movements, shapes that are the same, and a moving frame."""
 
 from dataclasses import replace
 from statistics import NormalDist
