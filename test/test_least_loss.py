@@ -45,7 +45,8 @@ def test_an_infinite_shortfall_is_the_rule_of_the_paper(case, strategy):
 
 
 @EVERY
-def test_where_the_wanted_eta_is_cheap_it_is_met_with_the_same_effort(strategy):
+def test_a_cheap_eta_is_met_with_the_same_effort_and_a_compromise_costs_no_more_than_what_it_gains(strategy):
+    """log J / J_0 <= shortfall / beta (k_wanted - k_0), J_0 and k_0 those of the least effort."""
     kinds = []
     for problem, guess in scenes(12):
         hard = solve_problem(
@@ -57,17 +58,10 @@ def test_where_the_wanted_eta_is_cheap_it_is_met_with_the_same_effort(strategy):
             assert soft.effort == pytest.approx(hard.effort, rel=1e-6)
         elif hard.status is Status.SOLVED:
             assert loss(soft, problem) < loss(hard, problem)
+        if soft.status is Status.COMPROMISED:
+            least = solve_problem(problem, cold_start(guess), FocConfig(strategy='fixed', tau=0.0, lam=1.0))
+            gained = problem.wanted_k - least.safety_factor
+            assert math.log(soft.effort / least.effort) <= SOFT.shortfall / SOFT.beta * gained + 1e-6
     assert {soft for hard, soft in kinds if hard is Status.ETA_UNREACHABLE} == {Status.COMPROMISED}
     assert kinds.count((Status.SOLVED, Status.SOLVED)) >= 4
     assert kinds.count((Status.SOLVED, Status.COMPROMISED)) >= 1
-
-
-@EVERY
-def test_a_compromise_costs_no_more_than_what_it_gains(strategy):
-    """log J / J_0 <= shortfall / beta (k_wanted - k_0), J_0 and k_0 those of the least effort."""
-    for problem, guess in scenes(12):
-        found = solve_problem(problem, cold_start(guess), SETTINGS[strategy])
-        least = solve_problem(problem, cold_start(guess), FocConfig(strategy='fixed', tau=0.0, lam=1.0))
-        if found.status is Status.COMPROMISED:
-            gained = problem.wanted_k - least.safety_factor
-            assert math.log(found.effort / least.effort) <= SOFT.shortfall / SOFT.beta * gained + 1e-6
