@@ -13,7 +13,7 @@ from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.guidance.limits import find_largest_force
 
-FEW, BATCH, BATCHES = 100, 2500, 4
+FEW, BATCH, BATCHES = 200, 2500, 4
 
 
 def check_bounds(run) -> None:
