@@ -69,7 +69,7 @@ ifneq ($(origin PYTHON),file)
 	@$(CHECK_PYTHON)
 	@test "$$($(BIN)/python -V)" = "$$($(PYTHON) -V)" || { echo "make: .venv is $$($(BIN)/python -V), not $$($(PYTHON) -V): make clean first" >&2; exit 1; }
 endif
-	@echo 'setup: ready'
+	@echo 'setup: ready; next: make demo'
 
 $(STAMP): setup.py setup.cfg pyproject.toml
 	@$(CHECK_PYTHON)

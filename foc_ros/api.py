@@ -115,7 +115,7 @@ class Prediction(types.Prediction):
         matplotlib.axes.Axes
             The axes that hold the drawing.
         """
-        from foc_ros.reporting.draw import plot_prediction
+        from foc_ros.reporting.figures import plot_prediction
 
         return plot_prediction(self, axes)
 

@@ -13,13 +13,17 @@ import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch
 from page import IMAGES, ROOT
 
 import foc_ros
@@ -34,14 +38,10 @@ from foc_ros.io.bags import BagReader
 from foc_ros.io.scene_file import guess_path, load_scene
 from foc_ros.reporting import draw
 from foc_ros.reporting.draw import compute_bounds, draw_scene, get_class_style, open_figure, save_figure
+from foc_ros.reporting.figures import draw_snapshot, make_moment_figure
 from foc_ros.reporting.report import ReportCollector
-from foc_ros.reporting.views import (
-    HandTrajectory,
-    Snapshot,
-    build_candidate_tracks,
-    build_candidate_views,
-    build_hand_trajectory,
-)
+from foc_ros.reporting.tracks import build_candidate_tracks
+from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_candidate_views, build_hand_trajectory
 from foc_ros.ros.parameters import dump_parameter_file
 
 sys.path.append(str(ROOT / 'test'))
@@ -55,8 +55,9 @@ MOVEMENT, AFTER_S = 5, 0.02
 """The movement, counted from 1, and the time after its beginning [s] of the scene: early, with several candidates."""
 SHOWN_MOVEMENTS = (0, 4, 6)
 """Rows of the movements of the recording that the animation shows."""
-PICTURES, LAST_MS, STEP_MS, COLOURS = 22, 900, 110, 128
-"""Pictures of a movement, durations of the last and of each other picture [ms], about a third of the real speed; colours."""
+PICTURES, LAST_MS, STEP_MS, COLOURS, SHOWN = 18, 1200, 140, 96, 0.02
+"""Pictures of a movement, durations of the last and of each other picture [ms], about a third of the real speed; colours; least
+likelihood of a path that the animation shows."""
 STEPS, GOAL = 50, np.array([0.3, 0.0])
 NOISE = 0.1
 CIRCLE = foc_ros.Circle((0.15, -0.01), radius=0.03, radius_stddev=0.003)
@@ -70,6 +71,7 @@ CURVE = np.arange(0.0, 27.0, 0.1)
 """Points s of the curve with rows at the steps."""
 
 
+@cache
 def replayed() -> tuple[HandTrajectory, list[Snapshot]]:
     """Return the hand's trajectory and all predictions of the recording."""
     collected = ReportCollector()
@@ -84,15 +86,7 @@ def scene(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
     span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
     snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
-    snapshot = snapshot.begin_at(hand.position_at(snapshot.stamp_ns))
-    bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
-    with open_figure(7.6, 6.6) as figure:
-        axes = figure.subplots()
-        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
-        draw.draw_candidates(axes, snapshot, draw.number_labels(snapshot.candidates))
-        draw.draw_hand(axes, hand, snapshot.stamp_ns, span)
-        draw.draw_legend(axes)
-    return figure
+    return make_moment_figure(hand, snapshot, span)
 
 
 def pictures(
@@ -103,13 +97,14 @@ def pictures(
     goals = np.unique(np.concatenate([each.goals for each in snapshots]), axis=0)
     bounds = compute_bounds(snapshots[0].obstacles, goals, (), hand.positions)
     for start_ns, end_ns in (spans[number] for number in chosen):
-        tracks = build_candidate_tracks([each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.candidates])
+        during = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.candidates]
+        tracks = build_candidate_tracks([replace(each, candidates=select_likely(each)) for each in during])
         rows = np.unique(np.linspace(0, len(tracks.snapshots) - 1, PICTURES).round().astype(int))
         for row in rows:
             snapshot = tracks.snapshots[row]
-            snapshot = snapshot.begin_at(hand.position_at(snapshot.stamp_ns))
-            with open_figure(8.4, 4.2) as figure:
+            with open_figure(8.4, 4.5) as figure:
                 scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
+                scene.grid(False)
                 draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
                 draw.draw_candidates(scene, snapshot, tracks.slots_at(row))
                 draw.draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
@@ -117,7 +112,32 @@ def pictures(
                 limits = (0.0, (end_ns - start_ns) / NANOSECONDS)
                 shares.set(xlim=limits, xlabel='time [s]', title='likelihood of each candidate', ylabel='')
                 shares.tick_params(labelbottom=True)
+                if shares.get_legend():
+                    shares.get_legend().remove()
+                figure.legend(*zip(*make_signs(), strict=True), loc='outside lower center', ncols=5, frameon=False, fontsize=9)
             yield figure, STEP_MS if row != rows[-1] else LAST_MS
+
+
+def select_likely(snapshot: Snapshot) -> tuple[CandidateView, ...]:
+    """Return the candidates that the animation shows."""
+    return tuple(each for each in snapshot.candidates if each.likelihood >= SHOWN)
+
+
+def make_signs() -> list[tuple[Any, str]]:
+    """Return what the signs of the animation mean: of each an example, and words."""
+    colour, _ = get_class_style(0)
+    return [
+        (Line2D([], [], marker='o', color='black', linestyle=''), 'hand'),
+        (Line2D([], [], color='black', linewidth=2.0), 'hand before'),
+        (Line2D([], [], color='0.55', linewidth=1.4), 'hand later'),
+        (Line2D([], [], marker='*', markersize=12, color='black', markerfacecolor='white', linestyle=''), 'goal'),
+        (Line2D([], [], color=colour, linewidth=3.0), 'predicted path'),
+        (Line2D([], [], color=colour, linestyle=':', linewidth=2.0), 'less surely clear'),
+        (Patch(facecolor=to_rgba(colour, 0.3), edgecolor=colour), 'its motor noise'),
+        (Patch(fill=False, edgecolor=colour, linestyle='--'), 'all uncertainty'),
+        (Patch(facecolor='0.65', edgecolor='0.35'), 'obstacle'),
+        (Patch(facecolor='none', edgecolor='0.6', hatch='////', linewidth=0.0), 'unknown'),
+    ]
 
 
 def save_animation(drawn: list[tuple[Figure, int]], file: Path) -> None:
@@ -127,11 +147,15 @@ def save_animation(drawn: list[tuple[Figure, int]], file: Path) -> None:
     images = []
     for figure, _ in drawn:
         buffer = io.BytesIO()
-        figure.savefig(buffer, format='png', dpi=80)
-        images.append(Image.open(buffer).convert('RGB').quantize(COLOURS, dither=Image.Dither.NONE))
-    images[0].save(
-        file, save_all=True, append_images=images[1:], duration=[duration_ms for _, duration_ms in drawn], loop=0, optimize=True
-    )
+        figure.savefig(buffer, format='png', dpi=96)
+        images.append(Image.open(buffer).convert('RGB'))
+    every = Image.new('RGB', (images[0].width, images[0].height * len(images)))
+    for row, image in enumerate(images):
+        every.paste(image, (0, row * image.height))
+    palette = every.quantize(COLOURS, dither=Image.Dither.NONE)  # one for all, so that what stays the same takes no room
+    first, *others = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    durations = [duration_ms for _, duration_ms in drawn]
+    first.save(file, save_all=True, append_images=others, duration=durations, loop=0, optimize=True)
 
 
 def api() -> Figure:
@@ -139,8 +163,9 @@ def api() -> Figure:
     found = re.search(r'^```python\n(.*?)^```', (ROOT / 'README.md').read_text('utf-8'), re.MULTILINE | re.DOTALL)
     if found is None:
         raise ValueError('README.md shows no Python code')
-    names: dict[str, object] = {}
-    exec(compile(found.group(1), 'README.md', 'exec'), names)
+    # without a time limit the picture does not depend on how busy the computer is
+    code, names = found.group(1).replace('foc_ros.Config()', 'foc_ros.Config(budget_s=0.0)'), dict[str, object]()
+    exec(compile(code, 'README.md', 'exec'), names)
     axes: Any = names['axes']
     figure: Figure = axes.figure
     return figure
@@ -259,7 +284,7 @@ def classes() -> Figure:
     candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
     with open_figure(7.4, 5.6) as figure:
         snapshot = Snapshot(0, scene.obstacles, scene.goals, candidates, None, hand=scene.hand.mean[:2])
-        draw.draw_snapshot(figure.subplots(), snapshot, compute_bounds(scene.obstacles, scene.goals, candidates))
+        draw_snapshot(figure.subplots(), snapshot, compute_bounds(scene.obstacles, scene.goals, candidates))
     return figure
 
 

@@ -37,11 +37,6 @@ def random_scene(rng: np.random.Generator, n: int, spread: float = 0.12) -> Obst
             return make_obstacles(centre, radius)
 
 
-def patterns(found: Search, ids: tuple[str, ...]) -> dict[tuple[int, ...], float]:
-    """Length by the sides of all obstacles, which all have to be in the names."""
-    return {tuple(dict(one.sides)[identity] for identity in ids): one.length for one in found.candidates}
-
-
 def gap_to_circles(path: np.ndarray, obstacles: Obstacles, clearance: float = CLEARANCE) -> float:
     """Least distance of a path's points from the circles with the clearance [m]."""
     apart = np.hypot(*(path[:, None] - obstacles.centre).transpose(2, 0, 1)) - obstacles.radius - clearance

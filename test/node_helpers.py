@@ -126,6 +126,14 @@ class Bench:
         return [array.status[0] for array in self.diagnostics if array.status[0].hardware_id == own]
 
 
+def begin(ros: Graph, poses: int = 0, **options: Any) -> Bench:
+    """Return a bench whose node has the scene and has taken so many hand poses."""
+    bench = Bench(ros, **options)
+    bench.publish_scene()
+    bench.move(hand_path(poses))
+    return bench
+
+
 def list_labels(table: Any) -> list[str]:
     """Return the labels of the candidates in a table of likelihoods, without the shares that none has."""
     return [label for label in table.layout.dim[0].label.split(';') if label not in ('', UNKNOWN, OTHER)]

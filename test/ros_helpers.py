@@ -49,13 +49,14 @@ class Graph:
 
     def __init__(self, domain: int, args: list[str] | None = None) -> None:
         import rclpy
-        from rclpy.executors import SingleThreadedExecutor
         from rclpy.signals import SignalHandlerOptions
+
+        from foc_ros.ros.main import create_executor
 
         self.domain = domain
         self.context = rclpy.Context()
         rclpy.init(context=self.context, args=args or [], domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor = create_executor(self.context)
         self.nodes: list[Any] = []
 
     @property

@@ -24,20 +24,3 @@ def test_the_page_shows_the_main_measurements_with_their_pictures():
     for picture in ('guarantee', 'effort_over_eta'):
         assert f'(images/{picture}.png)' in text
         assert (page.IMAGES / f'{picture}.png').is_file()
-
-
-def test_replacing_a_block_leaves_the_rest_of_the_page_unchanged():
-    text = PAGE.read_text(encoding='utf-8')
-    table = page.format_table(['a', 'b'], [['1', '2']])
-    assert table == '| a | b |\n| --- | --- |\n| 1 | 2 |'
-    once = page.replace_blocks(text, {'bounds': table})
-    assert page.find_blocks(once) == page.find_blocks(text) | {'bounds': f'\n{table}\n\n'}
-    assert page.replace_blocks(once, {'bounds': page.find_blocks(text)['bounds'].strip()}) == text
-
-
-def test_a_result_without_a_block_is_printed_and_not_lost(tmp_path, capsys):
-    file = tmp_path / 'page.md'
-    file.write_text('<!-- measured: speed -->\n<!-- end -->\n', encoding='utf-8')
-    page.write_blocks({'speed': 'fast', 'size': 'small'}, file)
-    assert file.read_text('utf-8') == '<!-- measured: speed -->\n\nfast\n\n<!-- end -->\n'
-    assert 'size\nsmall\n' in capsys.readouterr().out

@@ -37,7 +37,7 @@ def test_goals_have_names_and_likelihoods(predicted: foc_ros.Prediction) -> None
     for row, goal in enumerate(predicted.goals):
         shares = [each.likelihood for each in predicted if each.candidate.goal == row]
         assert goal.likelihood == pytest.approx(sum(shares))
-    assert bowl.likelihood + other.likelihood + predicted.unknown == pytest.approx(1.0)
+    assert bowl.likelihood + other.likelihood + predicted.unknown + predicted.other == pytest.approx(1.0)
     words = {each.candidate.goal: each.description.partition(':')[0] for each in predicted}
     assert words == {0: 'bowl', 1: 'goal1'}, 'labels number the goals, words name them'
     assert all(each.label.startswith(f'goal{each.candidate.goal}:') for each in predicted)

@@ -13,14 +13,10 @@ from assistance_rules import (
     ASSISTANCE_N,
     FULL_FORCE_M,
     INFLUENCE_M,
-    RATIONALITY,
     RIVALS,
-    GoalInference,
-    compute_blending_force,
     compute_field_force,
-    compute_hindsight_force,
 )
-from test_simulation import GOALS, QUICK, cross
+from test_simulation import QUICK
 
 from foc_ros.analysis.simulation import NOISY
 from foc_ros.analysis.simulation.operators import DT, draw_task
@@ -29,33 +25,6 @@ from foc_ros.core.types import make_obstacles
 
 STUDY = Path(__file__).parents[1] / 'benchmarks' / 'assistance.py'
 POST = make_obstacles([(0.0, 0.0)], [0.02])
-
-
-def test_goals_at_the_same_distance_are_equally_likely_until_the_hand_turns() -> None:
-    inference = GoalInference(GOALS, np.zeros(2))
-    assert inference.update(np.array([0.05, 0.0])) == pytest.approx([0.5, 0.5])
-    assert inference.update(np.array([0.06, 0.01]))[0] > 0.5
-
-
-def test_a_detour_costs_a_goal_its_likelihood() -> None:
-    goals = np.array([[0.3, 0.0], [-0.3, 0.0]])
-    probabilities = GoalInference(goals, np.zeros(2)).update(np.array([0.02, 0.0]))
-    assert probabilities[1] / probabilities[0] == pytest.approx(np.exp(-RATIONALITY * 0.04))
-
-
-def test_hindsight_is_the_mean_of_the_policies() -> None:
-    assert compute_hindsight_force(np.array([0.3, 0.0]), GOALS, np.array([0.5, 0.5])) == pytest.approx([0.0, 0.0], abs=1e-12)
-    alone = compute_hindsight_force(np.zeros(2), np.array([[0.3, 0.0]]), np.ones(1))
-    assert alone == pytest.approx([ASSISTANCE_N, 0.0])
-    weighted = compute_hindsight_force(np.array([0.3, 0.0]), GOALS, np.array([0.75, 0.25]))
-    assert weighted == pytest.approx([0.0, 0.5 * ASSISTANCE_N])
-
-
-@pytest.mark.parametrize(('lead', 'share'), [(0.0, 0.0), (0.2, 0.0), (0.4, 0.5), (0.6, 1.0), (1.0, 1.0)])
-def test_blending_begins_and_is_complete_at_its_confidences(lead: float, share: float) -> None:
-    probabilities = np.array([0.5 + lead / 2, 0.5 - lead / 2])
-    force = compute_blending_force(np.array([0.3, 0.0]), GOALS, probabilities)
-    assert force == pytest.approx([0.0, share * ASSISTANCE_N], abs=1e-9)
 
 
 def test_the_potential_field_pushes_outward_within_its_influence_only() -> None:
@@ -78,10 +47,6 @@ def test_every_rule_keeps_force_and_slew_within_the_limits(rule: str) -> None:
     sizes = np.hypot(*trial.assistance.T)
     assert 0.0 < sizes.max() <= QUICK.guidance.f_max + 1e-9
     assert np.hypot(*np.diff(trial.assistance, axis=0).T).max() <= QUICK.guidance.slew * DT + 1e-9
-
-
-def test_a_rule_without_reason_leaves_the_hand_alone() -> None:
-    assert not RIVALS['potential_field'](cross(), QUICK).update(0, np.zeros(2)).any()
 
 
 def run_study(*options: str) -> subprocess.CompletedProcess[str]:

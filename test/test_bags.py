@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from bag_helpers import START_NS, TYPES, messages, write_bag, write_by_rosbags, write_mcap
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin
 
 from foc_ros.analysis.recordings import BagRecording
 from foc_ros.core.errors import FocWarning, RecordingError
@@ -57,13 +57,6 @@ def test_sqlite_bags_are_read_like_mcap_bags(tmp_path: Path, whole: bool) -> Non
     assert_same([item for item in items if item.topic == '/hand_pose'], [each for each in messages() if each[0] == '/hand_pose'])
 
 
-def test_other_topics_are_skipped_and_counted(tmp_path: Path) -> None:
-    extra = TYPES.make('std_msgs/msg/String', data='hello')
-    bag = write_bag(tmp_path / 'more', [*messages(), ('/log', START_NS + 10**9, extra)])
-    with BagReader(bag) as reader:
-        assert len(list(reader)) == reader.message_count - 1
-
-
 def test_channels_that_are_not_needed_may_be_anything(tmp_path: Path) -> None:
     """A JSON channel, one without a definition, the events of a service, and a definition that cannot be parsed."""
     odd = {
@@ -74,14 +67,6 @@ def test_channels_that_are_not_needed_may_be_anything(tmp_path: Path) -> None:
     }
     write_mcap(tmp_path / 'mixed.mcap', messages(), odd=odd)
     assert_same(read(tmp_path / 'mixed.mcap'), messages())
-
-
-def test_a_copy_is_byte_for_byte(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'one')
-    with BagReader(bag) as reader, BagWriter(tmp_path / 'two') as writer:
-        for item in reader:
-            writer.copy(item, reader)
-    assert [bytes(item.raw) for item in read(tmp_path / 'two')] == [bytes(item.raw) for item in read(bag)]
 
 
 def test_the_hand_can_be_chosen(tmp_path: Path) -> None:
@@ -133,26 +118,6 @@ def test_an_empty_hand_topic_is_refused(tmp_path: Path) -> None:
         read(tmp_path / 'none')
 
 
-def test_a_bag_without_messages_is_refused(tmp_path: Path) -> None:
-    with BagWriter(tmp_path / 'none'):
-        pass
-    with pytest.raises(RecordingError, match='holds no messages'):
-        read(tmp_path / 'none')
-
-
-def test_two_types_on_one_topic_are_refused(tmp_path: Path) -> None:
-    bag = tmp_path / 'two'
-    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        for kind in ('geometry_msgs/msg/PoseArray', 'geometry_msgs/msg/PoseStamped'):
-            made = TYPES.make(kind)
-            connection = writer.add_connection('/hand_pose', kind, typestore=TYPESTORE)
-            writer.write(connection, 1, TYPESTORE.serialize_cdr(made, kind))
-        for topic, kind in (('/obstacles', 'sensor_msgs/msg/PointCloud2'), ('/goals', 'geometry_msgs/msg/PoseArray')):
-            writer.add_connection(topic, kind, typestore=TYPESTORE)
-    with pytest.raises(RecordingError, match='topic /hand_pose: expected one message type'):
-        read(bag)
-
-
 @pytest.mark.parametrize(
     ('make', 'reason'),
     [
@@ -170,14 +135,7 @@ def test_a_path_that_is_no_bag_is_refused(tmp_path: Path, make: Any, reason: str
         read(path)
 
 
-def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
-    (tmp_path / 'notes.txt').write_text('hello')
-    with pytest.raises(RecordingError, match=re.escape('expected a bag directory, a .mcap or a .db3 file')):
-        read(tmp_path / 'notes.txt')
-
-
-@pytest.mark.parametrize('beyond', [0, 4, 50, 100, 400])
-@pytest.mark.parametrize('as_folder', [True, False])
+@pytest.mark.parametrize(('beyond', 'as_folder'), [(0, True), (4, False), (100, True), (400, False)])
 def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path: Path, beyond: int, as_folder: bool) -> None:
     """The recorder was killed: there is no metadata.yaml either."""
     (tmp_path / 'killed').mkdir()
@@ -191,20 +149,10 @@ def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path: 
         list(BagRecording('killed', path).items())
 
 
-@pytest.mark.parametrize('share', [0.02, 0.3, 0.6])
-@pytest.mark.parametrize('single', [True, False])
+@pytest.mark.parametrize(('share', 'single'), [(0.02, True), (0.6, False)])
 def test_a_file_without_a_whole_chunk_is_refused(tmp_path: Path, share: float, single: bool) -> None:
     bag = write_bag(tmp_path / 'cut')
     whole = mcap(bag).read_bytes()
     mcap(bag).write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(RecordingError, match='damaged or cut short: no whole chunk'):
         read(mcap(bag) if single else bag)
-
-
-def test_a_truncated_sqlite_bag_is_refused(tmp_path: Path) -> None:
-    bag = tmp_path / 'old'
-    write_by_rosbags(bag, messages(seconds=2.0), version=8, storage_plugin=StoragePlugin.SQLITE3)
-    database = bag / 'old.db3'
-    database.write_bytes(database.read_bytes()[: 3 * database.stat().st_size // 5])
-    with pytest.raises(RecordingError, match=re.escape(str(bag))):
-        read(bag)

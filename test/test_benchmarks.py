@@ -1,6 +1,5 @@
 """The program of the benchmark, with a row that compares the package with itself and so needs no peer."""
 
-import importlib
 import json
 import os
 import subprocess
@@ -9,8 +8,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / 'benchmarks'))
-
-measurement = importlib.import_module('measurement')
 
 
 def run(*options: str, **environment: str) -> subprocess.CompletedProcess:
@@ -46,15 +43,3 @@ def test_an_unknown_row_is_rejected():
     done = run('--only', 'warm_vs_hot')
     assert done.returncode == 2
     assert 'warm_vs_hot' in done.stderr
-
-
-def test_a_ratio_says_how_many_times_as_long_the_peer_takes():
-    ours, peer = measurement.Timing('a', 2.0), measurement.Timing('b', 5.0)
-    assert measurement.Result(ours, peer, measurement.Agreement(True, 'equal'), 1).ratio == 2.5
-
-
-def test_tasks_are_timed_in_turn():
-    calls = []
-    times = measurement.time_in_turn({'a': lambda: calls.append('a'), 'b': lambda: calls.append('b')}, 2)
-    assert calls == ['a', 'b'] * 3
-    assert {name: len(each) for name, each in times.items()} == {'a': 2, 'b': 2}

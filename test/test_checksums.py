@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import random
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from bag_helpers import messages, write_bag, write_by_rosbags
-from rosbags.rosbag2 import StoragePlugin
+from bag_helpers import write_bag
 
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import BagReader
-from foc_ros.io.checksums import add_checksums
-from foc_ros.io.mcap_files import McapFile
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGED = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
@@ -50,37 +46,14 @@ def mutants(data: bytes, count: int) -> Iterator[bytes]:
 def test_no_mutant_of_a_written_file_is_read_with_another_content(bag: Path, tmp_path: Path) -> None:
     whole, data, refused, total = read(bag), (bag / 'bag.mcap').read_bytes(), 0, 0
     file = tmp_path / 'bad.mcap'
-    for mutant in mutants(data, 400):
+    for mutant in mutants(data, 200):
         file.write_bytes(mutant)
         try:
             assert read(file) == whole
         except RecordingError:
             refused += 1
         total += mutant != data
-    assert refused == total > 200
-
-
-def test_no_mutant_of_the_metadata_changes_the_content(bag: Path, tmp_path: Path) -> None:
-    whole, data, refused = read(bag), (bag / 'metadata.yaml').read_bytes(), 0
-    copy = tmp_path / 'bag'
-    shutil.copytree(bag, copy)
-    for mutant in mutants(data, 60):
-        (copy / 'metadata.yaml').write_bytes(mutant)
-        try:
-            assert read(copy) == whole
-        except RecordingError:
-            refused += 1
-    assert refused > 20
-
-
-@pytest.mark.parametrize('section', ['data', 'summary'])
-def test_the_damaged_section_is_named(bag: Path, tmp_path: Path, section: str) -> None:
-    data = bytearray((bag / 'bag.mcap').read_bytes())
-    place = {'data': 20, 'summary': len(data) - 60}[section]
-    data[place] ^= 1
-    (tmp_path / 'bad.mcap').write_bytes(data)
-    with pytest.raises(RecordingError, match=f'bad.mcap: damaged: the {section} section differs from its checksum'):
-        read(tmp_path / 'bad.mcap')
+    assert refused == total > 100
 
 
 def test_an_independent_reader_finds_every_checksum_right(bag: Path) -> None:
@@ -91,26 +64,3 @@ def test_an_independent_reader_finds_every_checksum_right(bag: Path) -> None:
         assert records['Chunk'].uncompressed_crc and records['DataEnd'].data_section_crc and records['Footer'].summary_crc
         with file.open('rb') as stream:
             assert sum(1 for _ in stream_reader.StreamReader(stream, validate_crcs=True).records) > 10
-
-
-def test_the_checksums_are_those_of_an_independent_writer(tmp_path: Path) -> None:
-    writer_module = pytest.importorskip('mcap.writer', reason='the mcap library is not installed')
-    file = tmp_path / 'other.mcap'
-    with file.open('wb') as stream:
-        writer = writer_module.Writer(
-            stream, compression=writer_module.CompressionType.NONE, chunk_size=400, enable_data_crcs=True
-        )
-        writer.start('ros2')
-        channel = writer.register_channel('/a', 'cdr', writer.register_schema('A', 'ros2msg', b'int8 a'))
-        for number in range(20):
-            writer.add_message(channel, number, bytes(100 * [number]), number)
-        writer.finish()
-    written = file.read_bytes()
-    McapFile(file).close()
-    add_checksums(file)
-    assert file.read_bytes() == written
-
-
-def test_a_file_without_checksums_is_read(tmp_path: Path, bag: Path) -> None:
-    write_by_rosbags(tmp_path / 'old', messages(), version=9, storage_plugin=StoragePlugin.MCAP)
-    assert read(tmp_path / 'old') == read(bag)

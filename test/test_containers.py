@@ -31,14 +31,6 @@ def test_the_image_is_built_and_started_by_the_same_commands() -> None:
     assert ' '.join(json.loads(instructions[5]['value'])) == COMMANDS[1]
 
 
-def test_the_image_contains_the_sources_and_nothing_that_is_made_of_them() -> None:
-    (copied,) = [each['value'] for each in parse_dockerfile() if each['instruction'] == 'COPY']
-    assert copied == '. .'
-    ignored = (ROOT / '.dockerignore').read_text('utf-8').split()
-    assert {'.git', '.venv', 'build', 'demo_output'} <= set(ignored)
-    assert not {'foc_ros', 'config', 'launch', 'resource', 'README.md', 'setup.py', 'Makefile'} & set(ignored)
-
-
 def test_the_development_container_runs_the_same_commands() -> None:
     container = json.loads((ROOT / '.devcontainer' / 'devcontainer.json').read_text('utf-8'))
     assert [container['postCreateCommand'], container['postAttachCommand']] == COMMANDS

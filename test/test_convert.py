@@ -64,19 +64,6 @@ def test_every_number_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert not rows['z'].any() and not rows['radius_stddev'].any()
 
 
-def test_the_scene_comes_first_and_twice_a_second(tmp_path: Path) -> None:
-    assert convert(tmp_path) == 0
-    for name in ('a', 'b'):
-        with BagReader(tmp_path / 'bags' / name) as reader:
-            items = list(reader)
-        roles = [item.role for item in items]
-        assert set(roles[:2]) == {'obstacles', 'goals'} and roles.count('hand_pose') >= 1
-        for role in ('obstacles', 'goals'):
-            stamps = np.array([item.log_ns for item in items if item.role == role] + [items[-1].log_ns])
-            assert np.diff(stamps).max(initial=0) <= 500_000_000
-            assert stamps[0] == next(item.log_ns for item in items if item.role == 'hand_pose') - 100_000_000
-
-
 def test_optional_columns(tmp_path: Path) -> None:
     obstacles = 'id,x_m,y_m,radius_m,radius_stddev_m,z_m\n7,0.5,-0.1,0.03,0.002,0.1\n-2,0,0,0,0,0\n'
     assert convert(tmp_path, 'recording,t_s,x_m,y_m,z_m\n1,0,0.1,0.2,0.3\n', obstacles, 'x_m,y_m,z_m\n0.1,0.2,0.4\n') == 0
@@ -97,10 +84,6 @@ def test_boxes_and_circles_share_a_table(tmp_path: Path) -> None:
     assert decode_point_cloud(message, 'xy').obstacles.corners.tolist() == [4, 1]
 
 
-def test_boxes_need_no_radius(tmp_path: Path) -> None:
-    assert convert(tmp_path, obstacles='x_m,y_m,size_x_m,size_y_m\n0.5,-0.1,0.2,0.1\n') == 0
-
-
 def test_each_recording_has_its_own_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     obstacles = 'recording,x_m,y_m,radius_m\na,0.5,-0.1,0.03\nb,0.1,0,0.01\na,0.6,0,0.02\n'
     assert convert(tmp_path, obstacles=obstacles, goals='recording,x_m,y_m\nb,1,0\na,2,0\na,3,0\n') == 0
@@ -113,14 +96,6 @@ def test_each_recording_has_its_own_scene(tmp_path: Path, capsys: pytest.Capture
         assert [pose.position.x for pose in items['goals'].poses] == goals
 
 
-def test_a_folder_of_tables_is_converted(tmp_path: Path) -> None:
-    for name, text in (('recordings', RECORDINGS), ('obstacles', OBSTACLES), ('goals', GOALS)):
-        (tmp_path / f'{name}.csv').write_text(text, 'utf-8')
-    assert main(['convert', str(tmp_path), '--output', str(tmp_path / 'bags')]) == 0
-    with BagReader(tmp_path / 'bags' / 'a') as reader:
-        assert {item.role for item in reader} == {'hand_pose', 'obstacles', 'goals'}
-
-
 def test_a_table_needs_obstacles_beside_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'r.csv').write_text(RECORDINGS, 'utf-8')
     assert main(['convert', str(tmp_path / 'r.csv'), '--output', str(tmp_path / 'bags')]) == 2
@@ -131,18 +106,6 @@ def test_without_goals_the_bag_has_none(tmp_path: Path) -> None:
     assert convert(tmp_path, goals=None) == 0
     with pytest.raises(RecordingError, match='no topic for goals'), BagReader(tmp_path / 'bags' / 'a'):
         pass
-
-
-def test_a_scene_without_obstacles_is_said_so(tmp_path: Path) -> None:
-    assert convert(tmp_path, obstacles='x_m,y_m,radius_m\n') == 0
-    with BagReader(tmp_path / 'bags' / 'a') as reader:
-        assert {item.message.width for item in reader if item.role == 'obstacles'} == {0}
-
-
-def test_excel_tables_read_alike(tmp_path: Path) -> None:
-    assert convert(tmp_path, '\ufeff' + RECORDINGS.replace('\n', '\r\n') + '\r\n,,,\r\n') == 0
-    with BagReader(tmp_path / 'bags' / 'a') as reader:
-        assert sum(item.role == 'hand_pose' for item in reader) == 3
 
 
 def test_names_are_safe(tmp_path: Path) -> None:
@@ -167,31 +130,21 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys
         ('recordings', 'recording,t_s,x_m,y_m\n', 'r.csv: expected at least one row, got none'),
         ('rows', 'a,0,0,0\na,1,0', 'r.csv: row 3: expected 4 cells, got 3'),
         ('rows', 'a,0,0,0\na,1,nan,0', "r.csv: row 3, column x_m: expected a number in [-10000, 10000], got 'nan'"),
-        ('rows', 'a,0,0,inf', "row 2, column y_m: expected a number in [-10000, 10000], got 'inf'"),
-        ('rows', 'a,0,0,1e5', "row 2, column y_m: expected a number in [-10000, 10000], got '1e5'"),
-        ('rows', 'a,0,,0', "row 2, column x_m: expected a number in [-10000, 10000], got ''"),
         ('rows', 'a,x,0,0', "row 2, column t_s: expected a number in [0, 2000000000], got 'x'"),
-        ('rows', 'a,-1,0,0', "row 2, column t_s: expected a number in [0, 2000000000], got '-1'"),
         ('rows', 'a,1.5,0,0\na,1.4,0,0', "row 3, column t_s: expected a number in [1.5, 86401.5], got '1.4'"),
         ('rows', 'a,0,0,0\na,1e9,0,0', "row 3, column t_s: expected a number in [0, 86400], got '1e9'"),
         ('rows', ',0,0,0', "row 2, column recording: expected a name, got ''"),
         ('rows', 'a b,0,0,0\na_b,0,0,0', "recordings 'a b' and 'a_b' would both be written to a_b"),
         ('rows', '"a,0,0,0', 'r.csv: not a CSV table'),
         ('obstacles', 'x_m,y_m\n0,0\n', 'o.csv: row 1: no column radius_m'),
-        ('obstacles', 'x_m,y_m,size_x_m\n0,0,1\n', 'o.csv: row 1: no column radius_m; it has x_m, y_m, size_x_m'),
-        ('obstacles', 'x_m,y_m,size_x_m,size_y_m\n0,0,1,-1\n', "size_y_m: expected a number in [0, 10000], got '-1'"),
         ('obstacles', 'x_m,y_m,size_x_m,size_y_m\n0,0,0,0\n', "row 2, column size_x_m: expected a size or a radius > 0, got '0'"),
         ('obstacles', 'x_m,y_m,size_x_m,size_y_m,yaw_rad\n0,0,1,1,nan\n', 'yaw_rad: expected a number in [-10000, 10000]'),
-        ('obstacles', 'recording,x_m,y_m,radius_m\n,0,0,1\n', "row 2, column recording: expected a name, got ''"),
         ('goals', 'recording,x_m,y_m\nb,0,0\n', "recording 'a': the table of goals has no row for it"),
         ('obstacles', 'x_m,y_m,radius_m\n0,0,-0.1\n', "radius_m: expected a number in [0, 10000], got '-0.1'"),
-        ('obstacles', 'x_m,y_m,radius_m,radius_stddev_m\n0,0,1,-1\n', "stddev_m: expected a number in [0, 10000], got '-1'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,1.5\n', "expected a whole number in [-2147483648, 2147483647], got '1.5'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,3\n0,0,1,3\n', 'row 3, column id: expected another id than the rows above'),
         ('obstacles', 'x_m,y_m,radius_m\n' + 20_001 * '0,0,1\n', 'o.csv: expected at most 20,000 rows, got more'),
         ('goals', 'x_m,y_m\n' + 257 * '0,0\n', 'g.csv: expected at most 256 rows, got more'),
-        ('goals', 'x_m\n0\n', 'g.csv: row 1: no column y_m'),
-        ('goals', 'x_m,y_m\n', 'g.csv: expected at least one row, got none'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_one_line(
@@ -202,20 +155,6 @@ def test_what_is_wrong_is_said_in_one_line(
     error = capsys.readouterr().err
     assert error.startswith('foc_ros convert: ') and message in error and error.count('\n') == 1
     assert not (tmp_path / 'bags').exists()
-
-
-def test_files_that_are_no_text_or_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / 'o.csv').write_text('x_m,y_m,radius_m\n')
-    (tmp_path / 'binary.csv').write_bytes(b'recording,t_s,x_m,y_m\na,0,\xff,0\n')
-    for file, reason in (
-        ('binary.csv', 'expected UTF-8 text, got byte 0xff'),
-        ('none.csv', 'no such file'),
-        ('.', 'Is a directory'),
-    ):
-        tables = str(tmp_path / file), '--obstacles', str(tmp_path / 'o.csv')
-        assert main(['convert', *tables, '--output', str(tmp_path / 'bags')]) == 2
-        error = capsys.readouterr().err
-        assert reason in error and error.count('\n') == 1
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
@@ -244,19 +183,6 @@ def test_all_errors_of_a_table_are_found_at_once(tmp_path: Path, capsys: pytest.
     assert [line.partition('o.csv: ')[2].partition(':')[0] for line in lines] == [
         'row 2, column radius_m', 'row 3, column y_m', 'row 5, column id',
     ]  # fmt: skip
-
-
-def test_the_errors_of_all_tables_are_found_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    wrong = 'x_m,y_m,radius_m\n0,0,-1\n', 'x_m,y_m\n0,a\n'
-    assert convert(tmp_path, 'recording,t_s,x_m,y_m\na,0,x,0\n', *wrong) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.partition('.csv: ')[0][-1] for line in lines] == ['r', 'o', 'g']
-
-
-def test_a_table_is_not_read_beyond_a_hundred_wrong_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert convert(tmp_path, obstacles='x_m,y_m,radius_m\n' + 20_000 * '0,0,-1\n') == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 101 and lines[-1].endswith('o.csv: the rows after row 101 were not checked')
 
 
 @pytest.mark.parametrize('name', ['radius_stdev_m', 'radius_std_m'])
@@ -341,9 +267,7 @@ def test_a_number_of_another_country_or_language_is_named(
     assert re.search(f'row 2, column x_m: expected {words}', capsys.readouterr().err)
 
 
-@pytest.mark.parametrize(
-    ('separator', 'comma'), [(';', False), ('\t', False), ('|', False), (' ', False), (';', True), ('\t', True), (' ; ', True)]
-)
+@pytest.mark.parametrize(('separator', 'comma'), [('|', False), (' ', False), (';', True), ('\t', True)])
 def test_other_separators_and_decimal_commas_are_read(tmp_path: Path, separator: str, comma: bool) -> None:
     usual = read_tables(write_folder(tmp_path / 'usual'))['a'].read_movement()
     (found,) = read_tables(write_folder(tmp_path / 'other', separator, comma)).values()
@@ -357,8 +281,3 @@ def test_empty_columns_of_a_spreadsheet_are_not_read(tmp_path: Path) -> None:
     for file in folder.iterdir():
         file.write_text(file.read_text().replace('\n', ',,\n'))
     assert len(read_tables(folder)['a'].read_movement().stamps_ns) == 50
-
-
-def test_decimal_commas_between_commas_are_named(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r'expected \d cells, got \d \(are there decimal commas\?'):
-        read_tables(write_folder(tmp_path / 'other', ',', True).rename(tmp_path / 'renamed'))

@@ -5,8 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 BLOCKED = ('rclpy', 'ament_index_python', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs')
 
 BLOCK = f"""
@@ -49,13 +47,6 @@ def run(program: str, *blocked: str) -> subprocess.CompletedProcess[str]:
     """Run a program in a Python in which ROS and the packages `blocked` cannot be imported."""
     block = BLOCK + f'BLOCKED |= {set(blocked)!r}\n' if blocked else BLOCK
     return subprocess.run([sys.executable, '-c', block + program], capture_output=True, text=True, timeout=100, check=False)
-
-
-@pytest.mark.parametrize('package', ['rclpy', 'sensor_msgs.msg', 'rosbags'])
-def test_the_blocked_packages_cannot_be_imported(package: str) -> None:
-    result = run(f'import {package}', 'rosbags')
-    assert result.returncode == 1
-    assert 'is blocked' in result.stderr
 
 
 def test_core_imports_and_predicts_without_ros_and_rosbags() -> None:

@@ -49,33 +49,6 @@ def simulated(problem: Problem, plant: str, control: np.ndarray) -> tuple[np.nda
 
 
 @EVERY_PLANT
-def test_the_parts_of_the_cost_are_those_of_a_simulation(plant):
-    """Effort, variances and soft goal rows, but for a constant: the part of the variance that no control causes."""
-    problem = weighted_problem(plant)
-    problem = replace(problem, at_goal=np.zeros(len(problem.goal), dtype=bool))
-    rows, targets, softness = problem.goal_rows
-    weights = 1.0 + problem.weighted_variance + LAMBDA * problem.summed_variance
-    control, other = 10 * np.random.default_rng(1).standard_normal((2, 2 * STEPS))
-
-    def value(u: np.ndarray) -> float:
-        return float((weights * u**2).sum() + (0.5 / softness * (rows @ u - targets) ** 2).sum())
-
-    simulations = [simulated(problem, plant, u)[1] for u in (control, other)]
-    assert value(control) - value(other) == pytest.approx(simulations[0] - simulations[1], rel=1e-9)
-
-
-@EVERY_PLANT
-def test_hard_goal_rows_are_the_end_of_a_simulation(plant):
-    problem = weighted_problem(plant)
-    rows, targets, softness = problem.goal_rows
-    hard = softness == 0
-    assert hard.sum() == 2
-    control = np.random.default_rng(2).standard_normal(2 * STEPS)
-    end = simulated(problem, plant, control)[0]
-    np.testing.assert_allclose((rows @ control - targets)[hard], (end - problem.goal)[:2], atol=1e-12)
-
-
-@EVERY_PLANT
 def test_terms_reported_for_a_solution_sum_to_the_simulated_cost(plant):
     problem = weighted_problem(plant)
     solution = solve_problem(problem, cold_start(np.zeros((STEPS + 1, 2))), FocConfig(strategy='fixed', tau=0.0, lam=LAMBDA))

@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import make_box_polygon
-from foc_ros.ros.messages import decode_markers
-from foc_ros.ros.messages.decode_markers import MarkerTable
+from foc_ros.ros.messages import decode_objects
+from foc_ros.ros.messages.decode_objects import MarkerTable
 from foc_ros.ros.messages.plane import project
 from foc_ros.ros.messages.types import MessageTypes
 
@@ -180,7 +180,7 @@ def test_an_empty_table_accepts_another_frame() -> None:
 
 
 def test_the_number_of_markers_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(decode_markers, 'MAX_ROWS', 3)
+    monkeypatch.setattr(decode_objects, 'MAX_ROWS', 3)
     scene = after(marker_array(BAGS, *[marker(BAGS, id=i) for i in range(3)]))
     with pytest.raises(MessageError, match='markers: expected at most 3 obstacles held at a time, got 4'):
         scene.with_message(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy', 0.0)

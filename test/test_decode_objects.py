@@ -25,7 +25,7 @@ from foc_ros.core.types import Obstacles, SampleStatus
 from foc_ros.io.topics import OPTIONAL, TYPES
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
-from foc_ros.ros.messages.transform_messages import Transform, transform_message
+from foc_ros.ros.messages.plane import Transform, compute_rotation
 
 BOX, SPHERE, CYLINDER, CONE = 1, 2, 3, 4
 QUARTER = {'z': math.sqrt(0.5), 'w': math.sqrt(0.5)}
@@ -172,15 +172,14 @@ def test_a_bag_with_them_is_replayed_by_its_own_definitions(tmp_path: Path, topi
 
 
 def test_both_inputs_are_transformed() -> None:
-    found = Transform(SimpleNamespace(x=0.0, y=0.0, **QUARTER), SimpleNamespace(x=1.0, y=0.0, z=0.0), 0)
+    found = Transform(compute_rotation(SimpleNamespace(x=0.0, y=0.0, **QUARTER)), np.array([1.0, 0.0, 0.0]))
     given = detections(detection((0.5, 0, 0), (0.4, 0.2, 0.1), frame_id='camera'), frame_id='camera')
-    array = decode_detections(transform_message('detections', given, 'world', 'xy', lambda _: found), 'xy', 0.0)
+    array = decode_detections(given, 'xy', 0.0, lambda _: ('world', found))
     thing = collision_object((BOX, (0.4, 0.2, 0.1), (0, 0, 0)), place=(0.5, 0, 0), frame_id='camera')
-    table = after(transform_message('collision_objects', thing, 'world', 'xy', lambda _: found))
+    table = CollisionTable().with_message(thing, lambda _: ('world', found))
     assert (array.frame_id, table.frame_id) == ('world', 'world')
     for obstacles in (array.obstacles, table.obstacles('xy', 0.0)):
         check_polygon(obstacles, 0, (1.0, 0.5), (0.4, 0.2), math.pi / 2)
-    assert (given.header.frame_id, thing.header.frame_id) == ('camera', 'camera'), 'what was received is not changed'
 
 
 @pytest.mark.parametrize('role', OPTIONAL)

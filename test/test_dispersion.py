@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from foc_ros.core.config import Config, CovarianceConfig, replace_values
-from foc_ros.core.learning.dispersion import LOG_FACTORS, REST_SHARE, Dispersion, compute_factors, make_forecast, scale_covariance
+from foc_ros.core.learning.dispersion import REST_SHARE, Dispersion
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import (
     NANOSECONDS,
@@ -24,10 +22,8 @@ from foc_ros.core.types import (
     Status,
     make_obstacles,
 )
-from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
 
 STDDEV = 0.02
-STEP_NS = NANOSECONDS // 10
 FIXED = {'duration.adaptation': 'none'}
 CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4} | FIXED)
 
@@ -57,7 +53,7 @@ def judge(ahead_s: float, factor: float, duration_s: float, count: int = 60) -> 
     return dispersion
 
 
-@pytest.mark.parametrize('factor', [0.25, 1.0, 3.0])
+@pytest.mark.parametrize('factor', [0.25, 3.0])
 @pytest.mark.parametrize(('ahead_s', 'duration_s', 'share'), [(0.25, 10.0, 0.025), (1.0, 2.0, 0.5), (1.0, 0.8, 1.0)])
 def test_the_factor_of_gaussian_errors_is_recovered(factor: float, ahead_s: float, duration_s: float, share: float) -> None:
     dispersion = judge(ahead_s, factor, duration_s)
@@ -66,38 +62,6 @@ def test_the_factor_of_gaussian_errors_is_recovered(factor: float, ahead_s: floa
     assert near ** (1.0 - share) * far**share == pytest.approx(factor, rel=0.15)
     if share == 1.0:
         assert near == pytest.approx(1.0, abs=0.1)
-
-
-def test_the_score_is_the_density_of_the_scaled_mixture() -> None:
-    config, position = CovarianceConfig(near=0.5, far=3.0), np.array([0.03, -0.01])
-    candidates = [make_candidate(0.7), make_candidate(0.3, duration_s=0.5, place=(0.05, 0.0))]
-    published = [scale_covariance(each, config) for each in candidates]
-    found = make_forecast(0, 1.0, 1.0, published, config).score(position)  # the second one ends before
-    for row, column in ((0, 0), (4, 9), (10, 2)):
-        near, far = np.exp(LOG_FACTORS[[row, column]])
-        parts = [
-            each.likelihood * multivariate_normal(each.mean[0, :2], stddev**2 * np.eye(2)).pdf(position)
-            for each, stddev in zip(candidates, STDDEV * np.array([np.sqrt(near * far), far]), strict=True)
-        ]
-        assert found[row, column] == pytest.approx(np.log(sum(parts)), rel=1e-6)
-
-
-@pytest.mark.parametrize('duration_s', [0.5, 2.0])
-def test_the_factor_leads_from_now_to_the_end_of_a_candidate(duration_s: float) -> None:
-    found = compute_factors(make_candidate(duration_s=duration_s).solution, CovarianceConfig(near=0.5, far=2.0))
-    np.testing.assert_allclose(found[[0, 4, 8]], [0.5, 1.0, 2.0])
-
-
-def test_only_a_moving_hand_counts_and_only_within_its_movement() -> None:
-    resting, candidates = replace(place_hand(0, (0.0, 0.0)), onset_ns=None), [make_candidate()]
-    assert not Dispersion().follow(resting).add(0, candidates, CovarianceConfig()).forecasts
-    assert not Dispersion().add(0, candidates, CovarianceConfig()).forecasts
-    moving = Dispersion().follow(place_hand(0, (0.0, 0.0))).add(0, candidates, CovarianceConfig())
-    later = moving.add(STEP_NS * 5, candidates, CovarianceConfig())
-    assert [each.count for each in later.forecasts] == [0.1] * 3 + [0.5] * 3
-    assert len(moving.forecasts) == 3 and moving.add(STEP_NS // 2, candidates, CovarianceConfig()) is moving
-    ended = moving.follow(replace(resting, stamp_ns=2 * NANOSECONDS))
-    assert not ended.forecasts and ended.errors == 0 and ended.adapt(CONFIG.covariance) is CONFIG.covariance
 
 
 def reach(pipeline: Pipeline, start_s: float, until_s: float = 1.6) -> list[Prediction]:
@@ -158,10 +122,3 @@ def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_swi
     pipeline = Pipeline(off)
     reach(pipeline, 1.0)
     assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config is off
-
-
-def test_factors_are_exported_as_a_parameter_file(tmp_path: Path) -> None:
-    pipeline = Pipeline(CONFIG)
-    reach(pipeline, 1.0)
-    write_parameter_file('--operator', tmp_path / 'operator.yaml', pipeline.adapted_config)
-    assert load_parameter_file(tmp_path / 'operator.yaml').covariance == pipeline.adapted_config.covariance

@@ -1,6 +1,5 @@
 """The time to go: whole durations, time since onset, slow hands, lower and upper limit."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -35,11 +34,6 @@ def test_fitts_law_at_whole_bits() -> None:
         assert compute_movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
 
 
-def test_at_rest_the_time_to_go_is_the_whole_duration_from_here() -> None:
-    assert time_to_go(hand(0.0), GOAL, FITTS) == pytest.approx(0.2 + 0.25 * math.log2(16.0))
-    assert time_to_go(hand(0.2), GOAL, FIXED) == 1.5
-
-
 def test_during_a_movement_the_time_to_go_is_the_duration_less_the_time_since_onset() -> None:
     assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), GOAL, FITTS) == pytest.approx(1.2 - 0.4)
     assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), GOAL, FIXED) == pytest.approx(1.5 - 0.4)
@@ -59,7 +53,7 @@ def test_a_slow_hand_needs_the_time_of_the_distance_at_its_speed() -> None:
     assert time_to_go(hand(0.01, onset=0.0, since_s=0.29 * 1.5, speed=0.05), GOAL, FIXED) == pytest.approx(0.71 * 1.5)
 
 
-@pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 34))
+@pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 10))
 def test_a_minimum_jerk_movement_of_the_expected_duration_is_not_delayed(share: float) -> None:
     x = 0.3 * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
     speed = 0.3 / 1.5 * (30.0 * share**2 - 60.0 * share**3 + 30.0 * share**4)
@@ -75,17 +69,6 @@ def test_the_time_to_go_stays_in_bounds_and_is_continuous_at_onset(
     assert time_to_go(hand(x, x, 0.0, speed), GOAL, config) == time_to_go(hand(x, speed=speed), GOAL, config)
     slower = time_to_go(hand(x, onset, since_s, speed / 2.0), GOAL, config)
     assert slower >= time_to_go(hand(x, onset, since_s, speed), GOAL, config)
-
-
-def test_the_time_to_go_does_not_depend_on_the_frame() -> None:
-    turn, shift = np.array([[0.6, -0.8], [0.8, 0.6]]), np.array([3.0, -2.0])
-    state = hand(0.1, onset=0.0, since_s=0.5, speed=0.1)
-    moved = replace(
-        state,
-        mean=np.concatenate([turn @ state.mean[:2] + shift, turn @ state.mean[2:4], np.zeros(2)]),
-        onset_position=turn @ state.onset_position + shift,
-    )
-    assert time_to_go(moved, turn @ GOAL + shift, FITTS) == pytest.approx(time_to_go(state, GOAL, FITTS), rel=1e-12)
 
 
 def test_the_goal_that_the_speed_fits_best_gives_the_factor_for_all_goals() -> None:

@@ -7,12 +7,10 @@ from scipy.linalg import expm
 from foc_ros.core.errors import InputError
 from foc_ros.core.plant.plants import (
     Plant,
-    build_triple_integrator_horizon,
     condense,
     discretise_damped_mass,
     discretise_triple_integrator,
 )
-from foc_ros.core.plant.replanning import compute_error_map, triple_integrator_error_map
 
 
 def zero_order_hold(a: np.ndarray, b: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -56,22 +54,6 @@ def test_horizon_is_what_the_plant_does_step_by_step(plant):
     np.testing.assert_allclose(predicted[-1], state, atol=1e-12)
 
 
-def test_the_scaled_horizon_equals_the_direct_one():
-    direct, scaled = condense(discretise_triple_integrator(0.037), 30), build_triple_integrator_horizon(0.037, 30)
-    np.testing.assert_allclose(scaled.powers, direct.powers, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(scaled.response, direct.response, rtol=1e-12, atol=1e-18)
-    np.testing.assert_allclose(scaled.maps, direct.maps, rtol=1e-12, atol=1e-24)
-    np.testing.assert_allclose(triple_integrator_error_map(0.037, 30), compute_error_map(direct), atol=1e-10)
-
-
-def test_a_corrected_error_starts_in_full_and_vanishes_at_the_goal():
-    error_map = triple_integrator_error_map(0.02, 50)
-    np.testing.assert_allclose(error_map[0], np.eye(6))
-    np.testing.assert_allclose(error_map[-1], 0.0, atol=1e-9)
-    open_loop = build_triple_integrator_horizon(0.02, 50).powers
-    assert np.abs(error_map[:, 0, 4]).max() < 0.05 * np.abs(open_loop[:, 0, 4]).max()
-
-
 @pytest.mark.parametrize(
     ('A', 'B', 'dt'),
     [
@@ -84,10 +66,3 @@ def test_a_corrected_error_starts_in_full_and_vanishes_at_the_goal():
 def test_a_plant_of_wrong_shape_is_refused(A, B, dt):
     with pytest.raises(InputError, match='plant'):
         Plant(A, B, dt)
-
-
-def test_mass_and_damping_are_checked():
-    with pytest.raises(InputError, match='mass'):
-        discretise_damped_mass(0.01, 0.0, 1.0)
-    with pytest.raises(InputError, match='damping'):
-        discretise_damped_mass(0.01, 1.0, float('nan'))

@@ -24,7 +24,7 @@ from foc_ros.ros.messages.types import MessageTypes
 BAGS = message_types('rosbags')
 NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz', 'candidate', 'likelihood']
 PAIRS = NAMES[7:13]
-NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS), 'goal', 'way']
+NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS), 'goal', 'way', 'status']
 
 
 def made(name: str, of: Prediction, types: MessageTypes = BAGS, plane: str = 'xy') -> Any:
@@ -50,8 +50,8 @@ def test_the_cloud_contains_every_solved_candidate(types: MessageTypes, plane: s
     assert (cloud.height, cloud.width, cloud.row_step, len(cloud.data)) == (
         1,
         2 * (STEPS + 1),
-        2 * (STEPS + 1) * 96,
-        2 * (STEPS + 1) * 96,
+        2 * (STEPS + 1) * 100,
+        2 * (STEPS + 1) * 100,
     )
     assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec, cloud.header.frame_id) == (5, 0, 'world')
     for index, each in enumerate(ways.solved_candidates):
@@ -198,6 +198,10 @@ def test_a_compromised_candidate_takes_part_and_says_so() -> None:
     ways = prediction(outcome('a', 0.7), outcome('b', 0.3, eta=0.62, status=Status.COMPROMISED))
     table = columns(made('prediction', ways))
     assert set(table['candidate'][table['compromised'] == 1]) == {1}
+    assert table['status'][:: STEPS + 1].tolist() == [0, 1]
+    late = prediction(*(outcome(status.value, 0.3, status=status) for status in (Status.ESTIMATED, Status.DEADLINE)))
+    table = columns(made('prediction', late))
+    assert table['status'][:: STEPS + 1].tolist() == [2, 3] and table['compromised'].all()
     assert made('likelihoods', ways).layout.dim[0].label == 'a;b'
     texts = [each.text for each in made('markers', ways).markers if each.ns == 'label']
     assert texts[1].endswith('30 %, compromised: eta 0.620')

@@ -6,30 +6,23 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicHermiteSpline
 from test_demonstrations import GOAL, OBSTACLES, bow
 
 from foc_ros.cli.main import main
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.classes.library import STEP_S, record_demonstration
-from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.learning.learnt import Knowledge
 from foc_ros.core.learning.recordings import (
     NO_LIBRARY,
-    POSITION_STDDEV,
     PRIOR_COUNT,
-    PRIOR_COUNT_BEYOND,
-    compare_with_class,
-    find_evidence,
     make_library,
-    update_likelihoods,
 )
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import LEFT, RIGHT, Candidate, HandState, make_obstacles
+from foc_ros.core.types import HandState
 from foc_ros.io.class_library import load_library, save_library
 
 CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_candidates': 24, 'likelihood.other_goal': 0.0})
@@ -74,22 +67,6 @@ def test_likelihoods_are_those_of_a_dirichlet_distribution():
             assert after[label].likelihood == pytest.approx(expected, abs=1e-9)
 
 
-def test_recordings_count_for_gaps_and_goals_as_much_as_the_model_and_less_for_ways():
-    """Eight classes: two gaps with two ways each, and two goals on each way; ten recordings of the first class."""
-    gap, way = np.repeat([0, 1], 4), np.repeat([0, 1, 2, 3], 2)
-    counts, n, m = np.array([10.0, *[0.0] * 7]), PRIOR_COUNT, PRIOR_COUNT_BEYOND
-    after = update_likelihoods(np.full(8, 0.125), counts, counts, Decisions(gap, way, np.zeros(8, dtype=np.intp)))
-    of_gap, of_way = np.bincount(gap, after), np.bincount(way, after)
-    assert after.sum() == pytest.approx(1.0)
-    assert of_gap[0] == pytest.approx((0.5 * n + 10.0) / (n + 10.0))
-    assert of_way[0] / of_gap[0] == pytest.approx((0.5 * m + 10.0) / (m + 10.0))
-    assert after[0] / of_way[0] == pytest.approx((0.5 * n + 10.0) / (n + 10.0))
-    np.testing.assert_allclose(after[4:], of_gap[1] / 4.0)
-    sure, seen = np.array([1.0, *[0.0] * 7]), np.array([*[0.0] * 7, 6.0])
-    of_gap = np.bincount(gap, update_likelihoods(sure, seen, seen, Decisions(gap, way, np.zeros(8, dtype=np.intp))))
-    np.testing.assert_allclose(of_gap, [n / (n + 6.0), 6.0 / (n + 6.0)])
-
-
 MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)
 """The hand of a recording one second after it began, half a second after the onset."""
 
@@ -113,14 +90,6 @@ def test_a_path_approaches_the_recordings_with_their_number():
     assert (np.diff(stddevs) < 0.0).all()
 
 
-def test_velocities_are_the_derivative_of_the_path():
-    taken = find_taken(ask(make_library([ABOVE] * 4), MOVING))
-    path = CubicHermiteSpline(taken.times, taken.mean[:, :2], taken.mean[:, 2:4])
-    middle = 0.5 * (taken.times[2:] + taken.times[1:-1])
-    expected = np.diff(taken.mean[:, :2], axis=0)[1:] / taken.solution.dt
-    assert np.hypot(*(path(middle, 1) - expected).T).max() < 0.05
-
-
 def test_other_classes_effort_and_eta_stay_those_of_the_plan():
     known, model = by_label(ask(make_library([ABOVE] * 20), MOVING)), by_label(ask(NO_LIBRARY, MOVING))
     others = [label for label, each in model.items() if not dict(each.candidate.sides).items() <= sides_of(ABOVE).items()]
@@ -131,24 +100,6 @@ def test_other_classes_effort_and_eta_stay_those_of_the_plan():
     for label, each in model.items():
         assert known[label].eta == each.eta and known[label].effort == each.effort
         np.testing.assert_array_equal(known[label].motor_covariance, each.motor_covariance)
-
-
-def test_an_obstacle_below_the_hand_does_not_keep_recordings_away():
-    """It stands on the recorded path; without its height it blocks."""
-    library, high = make_library([ABOVE] * 20), replace(MOVING, height=0.3, height_mean=np.array([0.3, 0.0, 0.0]))
-    low = make_obstacles(
-        [*OBSTACLES.centre, ABOVE.states[40, :2]],
-        [*OBSTACLES.radius, 0.02],
-        heights=[(-9.0, 9.0)] * len(OBSTACLES) + [(0.0, 0.05)],
-    )
-
-    def ask_above(obstacles):
-        heights = {'goal_heights': np.array([0.3])}
-        return predict(CONFIG, high, obstacles, GOAL, NO_TRACKS, Knowledge(library), **heights)[0]
-
-    without, over = find_taken(ask_above(low.take([0, 1, 2]))), find_taken(ask_above(low))
-    np.testing.assert_array_equal(over.mean, without.mean)
-    assert over.likelihood == without.likelihood
 
 
 @given(st.floats(0.012, 0.05), st.floats(-0.01, 0.01), st.floats(0.0, 0.9))
@@ -185,43 +136,6 @@ def test_without_a_recording_that_agrees_it_is_the_model(library):
         np.testing.assert_array_equal(one.covariance, other.covariance)
 
 
-def test_equal_input_gives_equal_answers():
-    one, other = (ask(make_library([ABOVE])) for _ in range(2))
-    for each, same in zip(one.candidates, other.candidates, strict=True):
-        assert each.likelihood == same.likelihood
-        np.testing.assert_array_equal(each.mean, same.mean)
-
-
-def test_recordings_count_by_position_and_velocity():
-    library = make_library([ABOVE])
-    away = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
-    assert not len(find_evidence(library, replace(HAND, mean=away), OBSTACLES, GOAL).row)
-    assert find_evidence(library, HAND, OBSTACLES, GOAL).weight == pytest.approx([1.0])
-    beside = replace(HAND, mean=HAND.mean - [POSITION_STDDEV, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert find_evidence(library, beside, OBSTACLES, GOAL).weight == pytest.approx([np.exp(-0.5)])
-
-
-def test_a_recording_of_another_class_leads_until_it_passes_there():
-    obstacles = make_obstacles([[0.1, 0.0], [0.2, 0.0]], 0.015)
-    path = np.column_stack([np.linspace(0.0, 0.3, 61), 0.04 * np.sin(np.linspace(0.0, 2.0 * np.pi, 61))])
-    recording = record_demonstration('world', path, obstacles, move(path))
-    evidence = find_evidence(make_library([recording]), HAND, obstacles, GOAL)
-    compared = {}
-    for sides in ((LEFT, RIGHT), (LEFT, LEFT), (RIGHT, RIGHT)):
-        candidate = Candidate('goal0', 0, tuple(zip(obstacles.ids, sides, strict=True)), path, 0.3)
-        compared[sides] = compare_with_class(candidate, evidence, obstacles, np.array([0]))
-    assert [bool(each.is_same[0]) for each in compared.values()] == [True, False, False]
-    until_s = [each.until_s[0] for each in compared.values()]
-    assert until_s[0] == np.inf and until_s[1] == pytest.approx(0.5 + 2.0 * 2.0 / 3.0, abs=0.2) and until_s[2] == 0.0
-
-
-def test_states_are_read_as_they_were_written(tmp_path):
-    save_library(tmp_path / 'ways.json', [ABOVE, replace(ABOVE, states=None)])
-    timed, plain = load_library(str(tmp_path / 'ways.json'))
-    np.testing.assert_array_equal(timed.states, ABOVE.states)
-    assert plain.states is None
-
-
 @pytest.mark.parametrize('states', ['[[0, 0, 0, 0]]', '1', '[[0, 0], [0, 0]]', '[[0, 0, 0, 0], [0, 0, 0, "x"]]'])
 def test_wrong_states_name_the_field(tmp_path, states):
     file = tmp_path / 'ways.json'
@@ -230,13 +144,6 @@ def test_wrong_states_name_the_field(tmp_path, states):
     file.write_text(text[: text.index('"states": ') + 10] + states + '}]}')
     with pytest.raises(InputError, match=r'ways\[0\]\.states'):
         load_library(str(file))
-
-
-def test_a_library_that_could_not_be_read_is_not_written(tmp_path):
-    long = replace(ABOVE, states=np.full((400, 4), np.pi))
-    with pytest.raises(InputError, match=r'expected at most 5,000,000 bytes'):
-        save_library(tmp_path / 'ways.json', [long] * 400)
-    assert not list(tmp_path.iterdir())
 
 
 HEADS = {'goals.csv': 'goal,x_m,y_m\n0,0.3,0.0\n', 'obstacles.csv': 'obstacle,x_m,y_m,radius_m\na,0.15,0.0,0.015\n'}

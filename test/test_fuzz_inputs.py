@@ -19,7 +19,7 @@ from test_unusual_recordings import WHOLE, write_metadata, write_sqlite
 from foc_ros.cli.main import main
 from foc_ros.io.bags import BagReader
 
-FEW, BATCH, BATCHES = 40, 50, 10
+FEW, BATCH, BATCHES = 16, 50, 4
 LONGEST_S = 10.0
 """Time of the processor for one command: other programs may keep it waiting for longer."""
 GIVEN = messages(seconds=0.3)

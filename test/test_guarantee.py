@@ -1,4 +1,4 @@
-"""Whatever is called solved keeps its promise: over 200 random feasible reaches, no obstacle is hit at any step too often.
+"""Whatever is called solved keeps its promise: over 70 random feasible reaches, no obstacle is hit at any step too often.
 
 Every count of noisy movements that stay clear is judged by its Wilson interval, at a level at which all counts of this file
 together would raise a false alarm once in a thousand runs.
@@ -18,15 +18,15 @@ from foc_ros.core.ocp.monte_carlo import monte_carlo, wilson
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.types import Solution, Status
 
-REACHES = 200
+REACHES = 70
 SAMPLES = 2000
 STRATEGIES: dict[str, tuple[Callable[[VariedReach], dict[str, object]], int]] = {
-    'lv': (lambda made: {'strategy': 'lv'}, 140),
-    'hc': (lambda made: {'strategy': 'hc'}, 150),
+    'lv': (lambda made: {'strategy': 'lv'}, 44),
+    'hc': (lambda made: {'strategy': 'hc'}, 47),
     'optimal': (lambda made: {'strategy': 'optimal'}, REACHES),
-    'algorithm1, growth 10': (lambda made: {'strategy': 'algorithm1'}, 170),
-    'algorithm1, growth 1.5': (lambda made: {'strategy': 'algorithm1', 'algorithm1_growth': 1.5}, 170),
-    'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 170),
+    'algorithm1, growth 10': (lambda made: {'strategy': 'algorithm1'}, 54),
+    'algorithm1, growth 1.5': (lambda made: {'strategy': 'algorithm1', 'algorithm1_growth': 1.5}, 54),
+    'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 54),
 }
 """The settings of every strategy, and how many reaches it solves at least: fewer solved would be fewer checked."""
 COMPARISONS = len(STRATEGIES) * REACHES * STEPS * 4
@@ -63,26 +63,26 @@ def test_what_is_solved_stays_clear_as_often_as_promised(strategy):
 
 def test_a_mean_that_only_just_stays_clear_is_found_out():
     """The check can fail: ways planned without the chance constraint are hit more often than eta allows."""
-    made = feasible_reaches(REACHES)[::5]
+    made = feasible_reaches(REACHES)[::2]
     naive = [solved(each.problem, each.guess, 'fixed', tau=0.0, lam=0.0) for each in made]
-    assert sum(largest_share_clear(each.problem, way) < each.problem.eta for each, way in zip(made, naive, strict=True)) >= 18
+    assert sum(largest_share_clear(each.problem, way) < each.problem.eta for each, way in zip(made, naive, strict=True)) >= 13
 
 
 def test_noise_that_was_not_planned_for_is_found_out():
     """So can the sharper one: with twice the noise, k standard deviations are no longer what they were."""
     found = 0
-    for made in feasible_reaches(REACHES)[::10]:
+    for made in feasible_reaches(REACHES)[::4]:
         solution = solved(made.problem, made.guess, 'optimal')
         noisier = replace(made.problem, noise=2 * made.problem.noise)
         found += largest_share_clear(noisier, solution) < NormalDist().cdf(k_of_eta(solution.eta))
-    assert found >= 5
+    assert found >= 4
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc'])
 def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised(strategy):
     """With Boole's inequality and the Gaussian bound; eta for each step alone does not promise it, and is found out."""
     checked, missed = 0, 0
-    for made in feasible_reaches(REACHES)[::10]:
+    for made in feasible_reaches(REACHES)[::4]:
         shares = {}
         for risk in ('path', 'step'):
             events = count_events(risk, len(made.problem.obstacles), made.problem.horizon.steps)
@@ -95,7 +95,7 @@ def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised
             assert shares['path'] >= made.problem.eta, f'seed {made.seed}'
             checked += 1
         missed += shares.get('step', 1.0) < made.problem.eta
-    assert checked >= 12
+    assert checked >= 9
     assert missed >= 1
 
 
@@ -108,4 +108,4 @@ def test_reaches_are_of_every_kind():
         not (problem.obstacles.velocity.any() or problem.obstacles.centre_covariance.any() or problem.initial_covariance.any())
         for problem in problems
     )
-    assert min(moving, uncertain, doubted, plain) >= 40
+    assert min(moving, uncertain, doubted, plain) >= 12

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from guidance_samples import PERIOD, random_candidate, random_prediction, random_scene, run_hostile
+from guidance_samples import PERIOD, random_candidate, run_hostile
 from prediction_samples import prediction
 
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.guidance.limits import find_largest_force
 
-FEW, BATCH, BATCHES = 300, 1000, 10
+FEW, BATCH, BATCHES = 200, 2500, 4
 
 
 def check_bounds(run) -> None:
@@ -100,19 +100,3 @@ def test_every_dead_man_condition_releases_the_hand_within_the_ramp(case: str, s
     assert output.force.tolist() == [0.0, 0.0]
     assert (np.diff(sizes) <= 0.0).all() and np.abs(np.diff(sizes)).max() <= settings.slew * PERIOD * (1 + 1e-9)
     assert output.authority == 0.0
-
-
-def test_a_random_state_releases_within_the_ramp() -> None:
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        config, obstacles, state = Config(), random_scene(rng), GuidanceState()
-        newest = random_prediction(rng, 0.0, np.zeros(2), obstacles)
-        given = GuidanceInput(0.0, np.zeros(2), rng.normal(0.0, 0.3, 2), newest)
-        for tick in range(10):
-            given = replace(given, t=PERIOD * tick)
-            _, state = guide(config, state, given)
-        begin = given.t
-        while given.t < begin + config.guidance.ramp_s - 1e-9:
-            given = replace(given, t=given.t + PERIOD, is_released=True)
-            output, state = guide(config, state, given)
-        assert output.force.tolist() == [0.0, 0.0]

@@ -44,10 +44,3 @@ def test_a_solution_keeps_the_hand_away_and_shows_the_given_obstacles() -> None:
 def test_the_hand_has_to_fit_at_start_and_goal() -> None:
     with pytest.raises(foc_ros.SceneError, match=r'^goal: expected a point outside obstacle 0, of radius 0\.03 m'):
         foc_ros.solve((0, 0), (0.175, 0.01), CUPS, config=WIDE)
-
-
-def test_a_predictor_shows_what_was_set() -> None:
-    predictor = foc_ros.Predictor(WIDE.with_values({'budget_s': 0.0}))
-    predictor.set_goals(GOALS)
-    predictor.set_obstacles(CUPS)
-    assert predictor.update(0.0, (0.0, 0.0)).obstacles.radius.tolist() == [0.02, 0.015]

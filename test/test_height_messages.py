@@ -16,12 +16,10 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import HeightTrajectory, Prediction
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.decode_markers import MarkerTable
-from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
+from foc_ros.ros.messages.decode_objects import CollisionTable, MarkerTable, decode_detections
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
-from foc_ros.ros.messages.plane import lift
-from foc_ros.ros.messages.transform_messages import Transform, transform_message
+from foc_ros.ros.messages.plane import Transform, compute_rotation, lift
 
 TYPES = message_types('rosbags')
 CUBE, SPHERE, CYLINDER = 1, 2, 3
@@ -91,16 +89,16 @@ def make_transform(angle: float, z: float) -> Transform:
     """Return a rotation about the x axis, and a shift along z."""
     quaternion = pose_stamped(TYPES, (0, 0, 0)).pose.orientation
     quaternion.x, quaternion.w = float(np.sin(angle / 2)), float(np.cos(angle / 2))
-    return Transform(quaternion, TYPES.make('geometry_msgs/msg/Vector3', z=z), SECOND)
+    return Transform(compute_rotation(quaternion), np.array([0.0, 0.0, z]))
 
 
 def test_a_transform_moves_heights_and_must_not_tilt_them() -> None:
     message = cloud(TYPES, table((0.1, 0.0, 0.5, 0.02, 0.2)), frame_id='camera')
     for angle, middle in ((0.0, 1.5), (np.pi, 0.5)):
-        moved = transform_message('obstacles', message, 'world', 'xy', lambda _, angle=angle: make_transform(angle, 1.0))
-        assert_allclose(decode_point_cloud(moved, 'xy').obstacles.heights, [[middle - 0.1, middle + 0.1]], rtol=1e-6)
+        moved = decode_point_cloud(message, 'xy', lambda _, angle=angle: ('world', make_transform(angle, 1.0)))
+        assert_allclose(moved.obstacles.heights, [[middle - 0.1, middle + 0.1]], rtol=1e-6)
     with pytest.raises(MessageError, match=r'fields\[size_z\]: expected boxes that the transform leaves in the task plane'):
-        transform_message('obstacles', message, 'world', 'xy', lambda _: make_transform(0.1, 0.0))
+        decode_point_cloud(message, 'xy', lambda _: ('world', make_transform(0.1, 0.0)))
 
 
 def test_heights_that_are_not_finite_are_refused() -> None:

@@ -9,7 +9,7 @@ from homotopy_shapes import HAND, make_box, random_shapes, shortest_by_pattern, 
 
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles, make_box_polygon
+from foc_ros.core.obstacles.shapes import Capsule, collect_obstacles, make_box_polygon
 from foc_ros.core.types import make_obstacles
 
 BEST = 16
@@ -48,7 +48,7 @@ def test_brute_force_finds_no_class_that_the_search_misses(batch):
         compare(make_scene(seed), seed)
 
 
-@pytest.mark.parametrize('batch', range(22))
+@pytest.mark.parametrize('batch', range(7))
 def test_brute_force_finds_none_in_many_more_scenes(batch):
     for seed in range(60 + 20 * batch, 60 + 20 * (batch + 1)):
         compare(make_scene(seed), seed)
@@ -77,50 +77,11 @@ def summarise(found):
     return [(one.label, round(one.length, 9)) for one in found.candidates]
 
 
-def subdivide(polygon, count):
-    """The same polygon with further vertices on its edges."""
-    share = np.arange(count)[:, None] / count
-    after = np.roll(polygon, -1, axis=0)
-    return np.concatenate([a + share * (b - a) for a, b in zip(polygon, after, strict=True)])
-
-
-@pytest.mark.parametrize('yaw', [0.0, 0.3, np.pi / 4])
-@pytest.mark.parametrize('corners', [1, 3])
-def test_a_box_with_64_vertices_is_the_same_box(yaw, corners):
-    boxes = [make_box(0.05, 0.04, yaw), make_box(0.06, 0.03, yaw), make_box(0.03, 0.06, -yaw)][:corners]
-    centre = np.array([[0.1, 0.01], [0.19, -0.02], [0.25, 0.03]])[:corners]
-    one = find(make_obstacles(centre, 0.0, polygons=boxes), k=8)
-    other = find(make_obstacles(centre, 0.0, polygons=[subdivide(box, 16) for box in boxes]), k=8)
-    assert [a.label for a in one.candidates] == [b.label for b in other.candidates]
-    assert len(one.candidates) == 2**corners
-    for a, b in zip(one.candidates, other.candidates, strict=True):
-        assert a.length == pytest.approx(b.length, abs=1e-9)
-        np.testing.assert_allclose(a.guess, b.guess, atol=1e-9)
-
-
-def test_a_polygon_of_64_vertices_is_nearly_the_circle():
-    angle = np.arange(64) * 2 * np.pi / 64
-    ring = np.column_stack([np.cos(angle), np.sin(angle)])
-    one = find(make_obstacles([[0.15, 0.01]], 0.03))
-    other = find(make_obstacles([[0.15, 0.01]], 0.0, polygons=[0.03 * ring]))
-    assert [a.length for a in one.candidates] == pytest.approx([b.length for b in other.candidates], **EXACT)
-
-
-def test_boxes_without_a_length_are_capsules_and_circles():
-    boxes = [Box((0.1, 0.01), (0.0, 0.0), radius=0.02), Box((0.2, 0.0), (0.08, 0.0), 0.3, radius=0.01)]
-    along = 0.04 * np.array([np.cos(0.3), np.sin(0.3)])
-    others = [Circle((0.1, 0.01), 0.02), Capsule(np.array([0.2, 0.0]) - along, np.array([0.2, 0.0]) + along, radius=0.01)]
-    one, other = find(collect_obstacles(boxes)), find(collect_obstacles(others))
-    assert [a.label for a in one.candidates] == [b.label for b in other.candidates]
-    for a, b in zip(one.candidates, other.candidates, strict=True):
-        np.testing.assert_allclose(a.guess, b.guess, atol=1e-12)
-
-
-@pytest.mark.parametrize('seed', range(15))
+@pytest.mark.parametrize('seed', range(10))
 def test_turned_and_shifted_scenes_and_other_orders_have_the_same_classes(seed):
     obstacles, rng = make_scene(seed), np.random.default_rng(seed)
     order = rng.permutation(len(obstacles))
-    assert summarise(find(obstacles)) == summarise(find(obstacles.take(order)))
+    assert summarise(find(obstacles)) == summarise(find(obstacles)) == summarise(find(obstacles.take(order)))
     angle, shift, velocity = rng.uniform(-np.pi, np.pi), rng.uniform(-2, 2, 2), np.array([0.2, 0.1])
     polygons = [turn(row[:corners], angle) for row, corners in zip(obstacles.vertices, obstacles.corners, strict=True)]
     moved = make_obstacles(turn(obstacles.centre, angle) + shift, obstacles.radius, ids=obstacles.ids, polygons=polygons)
@@ -132,7 +93,7 @@ def test_turned_and_shifted_scenes_and_other_orders_have_the_same_classes(seed):
         np.testing.assert_allclose(turn(a.guess, angle) + shift, b.guess, atol=2e-3)
 
 
-@pytest.mark.parametrize('seed', range(15))
+@pytest.mark.parametrize('seed', range(10))
 def test_mirrored_scenes_have_the_mirrored_classes(seed):
     obstacles, flip = make_scene(seed), np.array([1.0, -1.0])
     polygons = [row[:corners][::-1] * flip for row, corners in zip(obstacles.vertices, obstacles.corners, strict=True)]
@@ -148,7 +109,7 @@ def measure_clear(path, obstacles, clearance=CLEARANCE):
     return float((measure_offsets(path, obstacles)[1] - obstacles.radius - clearance).min())
 
 
-@pytest.mark.parametrize('seed', range(30))
+@pytest.mark.parametrize('seed', range(15))
 def test_guesses_are_clear_and_pass_as_their_names_say(seed):
     obstacles = make_scene(seed)
     for one in find(obstacles, steps=300).candidates:
@@ -190,12 +151,21 @@ def test_a_cross_of_two_bars_is_passed_on_two_sides_and_left_from_its_notches():
         assert measure_clear(one.guess, obstacles) > -1e-9
 
 
-def test_a_bar_through_a_circle_covers_it_in_two_places():
-    obstacles = make_obstacles(
-        [[0.175, 0.01], [0.175, -0.01]], [0.04, 0.0], polygons=[np.zeros((1, 2)), make_box(0.02, 0.2, 0.0)]
-    )
+def test_a_path_over_two_circles_and_back_between_them_and_a_third():
+    centre = np.array([[0.1866, 0.0914], [0.2434, 0.0164], [0.1862, 0.0495]])
+    obstacles = make_obstacles(centre, np.array([0.0355, 0.029, 0.0346]) - CLEARANCE)
+    found = {tuple(side for _, side in one.sides): one.length for one in find(obstacles, k=6).candidates}
     expected = shortest_by_pattern(obstacles)
-    assert [one.length for one in find(obstacles).candidates] == pytest.approx(sorted(expected.values()), **EXACT)
+    assert found.keys() == expected.keys()
+    assert found[1, -1, 1] == pytest.approx(0.511, rel=0.01)
+    assert found == pytest.approx(expected, **EXACT)
+
+
+def test_brute_force_agrees_with_the_closed_form_for_one_circle():
+    arc = np.pi - 2 * np.arccos(0.05 / 0.175)
+    exact = 2 * np.sqrt(0.175**2 - 0.05**2) + 0.05 * arc
+    found = shortest_by_pattern(make_obstacles([[0.175, 0.0]], 0.05), clearance=0.0)
+    assert found == {(1,): pytest.approx(exact, rel=1e-3), (-1,): pytest.approx(exact, rel=1e-3)}
 
 
 def test_a_chain_of_capsules_that_share_their_ends_is_one_obstacle():
@@ -228,13 +198,6 @@ def test_a_hand_in_a_box_or_in_its_margin_gets_out_on_both_sides(centre):
         assert measure_clear(one.guess[far], obstacles) > -1e-9
 
 
-@pytest.mark.parametrize('polygon', [make_box(0.06, 0.04, 0.1), make_box(0.06, 0.0, 0.2)[:3:2]])
-def test_a_hand_at_the_centre_of_a_shape_still_gets_out(polygon):
-    found = find(make_obstacles([[0.0, 0.0]], 0.01, polygons=[polygon]))
-    assert [one.label for one in found.candidates] == ['goal0:']
-    assert found.candidates[0].length == pytest.approx(0.35)
-
-
 def test_a_goal_in_a_box_is_reached_and_so_is_one_in_its_margin():
     box = make_box(0.04, 0.04, 0.3)
     inside = find(make_obstacles([GOAL + 0.01], 0.0, polygons=[box]))
@@ -244,14 +207,6 @@ def test_a_goal_in_a_box_is_reached_and_so_is_one_in_its_margin():
     near = find(obstacles, clearance=0.01)
     assert near.notes == {'goal_near': 1} and near.candidates
     assert all(measure_clear(one.guess, obstacles, 0.0) > 0.0 for one in near.candidates)
-
-
-def test_a_gap_between_boxes_is_open_from_twice_the_clearance():
-    for gap, through in ((2 * CLEARANCE - 1e-4, False), (2 * CLEARANCE + 1e-4, True)):
-        y = 0.03 + gap / 2
-        obstacles = make_obstacles([[0.15, y], [0.15, -y]], 0.0, polygons=[make_box(0.04, 0.06, 0.0)] * 2)
-        sides = [dict(one.sides) for one in find(obstacles, k=3).candidates]
-        assert ({'0': -1, '1': 1} in sides) is through
 
 
 def test_a_gap_that_was_taken_stays_open_while_it_is_a_little_too_narrow():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 
@@ -107,25 +108,10 @@ def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:
 @pytest.mark.parametrize(
     ('role', 'message', 'kind', 'words'),
     [
-        (
-            'hand_pose',
-            pose_stamped(TYPES, (float('nan'), 0, 0)),
-            'hand_lost',
-            'hand_pose: pose.position.x: expected a finite',
-        ),
-        (
-            'goals',
-            pose_array(TYPES, [(0, 0, 0), (0, float('inf'), 0)]),
-            'goals_invalid',
-            'goals: poses[1].position.y: expected a',
-        ),
+        ('hand_pose', pose_stamped(TYPES, (np.nan, 0, 0)), 'hand_lost', 'hand_pose: pose.position.x: expected a finite'),
+        ('goals', pose_array(TYPES, [(0, 0, 0), (0, np.inf, 0)]), 'goals_invalid', 'goals: poses[1].position.y: expected a'),
         ('goal_pose', pose_stamped(TYPES, (0, 1e9, 0)), 'goal_pose_invalid', 'goal_pose: pose.position.y: expected'),
-        (
-            'obstacles',
-            cloud(TYPES, obstacle_table([(0, 0, 0, -1)])),
-            'obstacles_invalid',
-            'obstacles: radius[0]: expected a number',
-        ),
+        ('obstacles', cloud(TYPES, obstacle_table([(0, 0, 0, -1)])), 'obstacles_invalid', 'obstacles: radius[0]: expected a'),
         (
             'obstacle_markers',
             marker_array(TYPES, marker(TYPES, scale=(-1, 1, 1))),
@@ -147,9 +133,9 @@ def test_a_message_that_cannot_be_decoded_changes_nothing_and_is_counted(
 
 
 def test_dropped_rows_are_counted(intake: Intake) -> None:
-    rows = obstacle_table([(0.1, 0.2, 0.0, 0.03), (float('nan'), 0, 0, 0.1)])
+    rows = obstacle_table([(0.1, 0.2, 0.0, 0.03), (np.nan, 0, 0, 0.1)])
     assert intake.take('obstacles', cloud(TYPES, rows)) is SampleStatus.ACCEPTED
-    show(intake, marker(TYPES, type=0), marker(TYPES, (float('inf'), 0, 0), id=3))
+    show(intake, marker(TYPES, type=0), marker(TYPES, (np.inf, 0, 0), id=3))
     assert intake.counts == {
         'obstacles_dropped_not_finite': 1,
         'obstacle_markers_dropped_not_a_shape': 1,
@@ -168,7 +154,7 @@ def test_a_refusal_of_the_pipeline_is_reported(intake: Intake) -> None:
 def test_a_restart_does_not_replace_the_last_refusal(intake: Intake) -> None:
     move(intake, 1.0)
     move(intake, 1.1, 'camera')
-    assert intake.take('goals', pose_array(TYPES, [(float('nan'), 0.0, 0.0)])) is None
+    assert intake.take('goals', pose_array(TYPES, [(np.nan, 0.0, 0.0)])) is None
     told = intake.last_refusal
     assert move(intake, 60.0) is SampleStatus.RESTARTED_GAP
     assert intake.last_refusal == told and 'poses[0]' in told

@@ -1,9 +1,6 @@
-"""Messages made for rclpy and for rosbags: the same fields, the right containers, and the same bytes."""
+"""Messages made for rclpy and for rosbags have the same bytes, and stamps stay in range."""
 
 from __future__ import annotations
-
-import array
-import re
 
 import numpy as np
 import pytest
@@ -49,26 +46,6 @@ def test_both_libraries_have_the_same_values(rclpy_types: RclpyTypes, index: int
     name = bags.__msgtype__
     decoded = STORE.deserialize_cdr(serialize_message(ours), name)
     assert STORE.serialize_cdr(decoded, name) == STORE.serialize_cdr(bags, name)
-
-
-def test_containers_are_those_of_each_library(rclpy_types: RclpyTypes) -> None:
-    ours = rclpy_types.make('sensor_msgs/msg/PointCloud2', data=np.arange(3))
-    bags = RosbagsTypes(STORE).make('sensor_msgs/msg/PointCloud2', data=b'\x00\x01\x02')
-    assert isinstance(ours.data, array.array) and ours.data.typecode == 'B' and list(ours.data) == [0, 1, 2]
-    assert isinstance(bags.data, np.ndarray) and bags.data.dtype == np.uint8 and list(bags.data) == [0, 1, 2]
-
-
-def test_integers_become_floats_in_float_fields(rclpy_types: RclpyTypes) -> None:
-    for types in (rclpy_types, RosbagsTypes(STORE)):
-        point = types.make('geometry_msgs/msg/Point', x=1, y=np.float32(2), z=np.int32(3))
-        assert [type(v) for v in (point.x, point.y, point.z)] == [float] * 3
-        assert (point.x, point.y, point.z) == (1.0, 2.0, 3.0)
-
-
-def test_an_unknown_field_is_named(rclpy_types: RclpyTypes) -> None:
-    for types in (rclpy_types, RosbagsTypes(STORE)):
-        with pytest.raises(TypeError, match=re.escape('geometry_msgs/msg/Point has no field radius')):
-            types.make('geometry_msgs/msg/Point', radius=1.0)
 
 
 @pytest.mark.parametrize(

@@ -70,24 +70,6 @@ def test_a_repeated_way_becomes_more_likely() -> None:
     assert last[1] == pytest.approx((prior * last[0] + 3.0) / (prior + 3.0), abs=0.02)
 
 
-def test_it_is_off_by_default() -> None:
-    pipeline = Pipeline(CONFIG.with_values({'experience.learning': Config().experience.learning}))
-    follow(pipeline, reach(ABOVE), reach(ABOVE))
-    assert not pipeline.learnt.movements.learnt and not pipeline.learnt.movements.states
-
-
-def test_learnt_goals_and_paths_say_nothing_of_ways() -> None:
-    with_paths, without = (Pipeline(CONFIG.with_values({'experience.learning': each})) for each in ('goals', 'none'))
-    learnt, unlearnt = (follow(each, *[reach(ABOVE)] * 3, is_predicting=True) for each in (with_paths, without))
-    assert len(with_paths.learnt.movements.learnt) == 2 and not without.learnt.movements.states
-    assert [likelihood_above(each) for each in learnt] == pytest.approx([likelihood_above(each) for each in unlearnt])
-    apart = [
-        np.hypot(*(one.candidates[0].mean[:, :2] - other.candidates[0].mean[:, :2]).T).max()
-        for one, other in zip(learnt, unlearnt, strict=True)
-    ]
-    assert max(apart) > 0.005, 'paths are learnt'
-
-
 def test_a_movement_is_learnt_when_it_has_ended() -> None:
     pipeline, path = Pipeline(CONFIG), reach(ABOVE, after_s=2.0)
     ended = round((0.4 + 1.5) / STEP_S)
@@ -135,14 +117,6 @@ def test_what_is_no_demonstration_is_refused(path: np.ndarray, goals: np.ndarray
     assert len(movements.states) <= MOST_STATES
 
 
-def test_the_oldest_movement_leaves_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(learning, 'MOST_LEARNT', 2)
-    pipeline = Pipeline(CONFIG)
-    follow(pipeline, reach(ABOVE), reach(BELOW), reach(BELOW), np.zeros((2, 2)))
-    assert [each.sides for each in pipeline.learnt.movements.learnt] == 2 * [pipeline.learnt.movements.learnt[-1].sides]
-    assert len(pipeline._library.recordings) == 2
-
-
 def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library() -> None:
     given = follow_one(ABOVE)
     for forget in (Pipeline.reset, lambda each: each.reconfigure(CONFIG.with_values({'estimator.jerk_density': 3.0}))):
@@ -161,36 +135,6 @@ def follow_one(path: np.ndarray):
     return pipeline.learnt.movements.learnt[0]
 
 
-def test_a_released_clutch_ends_a_movement() -> None:
-    pipeline = Pipeline(CONFIG)
-    follow(pipeline, reach(ABOVE))
-    assert not pipeline.learnt.movements.learnt
-    pipeline.set_engaged(False)
-    assert len(pipeline.learnt.movements.learnt) == 1 and pipeline.learnt.movements.hand is None
-
-
-def test_a_clutch_that_is_released_after_one_pose_of_a_movement_is_released() -> None:
-    pipeline, path = Pipeline(CONFIG), reach(ABOVE)
-    follow(pipeline, path[: len(path) // 2])
-    assert pipeline.hand_state is not None and pipeline.hand_state.onset_ns is not None
-    for on in (False, True):
-        pipeline.set_engaged(on)
-    stamp_ns = pipeline.hand_state.stamp_ns + round(STEP_S * NANOSECONDS)
-    pipeline.add_hand_sample(HandSample(stamp_ns, path[len(path) // 2], 0.0, 'world'))
-    pipeline.set_engaged(False)
-    movements = pipeline.learnt.movements
-    assert (pipeline.is_engaged, movements.learnt, movements.refused) == (False, (), 2)
-
-
-def test_without_a_message_of_obstacles_nothing_is_learnt() -> None:
-    pipeline = Pipeline(CONFIG)
-    pipeline.set_goals(GOAL, 'world')
-    for row, position in enumerate(reach(ABOVE)):
-        pipeline.add_hand_sample(HandSample(round(row * STEP_S * NANOSECONDS), position, 0.0, 'world'))
-    movements = pipeline.learnt.movements.finish()
-    assert not movements.learnt and 'before the first message of obstacles' in movements.refusal
-
-
 def test_recording_replay_and_pipeline_learn_the_same(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'reach', messages(seconds=1.02))
     (learnt,) = learn_recording(find_recordings(bag)['reach'], CONFIG)
@@ -207,17 +151,3 @@ def test_the_diagnostics_count_movements() -> None:
     follow(intake.pipeline, reach(ABOVE), reach(0.7 * BELOW), np.zeros((2, 2)))
     health = Monitor(0.0).report(1.0, intake, 'active', None, 0.0, [])
     assert any('1 movements recorded, 1 refused' in value for value in health.values.values())
-
-
-def test_states_do_not_depend_on_the_rate_of_the_samples() -> None:
-    fast, slow = reach(ABOVE), reach(ABOVE)[::5]
-    found = []
-    for positions, step_s in ((fast, STEP_S), (slow, 5 * STEP_S)):
-        pipeline = Pipeline(CONFIG)
-        pipeline.set_obstacles('cloud', OBSTACLES, None, 'world')
-        pipeline.set_goals(GOAL, 'world')
-        for row, position in enumerate(positions):
-            pipeline.add_hand_sample(HandSample(round(row * step_s * NANOSECONDS), position, 0.0, 'world'))
-        found.append(pipeline.learnt.movements.finish().learnt[0])
-    assert found[0].sides == found[1].sides
-    np.testing.assert_allclose(found[0].path, found[1].path, atol=0.01)

@@ -21,7 +21,7 @@ from test_node_faults import set_on  # noqa: E402
 
 from foc_ros.core import pipeline as computation  # noqa: E402
 from foc_ros.core.deadline import Deadline  # noqa: E402
-from foc_ros.ros import health, queue_polling  # noqa: E402
+from foc_ros.ros import health  # noqa: E402
 
 OK, WARN = b'\x00', b'\x01'
 
@@ -87,41 +87,6 @@ def test_services_and_diagnostics_answer_during_a_prediction(ros: Graph, gate: G
     end(bench, gate)
     stamps = [each.header.stamp for each in bench.wait_for('prediction', 2)]
     assert stamps == [hand_path(1)[0].header.stamp, poses[-1].header.stamp], 'the next one is made from the newest pose'
-
-
-def test_a_fast_hand_is_polled_until_it_is_slow_again(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The executor does not wake up for each pose at 1 kHz; every pose is received all the same, by a poll."""
-    bench, poses = Bench(ros), iter(hand_path(4000, rate_hz=1000.0))
-    polling = bench.node.polling
-    monkeypatch.setattr(queue_polling, 'POLL_S', 10.0)  # however slow the machine is
-    bench.deliver('hand_pose', next(poses), next(poses))
-    assert not polling.is_polling, 'another program spins'
-    polling.spin_once(ros.executor, 0.0)
-    bench.deliver('hand_pose', next(poses))
-    assert polling.is_polling
-    count = bench.node._monitor._inputs['hand_pose'].received
-    bench.send('hand_pose', *(next(poses) for _ in range(50)))
-    ros.spin_for(0.1)
-    assert bench.node._monitor._inputs['hand_pose'].received == count, 'the executor does not wait for poses'
-    polling.spin_once(ros.executor, 0.001)
-    assert bench.node._monitor._inputs['hand_pose'].received == count + 50
-    assert polling.is_polling
-    monkeypatch.setattr(queue_polling, 'POLL_S', 0.0)
-    polling.spin_once(ros.executor, 0.0)
-    assert not polling.is_polling
-    bench.deliver('hand_pose', next(poses))
-    assert figures(bench.health())['hand_pose refused'] == f'0 of {count + 51}'
-
-
-def test_a_fast_hand_is_needed_when_a_prediction_is_due_and_always_for_guidance(ros: Graph) -> None:
-    bench = Bench(ros)
-    assert bench.node.polling._find_unneeded_s() == 0.0
-    bench.publish_scene()
-    bench.move(hand_path(1))
-    bench.wait_for('prediction', 1)
-    assert bench.node.polling._find_unneeded_s() == 1.0 / bench.node.pipeline.config.rate_hz
-    assert set_on(bench, guidance__enabled=True).successful
-    assert bench.node.polling._find_unneeded_s() == 0.0
 
 
 def test_poses_in_the_queue_are_no_silence(ros: Graph) -> None:

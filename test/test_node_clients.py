@@ -25,7 +25,7 @@ def test_every_parameter_is_listed_described_read_and_set(ros: Graph) -> None:
     known = {parameter.name: parameter for parameter in list_parameters()}
     with running(ros, 'module'):
         listed = ros.call(client, ListParameters, 'foc/list_parameters', ListParameters.Request()).result.names
-        assert {*known, 'autostart', 'use_sim_time'} <= set(listed)
+        assert {*known, 'autostart', 'use_sim_time', 'qos_overrides./obstacles.subscription.durability'} <= set(listed)
         request = DescribeParameters.Request(names=listed)
         described = {
             each.name: each for each in ros.call(client, DescribeParameters, 'foc/describe_parameters', request).descriptors

@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
 from foc_ros.core import pipeline as pipelines  # noqa: E402
-from foc_ros.ros import guidance_loop  # noqa: E402
+from foc_ros.ros import guidance  # noqa: E402
 
 GUIDED = {'guidance.enabled': True, 'guidance.clearance': 0.0, 'rate_hz': 25.0}
 """Guidance everywhere, so that a hand that leaves its path feels a force."""
@@ -100,13 +100,13 @@ def test_a_node_that_is_a_predictor_only_publishes_no_guidance(ros: Graph) -> No
 
 
 def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    updates, update = [], guidance_loop.GuidanceLoop.update
+    updates, update = [], guidance.GuidanceLoop.update
 
-    def count(self: guidance_loop.GuidanceLoop, now_s: float) -> None:
+    def count(self: guidance.GuidanceLoop, now_s: float) -> None:
         updates.append(now_s)
         update(self, now_s)
 
-    monkeypatch.setattr(guidance_loop.GuidanceLoop, 'update', count)
+    monkeypatch.setattr(guidance.GuidanceLoop, 'update', count)
     bench = Guided(ros, **{'guidance.enabled': False})
     bench.publish_scene()
     bench.drive(60)
@@ -137,7 +137,6 @@ def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
     values = figures(bench.health())
     assert values['guidance'] in ('guiding', 'stale')
     assert 0.0 <= float(values['authority']) <= 0.5 and 0.0 <= float(values['force_N']) <= 3.0
-    assert values['realtime_priority'] in ('0', '50')
     assert 0.0 <= float(values['agreement']) <= 1.0 and 0.0 < float(values['tank_J']) <= 0.5
 
 
@@ -217,14 +216,14 @@ def test_a_slow_prediction_does_not_delay_guidance(ros: Graph, monkeypatch: pyte
 
 
 def test_an_error_of_guidance_is_reported_and_guidance_goes_on(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    bench, guide, failures = begin(ros), guidance_loop.guide, [ValueError('for this test')]
+    bench, guide, failures = begin(ros), guidance.guide, [ValueError('for this test')]
 
     def fail_once(*arguments: object):
         if failures:
             raise failures.pop()
         return guide(*arguments)
 
-    monkeypatch.setattr(guidance_loop, 'guide', fail_once)
+    monkeypatch.setattr(guidance, 'guide', fail_once)
     bench.drive_until(lambda: not failures, 'an update')
     assert int(figures(bench.health())['count internal_errors']) == 1
     bench.wrenches.clear()

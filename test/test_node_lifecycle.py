@@ -12,7 +12,7 @@ ros_helpers.require_ros()
 from lifecycle_msgs.msg import Transition  # noqa: E402
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState  # noqa: E402
 from message_helpers import SECOND, cloud, obstacle_table, pose_array  # noqa: E402
-from node_helpers import GOALS, ROWS, TYPES, Bench, figures, hand_path  # noqa: E402
+from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures, hand_path  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 
@@ -30,12 +30,6 @@ def predicted(bench: Bench, poses: list[Any]) -> int:
     before = int(figures(bench.health()).get('count predictions', 0))
     bench.move(poses)
     return int(figures(bench.health()).get('count predictions', 0)) - before
-
-
-def test_a_node_starts_active(ros: Graph) -> None:
-    bench = Bench(ros, outputs=[])
-    assert state_of(bench) == 'active'
-    assert figures(bench.health())['state'] == 'active'
 
 
 def test_a_managed_node_waits_for_configuration_and_activation(ros: Graph) -> None:
@@ -69,8 +63,7 @@ def test_a_manager_changes_the_state_by_number(ros: Graph) -> None:
 
 
 def test_a_deactivated_node_keeps_the_scene_and_can_be_activated_again(ros: Graph) -> None:
-    bench, poses = Bench(ros, outputs=[]), hand_path(12)
-    bench.publish_scene()
+    bench, poses = begin(ros, outputs=[]), hand_path(12)
     assert predicted(bench, poses[:4]) == 2
     assert change(bench, 'deactivate')
     assert predicted(bench, poses[4:8]) == 0
@@ -82,8 +75,7 @@ def test_a_deactivated_node_keeps_the_scene_and_can_be_activated_again(ros: Grap
 
 
 def test_the_clutch_is_kept_through_a_deactivation(ros: Graph) -> None:
-    bench, poses = Bench(ros, outputs=[]), hand_path(8)
-    bench.publish_scene()
+    bench, poses = begin(ros, outputs=[]), hand_path(8)
     ros.call(bench.player, SetBool, 'foc/engage', SetBool.Request(data=False))
     assert change(bench, 'deactivate')
     assert change(bench, 'activate')
@@ -92,9 +84,7 @@ def test_the_clutch_is_kept_through_a_deactivation(ros: Graph) -> None:
 
 
 def test_cleaning_up_forgets_all_but_the_parameters(ros: Graph) -> None:
-    bench = Bench(ros, outputs=[], parameters={'foc.eta': 0.7})
-    bench.publish_scene()
-    bench.move(hand_path(2))
+    bench = begin(ros, 2, outputs=[], parameters={'foc.eta': 0.7})
     assert change(bench, 'deactivate')
     assert change(bench, 'cleanup')
     assert state_of(bench) == 'unconfigured'
@@ -106,6 +96,16 @@ def test_cleaning_up_forgets_all_but_the_parameters(ros: Graph) -> None:
     assert change(bench, 'activate')
     bench.publish_scene()
     assert predicted(bench, hand_path(2)) == 1
+
+
+def test_messages_that_wait_when_the_node_is_cleaned_up_are_left(ros: Graph) -> None:
+    bench = begin(ros, outputs=[])
+    bench.send('hand_pose', *hand_path(50))
+    bench.send('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
+    bench.node.trigger_deactivate()
+    bench.node.trigger_cleanup()
+    ros.spin_for(0.2)
+    assert not bench.node.pipeline.scene.sources
 
 
 @pytest.mark.parametrize('label', ['activate', 'cleanup', 'no such transition'])
@@ -162,8 +162,7 @@ def test_a_silent_scene_stops_predictions_until_it_is_received_again(ros: Graph)
 
 
 def test_no_prediction_is_made_from_a_late_pose(ros: Graph) -> None:
-    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 5.0})
-    bench.publish_scene()
+    bench = begin(ros, parameters={'estimator.hand_timeout_s': 5.0})
     now_s = bench.node.get_clock().now().nanoseconds / SECOND
     bench.move(hand_path(1, start_s=now_s))
     bench.wait_for('prediction', 1)

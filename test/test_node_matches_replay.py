@@ -24,6 +24,7 @@ from foc_ros.ros.messages.encode_prediction import encode_outputs
 ROOT = Path(__file__).parents[1]
 SECONDS = 0.3
 LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
+NO_LIMITS = 'scene.timeout_s:=0.0', 'estimator.hand_timeout_s:=0.0', 'budget_s:=0.0'
 EXACT = ('candidate', 'compromised', 'goal', 'way')
 
 
@@ -64,11 +65,7 @@ def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]
         '--ros-args',
         '--params-file',
         parameters,
-        *(word for each in reliable for word in ('-p', each)),
-        '-p',
-        'scene.timeout_s:=0.0',
-        '-p',
-        'budget_s:=0.0',
+        *(word for each in (*reliable, *NO_LIMITS) for word in ('-p', each)),
     ]
     process = subprocess.Popen(
         command, cwd=ROOT, env=ros.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True

@@ -10,8 +10,8 @@ import ros_helpers
 
 ros_helpers.require_ros()
 
-from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, figures, hand_path, list_labels  # noqa: E402
+from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped  # noqa: E402
+from node_helpers import GOALS, QUICK, ROWS, TYPES, Bench, begin, figures, hand_path, list_labels  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
@@ -33,8 +33,7 @@ def sent(message: Any) -> Any:
 
 
 def test_every_due_hand_pose_gets_the_prediction_of_the_pipeline(ros: Graph) -> None:
-    bench, poses = Bench(ros), hand_path(20)
-    bench.publish_scene()
+    bench, poses = begin(ros), hand_path(20)
     bench.move(poses)
     clouds = bench.wait_for('prediction', 10)
     assert stamps(clouds) == stamps(poses)[::2]
@@ -69,17 +68,6 @@ def test_every_output_carries_the_stamp_and_frame_of_the_hand(ros: Graph) -> Non
     assert heights[0] == pytest.approx(0.25) and heights[-1] == pytest.approx(0.0, abs=1e-9), 'from the hand to the goal'
 
 
-def test_markers_and_a_single_goal_make_a_scene(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.deliver(
-        'obstacle_markers', marker_array(TYPES, marker(TYPES, (0.15, 0.02, 0.0), (0.06, 0.06, 0.06), stamp_ns=10 * SECOND))
-    )
-    bench.deliver('goal_pose', pose_stamped(TYPES, GOALS[0]))
-    bench.move(hand_path(2))
-    table = bench.wait_for('likelihoods', 1)[0]
-    assert 'a/0' in table.layout.dim[0].label
-
-
 def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros: Graph) -> None:
     bench = Bench(ros)
     assert 'no hand pose yet' in bench.health().message
@@ -101,8 +89,7 @@ def test_an_overloaded_node_predicts_from_the_newest_pose_and_counts_the_others(
 ) -> None:
     """Dropped cycles are counted; they are reported as a fault only if the predictions are not fresh."""
     monkeypatch.setattr(health, 'BUSY_S', 60.0 if is_fresh else 0.0)
-    bench, poses = Bench(ros), hand_path(41)
-    bench.publish_scene()
+    bench, poses = begin(ros), hand_path(41)
     bench.move(poses[:1])
     bench.wait_for('prediction', 1)
     bench.send('hand_pose', *poses[1:])
@@ -127,8 +114,7 @@ def test_a_refused_pose_triggers_no_prediction(ros: Graph) -> None:
 
 
 def test_a_looping_bag_restarts_the_movement(ros: Graph) -> None:
-    bench, poses = Bench(ros), hand_path(8, rate_hz=10.0)
-    bench.publish_scene()
+    bench, poses = begin(ros), hand_path(8, rate_hz=10.0)
     for turn in range(2):
         bench.move(poses)
         status = bench.health()
@@ -145,9 +131,7 @@ def test_only_subscribed_outputs_are_encoded(ros: Graph, monkeypatch: pytest.Mon
 
     asked: list[list[str]] = []
     monkeypatch.setattr(node, 'encode_outputs', lambda *args: asked.append(list(args[-1])) or encode_outputs(*args))
-    bench = Bench(ros, outputs=['likelihoods'])
-    bench.publish_scene()
-    bench.move(hand_path(1))
+    bench = begin(ros, 1, outputs=['likelihoods'])
     bench.wait_for('likelihoods', 1)
     assert asked == [['likelihoods']]
 
@@ -155,8 +139,7 @@ def test_only_subscribed_outputs_are_encoded(ros: Graph, monkeypatch: pytest.Mon
 def test_nothing_is_predicted_while_disengaged(ros: Graph) -> None:
     from std_srvs.srv import SetBool
 
-    bench, poses = Bench(ros), hand_path(12)
-    bench.publish_scene()
+    bench, poses = begin(ros), hand_path(12)
     bench.move(poses[:3])
     assert len(bench.wait_for('prediction', 2)) == 2
     answer = ros.call(bench.player, SetBool, 'foc/engage', SetBool.Request(data=False))
@@ -173,25 +156,12 @@ def test_nothing_is_predicted_while_disengaged(ros: Graph) -> None:
 def test_reset_forgets_the_movement_and_keeps_the_scene(ros: Graph) -> None:
     from std_srvs.srv import Trigger
 
-    bench = Bench(ros)
-    bench.publish_scene()
-    bench.move(hand_path(4))
+    bench = begin(ros, 4)
     bench.wait_for('prediction', 2)
     assert ros.call(bench.player, Trigger, 'foc/reset', Trigger.Request()).success
     assert bench.node.pipeline.hand_state is None
     bench.move(hand_path(1, start_s=9.9))
     assert stamps(bench.wait_for('prediction', 3))[-1] == round(9.9 * SECOND)
-
-
-def test_two_arms_in_two_namespaces_are_independent(ros: Graph) -> None:
-    left, right = Bench(ros, namespace='left', parameters={}), Bench(ros, namespace='right', parameters={})
-    left.publish_scene()
-    right.publish_scene()
-    left.publishers['hand_pose'].publish(hand_path(1)[0])
-    left.wait_for('prediction', 1)
-    ros.spin_for(0.2)
-    assert not right.received['prediction']
-    assert (left.health().name, right.health().name) == ('left/foc: prediction', 'right/foc: prediction')
 
 
 def test_a_scene_published_once_is_received_later_with_transient_local_durability(ros: Graph) -> None:
@@ -215,9 +185,7 @@ def test_a_scene_published_once_is_received_later_with_transient_local_durabilit
 
 
 def test_diagnostics_contain_rates_ages_times_and_candidates(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.publish_scene()
-    bench.move(hand_path(10))
+    bench = begin(ros, 10)
     bench.wait_for('prediction', 5)
     status = bench.health()
     values = figures(status)
@@ -251,8 +219,7 @@ def test_diagnostics_are_published_while_simulated_time_stands_still(ros: Graph)
 
 def test_the_node_learns_the_movement_that_the_pipeline_learns(ros: Graph) -> None:
     learning = {'experience.learning': 'online'}
-    bench, poses = Bench(ros, parameters=learning), hand_path(141)
-    bench.publish_scene()
+    bench, poses = begin(ros, parameters=learning), hand_path(141)
     bench.move(poses)
     intake = Intake(Pipeline(replace_values(Config(), QUICK | learning)))
     intake.take('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))

@@ -24,6 +24,9 @@ from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stam
 from node_helpers import GOALS, ROWS, TYPES, figures  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 
+from foc_ros.ros.isolated_node import reserve_domain  # noqa: E402
+from foc_ros.ros.main import main  # noqa: E402
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -42,19 +45,6 @@ LAUNCHES = {
     'command': [sys.executable, '-m', 'foc_ros', 'node'],
     'entry point': [entry_point('foc_node')],
 }
-
-
-SLOW_IMPORT = """
-import sys, time
-
-class Slow:
-    def find_spec(self, name, *_):
-        if name == 'foc_ros.ros.node':
-            time.sleep(60.0)
-
-sys.meta_path.insert(0, Slow())
-"""
-"""Loaded by a process at its start: as on a machine whose disk is slow, it takes long to load the node."""
 
 
 @contextmanager
@@ -133,14 +123,25 @@ def feed(ros: Graph, is_enough: Callable[[Player], bool], what: str, hand: str =
     return player
 
 
-@pytest.mark.parametrize('launch', LAUNCHES)
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ('launch', 'number'), [('module', signal.SIGTERM), ('command', signal.SIGINT), ('entry point', signal.SIGTERM)]
+)
 def test_a_working_node_stops_without_an_error(ros: Graph, launch: str, number: signal.Signals) -> None:
     with running(ros, launch) as process:
         feed(ros, lambda player: bool(player.predictions), 'a prediction')
         code, errors = ended(process, number)
     assert code == 0, errors
     assert 'Traceback' not in errors
+
+
+def test_a_node_works_with_an_rclpy_that_has_only_its_plain_executor(
+    ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / 'sitecustomize.py').write_text("import sys\nsys.modules['rclpy.experimental.events_executor'] = None\n")
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path), prepend=os.pathsep)
+    with running(ros, 'module') as process:
+        feed(ros, lambda player: bool(player.predictions), 'a prediction')
+        assert ended(process, signal.SIGTERM)[0] == 0
 
 
 def test_a_node_says_what_it_waits_for_and_when_it_predicts(ros: Graph) -> None:
@@ -155,37 +156,13 @@ def test_a_node_says_what_it_waits_for_and_when_it_predicts(ros: Graph) -> None:
     ]
 
 
-def test_dds_connects_the_process_while_it_loads_and_a_stop_then_leaves_no_trace(
-    ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / 'sitecustomize.py').write_text(SLOW_IMPORT)
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path), prepend=os.pathsep)
-    watcher = ros.node('watcher')
-    with running(ros, 'module') as process:
-        ros.spin_until(lambda: '_foc_start' in watcher.get_node_names(), 'the process', 30.0)
-        assert 'foc' not in watcher.get_node_names(), 'it is still loading'
-        code, errors = ended(process, signal.SIGTERM)
-    assert code == 0
-    assert [line for line in errors.splitlines() if not line.startswith('[INFO]')] == []
-    ros.spin_until(lambda: '_foc_start' not in watcher.get_node_names(), 'the end, without waiting for the lease', 10.0)
-
-
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph, number: signal.Signals) -> None:
     watcher = ros.node('watcher')
     with running(ros, 'module') as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
-        code, errors = ended(process, number)
-    assert code == 0
-    assert [line for line in errors.splitlines() if not line.startswith('[INFO]')] == []
-
-
-def test_a_second_signal_has_no_effect(ros: Graph) -> None:
-    watcher = ros.node('watcher')
-    with running(ros, 'module') as process:
-        ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
         process.send_signal(signal.SIGTERM)
-        code, errors = ended(process, signal.SIGINT)
+        code, errors = ended(process, number)  # a second one has no effect
     assert code == 0
     assert [line for line in errors.splitlines() if not line.startswith('[INFO]')] == []
 
@@ -208,10 +185,16 @@ def test_a_second_signal_has_no_effect(ros: Graph) -> None:
         (['--fast'], 'foc_node: unrecognized arguments: --fast (those of ROS follow --ros-args)\n'),
     ],
 )
-def test_a_node_that_cannot_start_prints_the_reason_in_one_line(ros: Graph, arguments: list[str], words: str) -> None:
-    with running(ros, 'module', *arguments) as process:
-        _, errors = process.communicate(timeout=30)
-    assert process.returncode == 2
+def test_a_node_that_cannot_start_prints_the_reason_in_one_line(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
+) -> None:
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with reserve_domain() as domain:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+        assert main(arguments) == 2
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    errors = capfd.readouterr().err
     lines = [line for line in errors.splitlines() if line.startswith('foc_node: ')]
     assert len(lines) == 1
     assert words in errors
@@ -241,7 +224,6 @@ def test_a_stopped_node_leaves_no_files_and_no_trace_in_the_graph(ros: Graph, tm
     environment = ros.environment | {'ROS_LOG_DIR': str(tmp_path / 'log'), 'PYTHONPATH': str(ROOT)}
     with subprocess.Popen(command, cwd=tmp_path, env=environment) as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
-        ros.spin_until(lambda: '_foc_start' not in watcher.get_node_names(), 'the end of the hidden node')
         process.send_signal(signal.SIGTERM)
         assert process.wait(30) == 0
     deadline = time.monotonic() + 30
@@ -249,11 +231,3 @@ def test_a_stopped_node_leaves_no_files_and_no_trace_in_the_graph(ros: Graph, tm
         assert time.monotonic() < deadline
         ros.executor.spin_once(timeout_sec=0.05)
     assert [each.name for each in tmp_path.iterdir()] == ['log']
-
-
-def test_a_node_receives_every_pose_of_a_tracker(ros: Graph) -> None:
-    count = 200
-    with running(ros, 'module', '--ros-args', '-p', 'foc.steps:=20') as process:
-        player = feed(ros, lambda player: player.sent == count, f'{count} poses sent')
-        ros.spin_until(lambda: player.figure('hand_pose refused') == f'0 of {count}', f'{count} poses in the diagnostics')
-        assert ended(process, signal.SIGTERM)[0] == 0

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foc_ros.core.obstacles.geometry import find_limits, measure_offsets, trace_obstacle, trace_outline
+from foc_ros.core.obstacles.geometry import find_limits, measure_offsets, trace_obstacle
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 
 SHAPES = (
@@ -34,11 +34,6 @@ def test_every_point_is_at_the_radius_and_the_area_is_that_of_steiner(shape: Sha
     edges = np.roll(shape.polygon, -1, axis=0) - shape.polygon
     expected = measure_area(shape.polygon) + np.hypot(*edges.T).sum() * radius + np.pi * radius**2
     assert measure_area(outline) == pytest.approx(expected, rel=1e-3)
-
-
-def test_a_sharp_box_is_its_corners() -> None:
-    polygon = Box((0.0, 0.0), (0.2, 0.1)).polygon
-    np.testing.assert_array_equal(trace_outline(polygon, 0.0), [*polygon, polygon[0]])
 
 
 @given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=12), st.floats(1e-3, 0.1))

@@ -93,11 +93,3 @@ def test_rows_of_the_prediction_are_read_by_field_name(decoded: dict[str, list[o
             assert np.allclose(part['xx'], solution.covariance[:, 0, 0], rtol=1e-6)
             assert np.allclose(part['likelihood'], by_label[label].likelihood)
             assert np.allclose([part['x'][-1], part['y'][-1]], GOAL[0, :2], atol=1e-6)
-
-
-def test_the_path_is_the_most_likely_one(decoded: dict[str, list[object]]) -> None:
-    for path, cloud in zip(decoded['/foc/path'], decoded['/foc/prediction'], strict=True):
-        table = rows(cloud)
-        best = table[table['candidate'] == 0]
-        assert np.allclose([pose.pose.position.x for pose in path.poses], best['x'], atol=1e-6)
-        assert stamp_ns(path.poses[-1]) > stamp_ns(path) == stamp_ns(cloud)

@@ -15,7 +15,7 @@ from report_samples import START_NS, prediction, predictions, samples, scene
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
 from foc_ros.io.outputs import check_replaceable, check_report
-from foc_ros.reporting.draw import plot_outcomes
+from foc_ros.reporting.figures import plot_outcomes
 from foc_ros.reporting.page import write_page
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
@@ -56,22 +56,3 @@ def test_a_report_overwrites_no_other_file(tmp_path: Path, name: str) -> None:
         check_report('--report', tmp_path)
     (tmp_path / name).rename(tmp_path / 'other.html')
     check_report('--report', tmp_path)
-
-
-def test_a_page_overwrites_no_other_file(tmp_path: Path) -> None:
-    (tmp_path / 'fit.html').write_text('mine', 'utf-8')
-    with pytest.raises(InputError, match='--report'):
-        write_page(tmp_path, 'fit.html', '')
-    assert (tmp_path / 'fit.html').read_text('utf-8') == 'mine'
-
-
-@pytest.mark.parametrize('command', [['evaluate', '.'], ['fit', '.', '--output', 'out.yaml'], ['simulate', '--trials', '1']])
-def test_a_report_that_is_a_file_is_refused_before_the_work(
-    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-    monkeypatch.chdir(tmp_path)
-    Path('mine').write_text('mine')
-    assert main([*command, '--report', 'mine']) == 2
-    assert capsys.readouterr().err == f'foc_ros {command[0]}: --report: expected a folder, got mine, which is a file\n'
-    assert Path('mine').read_text() == 'mine'

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from foc_ros.core.config import Config, DurationConfig, replace_values
-from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go, scale_durations
+from foc_ros.core.config import Config, replace_values
+from foc_ros.core.hand.duration import compute_movement_time, scale_durations
 from foc_ros.core.height import reach_along_axis
-from foc_ros.core.learning.pace import MOST_GOALS, Pace, find_free_positions
+from foc_ros.core.learning.pace import Pace, find_free_positions
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 
@@ -33,14 +31,6 @@ def follow(pipeline: Pipeline, *movements: np.ndarray, goal: np.ndarray = GOAL) 
         for row, position in enumerate(positions):
             pipeline.add_hand_sample(HandSample(start_ns + row * STEP_NS, position, 0.0, 'world'))
     return pipeline
-
-
-@pytest.mark.parametrize('model', ['fixed', 'fitts'])
-def test_scaled_durations_are_longer_by_the_factor(model: str) -> None:
-    pipeline, config = follow(Pipeline(CONFIG), np.zeros((5, 2))), DurationConfig(model=model)
-    assert pipeline.hand_state is not None
-    once, twice = (estimate_times_to_go(pipeline.hand_state, GOAL, each)[0] for each in (config, scale_durations(config, 2.0)))
-    assert twice == pytest.approx(2.0 * once, rel=1e-3)
 
 
 @pytest.mark.parametrize('factor', [0.6, 1.0, 2.0, 3.0])
@@ -69,20 +59,6 @@ def test_without_a_movement_nothing_changes() -> None:
     assert pipeline.adapted_config is CONFIG
 
 
-def test_a_movement_that_ends_on_the_way_does_not_count() -> None:
-    assert follow(Pipeline(CONFIG), reach(2.0, distance=0.2), np.zeros((50, 2))).learnt.pace.movements == 0
-
-
-def test_a_movement_is_judged_by_the_goals_that_it_had() -> None:
-    """The next recording has other goals, and its first sample ends a movement that was not at rest yet."""
-    unended = reach(2.0)[:-35]
-    pipeline = follow(Pipeline(CONFIG), unended)
-    follow(pipeline, np.zeros((2, 2)), goal=np.array([[-5.0, 0.0]]))
-    assert pipeline.learnt.pace.movements == 1 and pipeline.learnt.pace.present is None
-    same = follow(follow(Pipeline(CONFIG), unended), np.zeros((2, 2)))
-    np.testing.assert_array_equal(pipeline.learnt.pace.losses, same.learnt.pace.losses)
-
-
 def test_the_present_movement_counts_by_the_distance_that_it_has_covered() -> None:
     slow, pipeline, found = reach(4.0), Pipeline(CONFIG), [1.0]
     for row, position in enumerate(slow[:130]):
@@ -93,40 +69,6 @@ def test_the_present_movement_counts_by_the_distance_that_it_has_covered() -> No
     first = int(np.flatnonzero(np.array(found) != 1.0)[0])
     assert np.abs(np.diff(np.log(found[first:]))).max() < 0.1, 'after the first state that is judged, the factor does not jump'
     assert pipeline.learnt.pace.interrupt().find_best(CONFIG.duration) == ('rest', 1.0)
-
-
-def test_a_present_movement_is_judged_by_the_goal_to_which_it_fits_best() -> None:
-    goals = np.vstack([[[-0.1, 0.3]], GOAL, [[0.0, -0.4]]])
-    several, one = (follow(Pipeline(CONFIG), reach(3.0)[:150], goal=each).learnt.pace for each in (goals, GOAL))
-    found, expected = (each.find_best(CONFIG.duration)[1] for each in (several, one))
-    assert found == pytest.approx(expected, rel=0.05) and expected > 1.5
-
-
-def test_durations_that_are_better_known_are_changed_less() -> None:
-    pace = follow(Pipeline(CONFIG), reach(3.0)[:150]).learnt.pace
-    factors = [pace.find_best(replace(CONFIG.duration, spread=each))[1] for each in (0.4, 0.2, 0.1, 0.0)]
-    assert factors[0] > factors[1] > factors[2] > factors[3] == pytest.approx(1.0, abs=0.01)
-
-
-def test_a_state_is_judged_with_the_goals_that_the_hand_has_come_nearer_to() -> None:
-    angles = np.linspace(-np.pi, np.pi, 64, endpoint=False)
-    places = 0.4 * np.column_stack([np.cos(angles), np.sin(angles)])
-    present = follow(Pipeline(CONFIG), reach(3.0)[:120], goal=places).learnt.pace.present
-    assert present is not None
-    judged = np.flatnonzero(present.moved)
-    assert MOST_GOALS <= len(judged) < 16 and np.abs(angles[judged]).max() < 1.0
-    alone = follow(Pipeline(CONFIG), reach(3.0)[:120], goal=GOAL).learnt.pace
-    assert present.moved[32] == alone.present.moved[0]
-    np.testing.assert_allclose(present.errors[32], alone.present.errors[0])
-
-
-def test_goals_keep_their_errors_by_their_places_and_new_ones_have_none() -> None:
-    goals = np.vstack([GOAL, GOAL + 0.2, GOAL - 0.2])
-    present = follow(Pipeline(CONFIG), reach(3.0)[:150], goal=goals).learnt.pace.present
-    assert present is not None and present.moved.all()
-    matched = present.match(np.vstack([GOAL + 0.5, GOAL - 0.21, GOAL + 0.01]))
-    np.testing.assert_array_equal(matched.errors, [0.0 * present.errors[0], present.errors[2], present.errors[0]])
-    np.testing.assert_array_equal(matched.moved, [0.0, present.moved[2], present.moved[0]])
 
 
 def test_goals_that_change_during_movements_do_not_keep_the_pace_from_being_learnt() -> None:
@@ -160,20 +102,6 @@ def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:
     assert pipeline.learnt.pace.movements > 0
     pipeline.reconfigure(pipeline.adapted_config)
     assert pipeline.learnt.pace.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
-
-
-def test_factors_stay_within_the_bounds_of_the_parameters() -> None:
-    assert scale_durations(DurationConfig(model='fixed', fixed_s=50.0), 3.0).fixed_s == 60.0
-    assert replace(Pace(), movements=1).find_best(DurationConfig()) == ('rest', pytest.approx(1.0))
-
-
-@pytest.mark.parametrize('passing', [False, True])
-def test_free_movements_end_at_the_goal_and_may_pass_it_at_their_speed(passing: bool) -> None:
-    goal, start = np.array([0.3, 0.4]), np.array([0.0, 0.0, 0.15, 0.2])
-    halfway, there = (find_free_positions(start, goal, np.array([2.0]), seconds, passing)[0] for seconds in (1.0, 3.0))
-    np.testing.assert_allclose(there, goal, atol=1e-12)
-    if passing:
-        np.testing.assert_allclose(halfway, goal / 2.0, atol=1e-12)
 
 
 @pytest.mark.parametrize('arrival', ['rest', 'passing'])

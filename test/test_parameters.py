@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,7 @@ from ros_helpers import Graph
 from foc_ros.core.config import Config, flatten, list_parameters, replace_values
 from foc_ros.core.errors import FocError, FocWarning, ParameterError, RecordingError
 from foc_ros.ros import parameters as module
-from foc_ros.ros.parameters import check_parameters, dump_parameter_file, load_parameter_file
+from foc_ros.ros.parameters import check_parameter_files, dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).parents[1]
 NAMES = [parameter.name for parameter in list_parameters()]
@@ -30,13 +28,6 @@ def load(folder: Path, text: str) -> Config:
     file = folder / 'params.yaml'
     file.write_text(text, 'utf-8')
     return load_parameter_file(file)
-
-
-def test_the_shipped_file_is_current() -> None:
-    made = subprocess.run(
-        [sys.executable, '-m', 'foc_ros.ros.parameters'], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout
-    assert made == (ROOT / 'config' / 'foc.yaml').read_text('utf-8'), 'run: python -m foc_ros.ros.parameters > config/foc.yaml'
 
 
 def test_the_shipped_file_holds_the_defaults() -> None:
@@ -168,24 +159,6 @@ def node_with(ros: Graph, **overrides: object) -> Any:
     return ros.node('foc', parameter_overrides=given_values, automatically_declare_parameters_from_overrides=True)
 
 
-@pytest.mark.parametrize(
-    'arguments',
-    [
-        ['-p', 'arm:rate_hz:=-1.0'],
-        ['-p', 'rate_hz:={'],
-        ['-p', 'budget_s:=1e-3', '-p', 'likelihood.shortfall:=.inf'],
-        ['-p', 'frame_id:=2026-11-24'],
-        ['-p', 'frame_id:=1_0'],
-        ['-p', 'frame_id:=~'],
-    ],
-)
-def test_what_depends_on_the_name_of_the_node_is_left_to_the_node(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    check_parameters(['foc_node', '--ros-args', *arguments])
-
-
 SECTIONS = ['/**', '/*', 'foc', '/foc', '/**/foc', '/*/foc', '/**/**', '/arm/foc', '/arm/*', '/arm/**', 'arm/foc', '/arm/left/*']
 
 
@@ -208,7 +181,7 @@ def test_sections_apply_as_ros_applies_them(tmp_path: Path, namespace: str) -> N
             assert module._read_values(file, node, is_needed=False) == ({'rate_hz': applied[-1]} if applied else {})
             if namespace == '/' and applied:
                 assert load_parameter_file(file).rate_hz == applied[-1]
-        if first in SECTIONS[::4]:  # a node takes a while
+        if first == '/**':  # which applies always: it shows whether the second one does; a node takes a while
             with graph(arguments) as ros:
                 overrides = node_with(ros).get_parameters_by_prefix('')
                 assert [each.value for name, each in overrides.items() if name == 'rate_hz'] == applied[-1:]
@@ -221,10 +194,10 @@ def test_a_section_that_does_not_apply_is_named(tmp_path: Path) -> None:
         assert load_parameter_file(file).rate_hz == 6.0
     arguments = ['foc_node', '--ros-args', '--params-file', str(file)]
     with pytest.warns(FocWarning, match='does not apply to the node /foc$'):
-        check_parameters(arguments)
+        check_parameter_files(arguments)
     for others in (['-r', '__ns:=/left'], ['-r', '__node:=arm'], ['--remap', '__name:=arm']):
         with pytest.warns(FocWarning, match='/arm/foc does not apply to the node /(left/foc|arm)$'):
-            check_parameters([*arguments, *others])
+            check_parameter_files([*arguments, *others])
 
 
 @pytest.mark.parametrize(
@@ -243,26 +216,18 @@ def test_a_section_that_does_not_apply_is_named(tmp_path: Path) -> None:
 def test_node_and_commands_refuse_the_same_files(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / 'params.yaml'
     file.write_text(text)
-    for read in (load_parameter_file, lambda each: check_parameters(['--ros-args', '--params-file', str(each)])):
+    for read in (load_parameter_file, lambda each: check_parameter_files(['--ros-args', '--params-file', str(each)])):
         with pytest.raises(FocError, match=re.escape(words.replace('"', ''))):
             read(file)
 
 
 def test_a_node_needs_no_parameters_in_a_file(tmp_path: Path) -> None:
     (tmp_path / 'params.yaml').write_text('# nothing yet\n')
-    check_parameters(['--ros-args', '--params-file', str(tmp_path / 'params.yaml')])
+    check_parameter_files(['--ros-args', '--params-file', str(tmp_path / 'params.yaml')])
 
 
 def test_a_section_may_be_below_the_root(tmp_path: Path) -> None:
     assert load(tmp_path, '/: {foc: {ros__parameters: {rate_hz: 5.0}}}').rate_hz == 5.0
-
-
-def test_a_later_argument_replaces_an_earlier_one(tmp_path: Path) -> None:
-    file = tmp_path / 'foc.yaml'
-    file.write_text('foc: {ros__parameters: {rate_hz: -1.0}}')
-    check_parameters(['--ros-args', '--params-file', str(file), '-p', 'rate_hz:=5.0'])
-    with pytest.raises(ParameterError, match='rate_hz'):
-        check_parameters(['--ros-args', '-p', 'rate_hz:=5.0', '--params-file', str(file)])
 
 
 def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:
@@ -301,13 +266,6 @@ def test_a_node_starts_with_its_parameter_overrides(ros: Graph) -> None:
     assert isinstance(node.get_parameter('rate_hz').value, float)
 
 
-def test_a_node_does_not_start_with_a_value_out_of_bounds(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import declare_parameters
-
-    with pytest.raises(ParameterError, match=re.escape('foc.eta: expected a number in [0, 0.999], got 2.0')):
-        declare_parameters(node_with(ros, foc__eta=2.0), Config())
-
-
 def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
     from ros_helpers import graph
 
@@ -318,13 +276,6 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
         assert declare_parameters(node_with(ros), Config()) == config == load_parameter_file(file)
-
-
-def test_an_unknown_parameter_of_a_node_is_refused_with_a_similar_one(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import declare_parameters
-
-    with pytest.raises(ParameterError, match=r'foc\.etta: expected a known parameter \(did you mean foc\.eta\?\), got 0\.5'):
-        declare_parameters(node_with(ros, foc__etta=0.5), Config())
 
 
 def test_names_in_the_file_are_the_names_of_the_node() -> None:

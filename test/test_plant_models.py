@@ -9,9 +9,8 @@ from numpy.testing import assert_allclose
 import foc_ros
 from foc_ros.core.config import Config
 from foc_ros.core.obstacles.risk import k_of_eta
-from foc_ros.core.plant.covariance import compute_duration_sensitivity
 from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
-from foc_ros.core.plant.plants import Plant, condense, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.plant.plants import Plant, discretise_triple_integrator
 from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.registry import PLANTS
 from foc_ros.core.tracks import NO_TRACKS
@@ -39,20 +38,6 @@ def register(monkeypatch):
     make_plant_model.cache_clear()
 
 
-def test_without_obstacles_the_effort_of_a_damped_mass_is_that_of_the_kkt_system():
-    (found,) = predict(MASS_CONFIG, MOVING, make_obstacles(), GOAL, NO_TRACKS)[0].solved_candidates
-    solution = found.solution
-    horizon = condense(discretise_damped_mass(solution.dt, MASS, DAMPING), STEPS)
-    target = np.array([0.3, 0.0, 0.0, 0.0]) - horizon.powers[-1] @ MOVING.mean[:4]
-    n = 2 * STEPS
-    kkt = np.block([[2.0 * np.eye(n), horizon.last.T], [horizon.last, np.zeros((4, 4))]])
-    control = np.linalg.solve(kkt, np.concatenate([np.zeros(n), target]))[:n]
-    assert solution.effort == pytest.approx(control @ control, rel=1e-9)
-    assert_allclose(solution.mean[-1], [0.3, 0.0, 0.0, 0.0], atol=1e-9)
-    assert solution.mean.shape == (STEPS + 1, 4)
-    assert solution.covariance.shape == (STEPS + 1, 4, 4)
-
-
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
 def test_a_damped_mass_avoids_obstacles_as_surely_as_wanted(strategy):
     candidates = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy=strategy, config=MASS_CONFIG)
@@ -68,40 +53,6 @@ def test_a_damped_mass_avoids_obstacles_as_surely_as_wanted(strategy):
         expected = 0.03**2 + 0.003**2 - distance**2
         total = 4 * 0.03**2 * 0.003**2 + 2 * 0.003**4 + 4 * distance**2 * variance
         assert (expected + k_of_eta(0.9) * np.sqrt(total)).max() <= 1e-6
-
-
-def test_predictions_of_a_damped_mass_have_all_parts_of_the_covariance():
-    config = MASS_CONFIG.with_values({'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2})
-    scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
-    exact = MASS_CONFIG.with_values({'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0})
-    narrow, wide = (predict(each, MOVING, *scene, NO_TRACKS)[0] for each in (exact, config))
-    assert len(narrow.solved_candidates) == 2
-    for before, after in zip(narrow.candidates, wide.candidates, strict=True):
-        np.testing.assert_array_equal(before.mean, after.mean)
-        added = after.covariance - before.covariance
-        assert np.linalg.eigvalsh(added).min() > -1e-12
-        assert added[-1, 0, 0] >= 0.005**2
-        assert added[STEPS // 2, 0, 0] > added[-1, 0, 0]
-
-
-def test_the_duration_shifts_the_end_of_a_damped_mass_as_a_longer_plan_does():
-    plans = []
-    for factor in (0.99, 1.0, 1.01):
-        config = MASS_CONFIG.with_values({'duration.model': 'fixed', 'duration.fixed_s': factor})
-        plans.append(predict(config, MOVING, make_obstacles(), GOAL, NO_TRACKS)[0].candidates[0].solution)
-    plan = plans[1]
-    early, late = (np.interp(plan.times, each.times, each.path[:, 0]) for each in plans[::2])
-    found = compute_duration_sensitivity(plan, False, make_plant_model(MASS_CONFIG.foc))[:, 0]
-    middle = slice(0, int(0.95 * STEPS))
-    assert_allclose(found[middle], ((early - late) / 0.02)[middle], atol=0.03 * np.abs(found).max())
-
-
-def test_the_durations_do_not_depend_on_the_plant():
-    durations = []
-    for config in (Config().with_values({'estimator.acceleration_time_s': 0.0}), MASS_CONFIG):
-        solved = predict(config, MOVING, make_obstacles([[0.15, 0.01]], 0.03), GOAL, NO_TRACKS)[0].solved_candidates
-        durations.append({each.label: each.times[-1] for each in solved})
-    assert durations[0] == durations[1]
 
 
 def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(register):
@@ -134,11 +85,6 @@ def test_a_plant_with_other_states_from_outside_is_solved_and_predicted(register
     for prediction in islice(foc_ros.replay('foc_ros/recordings/reaching.mcap', config), 3):
         assert prediction.solved_candidates
         assert prediction.candidates[0].mean.shape[1] == 4
-
-
-def test_a_recording_is_replayed_with_a_damped_mass():
-    for prediction in islice(foc_ros.replay('foc_ros/recordings/reaching.mcap', MASS_CONFIG), 3):
-        assert prediction.solved_candidates
 
 
 def test_what_is_no_plant_model_is_refused(register):

@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from play_helpers import until
-from report_samples import START_NS, prediction, widen
+from report_samples import START_NS, prediction
 from session_helpers import BOX, CIRCLE, SCENE, TASKS, parse
 
 from foc_ros.core.config import Config
@@ -21,9 +21,8 @@ from foc_ros.core.errors import InputError
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.play.messages import PageClock, parse_message
 from foc_ros.play.predictor import Predictor, State
-from foc_ros.play.scene import FIRST_SCENE, START, TARGET_RADIUS, Slots, make_random_scene, view_candidates
-from foc_ros.play.tasks import Phase, Tasks, make_trials, tabulate_scores
-from foc_ros.reporting.views import build_snapshot
+from foc_ros.play.scene import FIRST_SCENE, START
+from foc_ros.play.tasks import Phase, Tasks, tabulate_scores
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.decode_poses import decode_goals
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
@@ -78,24 +77,6 @@ def test_a_scene_reaches_the_node_as_it_was_arranged() -> None:
     np.testing.assert_allclose(decode_goals(messages['goals'], 'xy')[0], [[0.3, 0.0]])
 
 
-def test_clearance_is_negative_inside_an_obstacle() -> None:
-    scene = parse(SCENE | {'obstacles': [CIRCLE, BOX | {'y': 0.0, 'yaw': 0.0}]})
-    for position, clearance in (((0.1, 0.03), 0.01), ((0.1, 0.015), -0.005), ((0.2, 0.012), 0.002), ((0.2, 0.004), -0.006)):
-        assert scene.measure_clearance(position) == pytest.approx(clearance)
-    assert parse(SCENE | {'obstacles': []}).measure_clearance((0.0, 0.0)) == math.inf
-
-
-def test_random_scenes_leave_room_and_repeat_by_seed() -> None:
-    for seed in range(50):
-        scene = make_random_scene(np.random.default_rng(seed), FIRST_SCENE.goals)
-        assert scene == make_random_scene(np.random.default_rng(seed), FIRST_SCENE.goals)
-        assert 3 <= len(scene.obstacles) <= 5
-        assert parse({'type': 'scene', **scene.model_dump()}).obstacles == scene.obstacles  # within the bounds of the page
-        for point in (START, *scene.points):
-            assert scene.measure_clearance(point) > TARGET_RADIUS
-    assert scene != make_random_scene(np.random.default_rng(0), FIRST_SCENE.goals)
-
-
 def test_stamps_follow_the_quickest_message_and_never_step_back() -> None:
     clock, second = PageClock(), 10**9
     assert clock.stamp(1000.0, 100 * second) == 100 * second
@@ -110,16 +91,6 @@ def test_stamps_follow_the_quickest_message_and_never_step_back() -> None:
     with pytest.raises(InputError, match=r'hand\.t: expected a time before .* ms, got 9000000000'):
         clock.stamp(9e9, 101 * second)
     assert clock.stamp(1140.0, 100 * second + 60_000_000) == 100 * second + 50_000_000
-
-
-def test_a_sequence_is_balanced_and_repeats_by_seed() -> None:
-    settings = parse(TASKS | {'trials': 12, 'shuffled': True})
-    trials = make_trials(settings, FIRST_SCENE)
-    assert trials == make_trials(settings, FIRST_SCENE) != make_trials(settings.model_copy(update={'seed': 4}), FIRST_SCENE)
-    kinds = [(each.goal, each.is_guided) for each in trials]
-    assert {kind: kinds.count(kind) for kind in set(kinds)} == {(goal, on): 2 for goal in range(3) for on in (False, True)}
-    assert len({each.scene.model_dump_json() for each in trials}) == 12
-    assert not any(each.is_guided for each in make_trials(settings.model_copy(update={'assistance': 'without'}), FIRST_SCENE))
 
 
 def test_a_trial_is_scored() -> None:
@@ -176,22 +147,3 @@ def test_the_state_is_well_only_while_predictions_succeed() -> None:
     finally:
         predictor.stop()
     assert predictor.check().text.startswith('predictions have ended')
-
-
-def test_the_page_is_given_words_ghosts_and_the_total_uncertainty_of_the_most_likely_path_only() -> None:
-    views = view_candidates(build_snapshot(widen(prediction(START_NS, np.zeros(2)))), Slots())
-    assert [each['slot'] for each in views] == [0, 1, 2, None]
-    assert [each['goal'] for each in views] == [0, 0, 1, 1]
-    assert views[0]['description'] == 'goal0: left of 1' != views[1]['description'] == 'goal0: right of 1'
-    assert [each['ghost'] for each in views] == ['', '', 'leads through obstacle post', 'eta unreachable']
-    assert [bool(each['total']) for each in views] == [True, False, False, False]
-    assert [each['likelihood'] for each in views] == [0.6, 0.3, 0.1, None]
-
-
-def test_a_class_keeps_its_slot_while_it_is_followed() -> None:
-    slots = Slots()
-    assert slots.assign([5, 9]) == [0, 1]
-    assert slots.assign([9, 4, 5]) == [1, 2, 0]
-    assert slots.assign([4]) == [2]
-    assert slots.assign([4, 5]) == [2, 3]  # slot 0 is free for a short time only: the others come first
-    assert slots.assign(list(range(20)))[12:] == [None] * 8

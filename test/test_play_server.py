@@ -25,10 +25,10 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
-from foc_ros.play.address import describe_page, is_loopback, open_sockets
+from foc_ros.play.address import open_sockets
 from foc_ros.play.messages import LONGEST_MESSAGE
 from foc_ros.play.predictor import Predictor
-from foc_ros.play.server import FILES, is_own_host, listen
+from foc_ros.play.server import FILES, listen
 from foc_ros.play.session import Session
 
 HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': None}
@@ -137,18 +137,6 @@ def test_bad_messages_are_refused_and_harm_nothing(tmp_path: Path) -> None:
         assert not any(tmp_path.iterdir())
 
     serve(tmp_path, test)
-
-
-def test_own_hosts_loopback_and_the_address_of_the_page() -> None:
-    own = (('localhost', '127.0.0.1'), ('127.0.0.1',) * 2, ('[::1]', '::1'), ('192.168.1.7', '0.0.0.0'), ('lab', 'lab'))
-    assert all(is_own_host(name, host) for name, host in own)
-    foreign = ('lab', '0.0.0.0'), *((name, '127.0.0.1') for name in ('attacker.example', '127.0.0.1.attacker.example', ''))
-    assert not any(is_own_host(name, host) for name, host in foreign)
-    assert all(map(is_loopback, ('127.0.0.1', 'localhost', '::1')))
-    assert not any(map(is_loopback, ('0.0.0.0', '192.168.1.7', 'lab')))
-    assert describe_page('::1', 8420) == 'http://[::1]:8420 in a browser'
-    words = 'http://0.0.0.0:8420 in a browser, on other computers with an address of this one in place of 0.0.0.0'
-    assert describe_page('0.0.0.0', 8420) == words
 
 
 def test_a_wrong_option_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,7 +22,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.io.bags import BagReader
 from foc_ros.io.topics import TYPES
 from foc_ros.play import jobs, recording
-from foc_ros.play.predictor import Predictor, State
+from foc_ros.play.predictor import Predictor
 from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START
 from foc_ros.play.session import Session
 from foc_ros.reporting.encode import LENGTH
@@ -59,16 +59,6 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page: Page) -> None:
     assert replay.describe_losses() == ''
     with BagReader(folder / recording.SESSION) as reader:
         assert sum(item.role == 'hand_pose' for item in reader) > len(stamps)
-
-
-def test_a_stopped_task_leaves_its_session_and_restores_guidance(page: Page) -> None:
-    page.send(TASKS | {'assistance': 'with'})
-    page.move(START, 60)
-    page.send({'type': 'stop'})
-    assert page.last('score')['rows'] == []
-    assert [each.guidance.enabled for each in page.session.predictor.configs] == [True, False]
-    folder = Path(page.last('settings')['session'])
-    assert sorted(each.name for each in folder.iterdir()) == ['parameters.yaml', 'session']
 
 
 def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None:
@@ -177,37 +167,6 @@ def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_s
     assert asyncio.run(work(page, 'compare'))['text'].endswith(' Not used: trial_002 (nothing could be predicted).')
 
 
-def test_a_fit_that_ends_during_tasks_changes_the_parameters_after_them(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    record_trials(page, 1)
-    page.send(TASKS | {'assistance': 'with'})
-    page.session.predictor.configs.clear()
-    operator = page.session._jobs.operator = page.session._jobs.recording.folder / recording.OPERATOR
-    operator.write_text(dump_parameter_file(replace_values(Config(), FITTED)))
-    page.session._note_fitted(True)
-    reach(page)
-    assert {each.likelihood.beta for each in page.session.predictor.configs} <= {Config().likelihood.beta}
-    page.send({'type': 'stop'})
-    assert page.session.predictor.configs[-1] == replace_values(Config(), FITTED)
-    assert page.last('settings')['parameters'] == 'mine'
-
-
-@pytest.mark.parametrize('printed', ['{"failed": {}}', ''], ids=['answer', 'nothing'])
-def test_a_command_that_could_not_use_all_trials_has_an_answer(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, printed: str
-) -> None:
-    """Exit code 2 and an answer mean that some recordings were not used; without an answer, the command has failed."""
-    program = tmp_path / 'program'
-    program.write_text(f"#!/bin/sh\necho 'foc_ros fit: trial_002: reason' >&2\nprintf '%s' '{printed}'\nexit 2\n")
-    program.chmod(0o755)
-    monkeypatch.setattr(jobs.sys, 'executable', str(program))
-    noted: list[str] = []
-    if printed:
-        assert asyncio.run(jobs.run_command(noted.append, 'fit')) == printed
-    else:
-        with pytest.raises(jobs.CommandError, match='foc_ros fit: trial_002: reason'):
-            asyncio.run(jobs.run_command(noted.append, 'fit'))
-
-
 NO_POSITIONS = {
     'displacement_m': {'likelihood-weighted': {'average': {'0.5': None}}},
     'nlpd': {'foc': {'0.5': None}},
@@ -262,14 +221,6 @@ def test_a_fit_shows_its_progress_and_can_be_cancelled(page: Page, tmp_path: Pat
 
     asyncio.run(run())
     assert page.last('settings')['fitted'] is False
-
-
-def test_the_page_is_told_what_fails(page: Page) -> None:
-    page.session.tick()
-    assert (page.last('status')['level'], page.last('status')['text']) == ('well', 'silent')
-    page.session.predictor.state = State('failing', 'no path to any goal can be found')
-    page.session.tick()
-    assert page.last('status')['level'] == 'failing'
 
 
 def test_only_the_newest_page_steers(page: Page) -> None:

@@ -47,19 +47,6 @@ def test_the_animation_covers_a_movement(tmp_path: Path) -> None:
     assert (tmp_path / 'demo.gif').read_bytes().startswith(b'GIF89a')
 
 
-def test_the_readme_picture_shows_the_beginning_of_its_movement() -> None:
-    still = script('pictures')
-    made = samples(still.MOVEMENT)
-    hand, snapshots = build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made, every=2)]
-    start_ns = hand.find_movements(0.05)[still.MOVEMENT - 1][0]
-    shown = min(snapshots, key=lambda each: abs(each.stamp_ns - start_ns - still.AFTER_S * 1e9))
-    drawn = [line.get_xydata() for line in still.scene(hand, snapshots).axes[0].lines]
-    for each in shown.candidates:
-        assert any(np.array_equal(line, each.curve) for line in drawn)
-    # the hand's past, its future, and where it is
-    assert sum(np.isin(line[:, 0], hand.positions[:, 0]).all() for line in drawn) >= 3
-
-
 @pytest.mark.parametrize('name', ['noise', 'surrogate', 'strategies', 'classes', 'likelihood'])
 def test_concepts_have_their_pictures(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     concepts = script('pictures')

@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 
 from foc_ros.core.config import Config
-from foc_ros.ros.guidance_loop import GuidanceLoop
-from foc_ros.ros.realtime import ThreadPriority
+from foc_ros.ros.guidance import GuidanceLoop
 
 GUIDED = Config().with_values({'guidance.enabled': True, 'guidance.realtime_priority': 7})
 
@@ -32,30 +31,23 @@ def get_policy() -> tuple[int, int]:
     return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getparam(0).sched_priority
 
 
-def is_permitted() -> bool:
-    """Return whether a thread of this process may have a real-time priority."""
-    return bool(run_in_thread(lambda: try_priority(7)).priority)
-
-
-def try_priority(priority: int) -> ThreadPriority:
-    """Set the priority of this thread and return it."""
-    tried = ThreadPriority(lambda _: None)
-    tried.set(priority)
-    return tried
+def make_loop(warn: Callable[[str], None] = lambda _: None) -> GuidanceLoop:
+    return GuidanceLoop(GUIDED, lambda *_: None, lambda _: None, warn)
 
 
 def test_the_priority_holds_for_the_thread_alone_and_can_be_given_back() -> None:
-    if not is_permitted():
-        pytest.skip('this user may not set a real-time priority (rtprio)')
+    loop, ordinary = make_loop(), (os.SCHED_OTHER, 0)
 
     def set_and_back() -> list[tuple[int, int]]:
-        priority = try_priority(7)
+        loop._set_priority(7)
         found = [get_policy(), run_in_thread(get_policy)]
-        priority.set(0)
+        loop._set_priority(0)
         return [*found, get_policy()]
 
-    ordinary = os.SCHED_OTHER, 0
-    assert run_in_thread(set_and_back) == [(os.SCHED_FIFO, 7), ordinary, ordinary]
+    found = run_in_thread(set_and_back)
+    if found[0] == ordinary:
+        pytest.skip('this user may not set a real-time priority (rtprio)')
+    assert found == [(os.SCHED_FIFO, 7), ordinary, ordinary]
     assert get_policy() == ordinary
 
 
@@ -66,10 +58,10 @@ def test_a_priority_that_is_not_permitted_is_told_once(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(os, 'sched_setscheduler', refuse)
     told: list[str] = []
-    priority = ThreadPriority(told.append)
+    loop = make_loop(told.append)
     for each in (0, 50, 50, 60):
-        priority.set(each)
-    assert priority.priority == 0
+        loop._set_priority(each)
+    assert loop._priority == 0
     assert len(told) == 1
     assert all(word in told[0] for word in ('50', 'not permitted', 'rtprio', 'guidance.realtime_priority'))
 
@@ -79,7 +71,7 @@ def test_the_thread_of_guidance_has_it_while_guidance_is_enabled(monkeypatch: py
     monkeypatch.setattr(
         os, 'sched_setscheduler', lambda _, __, to: asked.append((threading.current_thread().name, to.sched_priority))
     )
-    loop = GuidanceLoop(GUIDED, lambda *_: None, lambda _: None, lambda _: None)
+    loop = make_loop()
 
     def wait_for(*priorities: int) -> None:
         end = time.monotonic() + 10.0
@@ -107,7 +99,7 @@ def test_a_late_update_leaves_the_processor_to_others(monkeypatch: pytest.Monkey
         updates.append((now_s, time.monotonic()))
 
     monkeypatch.setattr(GuidanceLoop, 'update', update_slowly)
-    loop = GuidanceLoop(GUIDED, lambda *_: None, lambda _: None, lambda _: None)
+    loop = make_loop()
     loop.start()
     end = time.monotonic() + 10.0
     while len(updates) < 5 and time.monotonic() < end:

@@ -1,7 +1,7 @@
 """Records have read-only arrays: copies, unless the array is read-only already."""
 
 import pickle
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ import pytest
 from foc_ros.core.config import Config
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import Array, HandState, Prediction, Record, Solution, as_readonly, make_obstacles
+from foc_ros.core.types import Array, HandState, Prediction, Record, make_obstacles
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,31 +35,9 @@ def test_a_record_copies_an_array_that_can_be_written_to() -> None:
         kept.array[0] = 1.0
 
 
-def test_a_read_only_array_is_not_copied() -> None:
-    array = as_readonly(np.zeros(3))
-    assert Kept(array).array is array
-    with pytest.raises(ValueError, match='read-only'):
-        array[0] = 1.0
-
-
-def test_a_view_across_rows_becomes_contiguous() -> None:
-    kept = Kept(as_readonly(np.arange(6.0).reshape(3, 2))[:, 0])
-    assert kept.array.flags.c_contiguous and kept.array.tolist() == [0.0, 2.0, 4.0]
-
-
 def test_a_record_from_another_process_is_read_only() -> None:
     kept = pickle.loads(pickle.dumps(make_obstacles([[0.15, 0.0]], 0.02)))
     assert not any(value.flags.writeable for value in vars(kept).values() if isinstance(value, np.ndarray))
-
-
-def test_a_solution_with_another_covariance_is_otherwise_the_same(prediction: Prediction) -> None:
-    solution = prediction.candidates[0].solution
-    covariance = 2.0 * solution.covariance
-    found, motor = solution.with_covariance(covariance.copy()), solution.motor_covariance
-    expected = replace(solution, covariance=covariance, motor_covariance=solution.covariance if motor is None else motor)
-    assert vars(found).keys() == vars(expected).keys() == {field.name for field in fields(Solution)}
-    for name, value in vars(expected).items():
-        np.testing.assert_array_equal(vars(found)[name], value)
 
 
 def test_all_arrays_of_a_prediction_are_read_only(prediction: Prediction) -> None:

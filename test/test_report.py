@@ -19,8 +19,8 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import HandSample, Status
 from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
-from foc_ros.reporting.report import write_report
-from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
+from foc_ros.reporting.report import describe_late, write_report
+from foc_ros.reporting.views import Snapshot, build_hand_trajectory, build_snapshot
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
 
@@ -134,20 +134,41 @@ def test_a_long_recording_is_thinned_out_and_its_page_stays_below_a_megabyte_and
     assert len(json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))['predictions']) == 4_500
 
 
-def test_paths_begin_at_the_measured_hand_and_ghosts_say_why(tmp_path: Path) -> None:
-    """The second half of the predictions is of answers from before: they begin where the hand was 0.2 s ago."""
-    made = samples()
-    known = predictions(made, every=2)
-    late = [replace(old, stamp_ns=new.stamp_ns) for old, new in zip(known[:-10], known[10:], strict=True)]
-    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in late], {})
+def test_ghosts_say_why(tmp_path: Path) -> None:
+    report(tmp_path)
     data = page_data_of(tmp_path)
-    hand = np.cumsum([data['hand']['t'], data['hand']['x'], data['hand']['y']], axis=1)
-    for frame in data['frames']:
-        at = hand[1:, np.searchsorted(hand[0], round(1e3 * data['times'][frame['at']]))]
-        for each in (*frame['candidates'], *frame['unsolved']):
-            np.testing.assert_allclose([each['x'][0], each['y'][0]], at, atol=1.0)
     ghosts = {data['labels'][each['ghost']] for frame in data['frames'] for each in (*frame['candidates'], *frame['unsolved'])}
     assert {'', 'leads through obstacle post', 'eta unreachable'} <= ghosts
+
+
+def end_with(snapshot: Snapshot, *statuses: Status) -> Snapshot:
+    """Return a snapshot whose likeliest candidates have ended otherwise, and without one that is lost."""
+    pairs = zip(snapshot.candidates, statuses, strict=False)
+    ended = [replace(each, status=status) for each, status in pairs]
+    return replace(snapshot, candidates=(*ended, *snapshot.candidates[len(ended) :]), unsolved=())
+
+
+def test_a_busy_computer_is_told_once_with_what_to_change_and_an_estimate_is_not_called_compromised(tmp_path: Path) -> None:
+    made = [build_snapshot(each) for each in predictions(samples())]
+    hand = build_hand_trajectory(samples())
+
+    def told(snapshots: list[Snapshot]) -> tuple[list[str], dict[str, str]]:
+        write_report(tmp_path, 'x', hand, snapshots, {})
+        numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
+        return numbers['warnings'], numbers['summary']
+
+    count = len(made)
+    calm = [end_with(each, Status.SOLVED, Status.ESTIMATED, Status.COMPROMISED) for each in made]
+    warnings, facts = told([end_with(calm[0], Status.DEADLINE), *calm[1:]])
+    assert warnings == [] and describe_late(calm) == ''
+    shown = f'as surely as wanted: {count - 1}, less surely: {count}, as far as estimated: {count + 1}'
+    assert facts['paths with at least 1 %'] == f'{3 * count}; they avoid the obstacles {shown}'
+    busy = [end_with(each, Status.DEADLINE) for each in made[:10]] + calm[10:]
+    (words,), _ = told(busy)
+    assert words == describe_late(busy) and words.startswith(f'This computer was too busy for 10 of {count} predictions')
+    assert 'rate_hz' in words and 'homotopy.max_candidates' in words and 'budget_s' in words
+    (words,), _ = told([end_with(each, Status.COMPROMISED) for each in made[:5]] + calm[5:])
+    assert words.startswith(f'In 5 of {count} predictions the most likely path avoids the obstacles less surely than wanted')
 
 
 def test_the_vertices_of_a_box_are_behind_the_numbers_of_a_circle(tmp_path: Path) -> None:

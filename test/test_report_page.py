@@ -13,8 +13,8 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from browser_helpers import check_report, chromium, screenshot, show
-from report_samples import predictions, samples
+from browser_helpers import MOVE, check_report, chromium, screenshot, show
+from report_samples import START_NS, predictions, samples
 
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
@@ -135,6 +135,9 @@ def test_a_candidate_can_be_highlighted(browser: Any, report: Path) -> None:
 
 def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_the_pointer(browser: Any, report: Path) -> None:
     show(browser, report / 'index.html')
+    choose = "const first = document.getElementById('movement'); first.value = 0; first.dispatchEvent(new Event('change'))"
+    browser.execute_script(choose)
+    browser.execute_script(MOVE, 0)
     paths = browser.execute_script('return report.scene.paths.map((each) => [each.kind, each.text, each.points])')
     assert [kind for kind, _, _ in paths].count('ghost') == 2
     begins = np.array([points[0] for _, _, points in paths])
@@ -150,7 +153,7 @@ def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_t
     assert (kind, browser.execute_script('return report.scene.find(arguments[0])', points[12])) == ('path', text)
     signs = browser.find_element('id', 'signs').text
     assert all(
-        name in signs for name in ('hand before', 'hand later', 'motor noise', 'total uncertainty', 'obstacle', 'goal', 'pale')
+        name in signs for name in ('hand before', 'hand later', 'motor noise', 'all uncertainty', 'obstacle', 'goal', 'pale')
     )
 
 
@@ -190,17 +193,26 @@ def test_a_warning_leads_to_its_first_moment(browser: Any, tmp_path: Path) -> No
     assert counters.get_attribute('open') is None and 'hand_late 3' in counters.get_attribute('textContent')
 
 
-def test_the_page_begins_where_the_filter_has_settled(browser: Any, tmp_path: Path) -> None:
-    made = samples()
+def test_the_page_opens_on_the_way_where_several_paths_are_likely_and_the_filter_has_setled(browser: Any, tmp_path: Path) -> None:
+    """The second of two movements has a moment with four paths; the first predictions of both are not settled."""
+    made = samples(2)
     snapshots = [build_snapshot(each) for each in predictions(made)]
-    for row in range(4):
-        candidates = snapshots[row].candidates
-        wide = tuple(replace(each, covariance=100.0 * each.covariance, motor_covariance=each.covariance) for each in candidates)
-        snapshots[row] = replace(snapshots[row], candidates=wide)
+    best = next(row for row, each in enumerate(snapshots) if each.stamp_ns > START_NS + 2_300_000_000)
+    for row, snapshot in enumerate(snapshots):
+        shares = (0.3, 0.3, 0.25) if row == best else (0.9, 0.03, 0.02)
+        candidates = tuple(replace(each, likelihood=share) for each, share in zip(snapshot.candidates, shares, strict=True))
+        snapshots[row] = replace(snapshot, candidates=candidates)
+    unsettled = next(row for row, each in enumerate(snapshots) if each.stamp_ns > START_NS + 2_250_000_000)
+    wide = tuple(
+        replace(each, likelihood=0.3, covariance=100.0 * each.covariance, motor_covariance=each.covariance)
+        for each in snapshots[unsettled].candidates
+    )
+    snapshots[unsettled] = replace(snapshots[unsettled], candidates=wide)
     write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
     assert show(browser, tmp_path / 'index.html') == []
     slider = browser.find_element('id', 'time')
-    assert (slider.get_attribute('min'), slider.get_attribute('value')) == ('0', '4')
+    assert slider.get_attribute('value') == str(best) != str(unsettled)
+    assert browser.find_element('id', 'movement').get_attribute('value') == '1'
 
 
 def changed(report: Path, copy: Path, old: str, new: str) -> Path:

@@ -23,14 +23,6 @@ def test_the_union_of_the_sources_holds_the_latest_row_of_an_id() -> None:
     assert dict(zip(again.ids, again.centre[:, 0], strict=True)) == {'a': 0.0, 'b': 1.0, 'c': 2.0}
 
 
-def test_a_source_replaces_its_whole_table() -> None:
-    scene = Scene().with_source('cloud', ObstacleSource(make_obstacles([[0.0, 0.0]], 0.1, ids=('a',)), NOW, 'w'))
-    scene = scene.with_source('cloud', ObstacleSource(make_obstacles([[1.0, 0.0]], 0.1, ids=('b',)), NOW, 'w'))
-    assert scene.obstacles(NOW).ids == ('b',)
-    assert len(scene.with_source('cloud', ObstacleSource(make_obstacles(), NOW, 'w')).obstacles(NOW)) == 0
-    assert len(Scene().obstacles(NOW)) == 0
-
-
 def test_obstacles_move_on_to_the_given_stamp() -> None:
     moving = make_obstacles([[0.1, 0.2]], 0.1, velocity=[0.5, -1.0])
     stamped = Scene().with_source('cloud', ObstacleSource(moving, NOW - NANOSECONDS // 5, 'w'))
@@ -57,27 +49,3 @@ def test_stale_sources_are_found_by_their_stamps(ages: list[float | None], timeo
         stamp = None if age is None else NOW - round(age * 1e9)
         scene = scene.with_source(str(i), ObstacleSource(make_obstacles(), stamp, 'w'))
     assert scene.not_ready_reason(NOW, timeout) == (None if words is None else ('stale', words))
-
-
-def test_what_is_missing_is_named() -> None:
-    scene = Scene()
-    assert scene.not_ready_reason(NOW, 2.0) == (
-        'no_obstacles',
-        'no obstacles received yet: publish an empty cloud for an empty scene',
-    )
-    scene = scene.with_source('cloud', ObstacleSource(make_obstacles(), NOW, 'w'))
-    assert scene.not_ready_reason(NOW, 2.0) == ('no_goal', 'no goal received')
-    assert scene.with_goals(np.zeros((0, 2)), 'w').not_ready_reason(NOW, 2.0) == (
-        'no_goal',
-        'no goal: the last goals message was empty',
-    )
-    assert scene.with_goals(np.zeros((1, 2)), 'w').not_ready_reason(NOW, 2.0) is None
-
-
-def test_the_scene_copies_its_goals() -> None:
-    given = np.zeros((1, 2))
-    scene = Scene().with_goals(given, 'w')
-    given[0, 0] = 7.0
-    assert scene.goals is not None
-    assert scene.goals[0, 0] == 0.0
-    assert not scene.goals.flags.writeable

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +11,8 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config
-from foc_ros.core.errors import FocError, ParameterError, RecordingError, SceneError, list_messages
+from foc_ros.core.errors import RecordingError, SceneError, list_messages
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, collect_obstacles
-from foc_ros.core.support import check_number, check_vector
-from foc_ros.io.documents import _check_keys as check_keys
 from foc_ros.io.scene_file import guess_path, load_scene, parse_scene
 
 SCENE: dict[str, Any] = {
@@ -83,29 +79,11 @@ def test_boxes_capsules_and_hulls_are_read() -> None:
         np.testing.assert_array_equal(getattr(obstacles, name), values, err_msg=name)
 
 
-def test_the_hand_has_a_radius() -> None:
-    scene = {**without('tau', 'lambda'), 'strategy': 'optimal', 'hand_radius': 0.01}
-    assert parse_scene(scene).config.scene.hand_radius == 0.01
-    assert parse_scene(scene).obstacles.radius.tolist() == [0.03, 0.02]
-    with pytest.raises(
-        SceneError, match=r'^start: expected a point outside obstacle cup, of radius 0\.04 m, got .*, 0\.035 m from'
-    ):
-        parse_scene({**scene, 'start': [0.1, 0.035]})
-
-
 @pytest.mark.parametrize('name', ['scene.yaml', 'scene.yml', 'scene.json', 'scene'])
 def test_yaml_and_json_give_the_same_scene(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text(json.dumps(SCENE, indent='\t' if name.endswith('json') else None), 'utf-8')
     scene = load_scene(tmp_path / name)
     assert scene.config.foc.lam == 1e6 and scene.obstacles.ids == ('cup', '1')
-
-
-def test_yaml_texts_of_numbers_are_numbers(tmp_path: Path) -> None:
-    (tmp_path / 's.yaml').write_text(
-        'start: [0, 0]\ngoal: [3e-1, 0]\nstrategy: fixed\nlambda: 2e6\nobstacles: [{x: 1e-1, y: 1, radius: 1e-2}]'
-    )
-    scene = load_scene(tmp_path / 's.yaml')
-    assert scene.goals[0, 0] == 0.3 and scene.config.foc.lam == 2e6 and scene.obstacles.radius.tolist() == [0.01]
 
 
 ROUND = [[2 + np.cos(turn), 2 + np.sin(turn)] for turn in np.linspace(0, 2 * np.pi, 18)[:17]]
@@ -123,62 +101,41 @@ def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
     ('scene', 'message'),
     [
         ([], r'scene: expected a mapping of fields, got \[\]'),
-        (None, 'scene: expected a mapping of fields, got None'),
         ({**SCENE, 'etta': 0.9}, r'etta: expected a known field \(did you mean eta\?\), got 0\.9'),
         (without('start'), 'start: expected two numbers, got nothing'),
         ({**SCENE, 'start': 0.1}, 'start: expected a list of 2 numbers, got 0.1'),
-        ({**SCENE, 'start': [0.1]}, r'start: expected a list of 2 numbers, got \[0.1\]'),
         ({**SCENE, 'start': [0.1, 'a']}, r"start: expected a number in \[-10000, 10000\], got 'a'"),
         ({**SCENE, 'start': [0.1, float('nan')]}, r'start: expected a number in \[-10000, 10000\], got nan'),
-        ({**SCENE, 'start': [0.1, True]}, r'start: expected a number in \[-10000, 10000\], got True'),
-        ({**SCENE, 'start_velocity': [0, None]}, r'start_velocity: expected a number in \[-10000, 10000\], got None'),
         ({**SCENE, 'start_stddev': -0.1}, r'start_stddev: expected a number in \[0, 10000\], got -0.1'),
         (without('goal'), 'goal: expected either goal or goals, got neither'),
         ({**SCENE, 'goals': [[0, 0]]}, 'goal: expected either goal or goals, got both'),
         ({**without('goal'), 'goals': []}, r'goals: expected at least one point, got \[\]'),
         ({**without('goal'), 'goals': [[0, 0], [1e5, 0]]}, r'goals\[1\]: expected a number in \[-10000, 10000\], got 100000.0'),
         ({**SCENE, 'eta': 1.0}, r'eta: expected a number in \[0, 0.999\], got 1.0'),
-        ({**SCENE, 'eta': -0.1}, r'eta: expected a number in \[0, 0.999\], got -0.1'),
-        ({**SCENE, 'eta': float('nan')}, 'eta: expected a finite number.*, got nan'),
         ({**SCENE, 'steps': 2}, r'steps: expected a number in \[5, 400\], got 2'),
         ({**SCENE, 'steps': 40.5}, 'steps: expected a whole number.*, got 40.5'),
         ({**SCENE, 'duration_s': 0}, 'duration_s: expected a number in .* s, got 0'),
-        ({**SCENE, 'noise': 0.1}, 'noise: expected a list of 2 numbers, got 0.1'),
         ({**SCENE, 'noise': [0.1, -0.1]}, r'noise: expected a number in \[0, 2\].*, got -0.1'),
         ({**SCENE, 'strategy': 'best'}, "strategy: expected one of lv, hc, optimal, algorithm1, fixed, got 'best'"),
         ({**SCENE, 'strategy': 'lv'}, 'tau: expected to be given with strategy fixed only, got strategy lv'),
-        ({**without('tau'), 'strategy': 'hc'}, 'lambda: expected to be given with strategy fixed only, got strategy hc'),
-        ({**SCENE, 'lambda': -1}, 'lambda: expected a number in .*, got -1'),
-        ({**SCENE, 'max_candidates': 0}, 'max_candidates: expected a number in .*, got 0'),
         ({**SCENE, 'obstacles': {'x': 1}}, "obstacles: expected a list, got {'x': 1}"),
         ({**SCENE, 'obstacles': [{'x': 1, 'y': 1}]}, r'obstacles\[0\].radius: expected a number, got nothing'),
         (obstacle(radius=-1), r'obstacles\[0\].radius: expected a number in \[0, 10000\], got -1'),
-        (obstacle(size=[0.1, -1]), r'obstacles\[0\].size: expected a number in \[0, 10000\], got -1'),
-        (obstacle(size=0.1), r'obstacles\[0\].size: expected a list of 2 numbers, got 0.1'),
         (obstacle(size=[0, 0], radius=0), r'obstacles\[0\].radius: expected a number > 0 m for a box without any size, got 0'),
-        (obstacle(size=[1, 1], yaw=float('nan')), r'obstacles\[0\].yaw: expected a number in \[-10000, 10000\], got nan'),
         (obstacle(yaw=1), r'obstacles\[0\].yaw: expected to be given with a size, and without points, got 1'),
         (obstacle(points=[[0, 0]]), r'obstacles\[0\].x: expected to be given with a size, and without points, got 1'),
         ({**SCENE, 'obstacles': [{'points': []}]}, r'obstacles\[0\].points: expected finite numbers of shape \(n, 2\), got \[\]'),
-        ({**SCENE, 'obstacles': [{'points': [[1, 1], [2]]}]}, r'obstacles\[0\].points\[1\]: expected a list of 2 numbers'),
         ({**SCENE, 'obstacles': [{'points': ROUND}]}, r'obstacles\[0\].points: expected a hull of at most 16 corners, got 17'),
-        ({**SCENE, 'obstacles': [{'size': [1, 1], 'y': 1}]}, r'obstacles\[0\].x: expected a number, got nothing'),
-        ({**SCENE, 'obstacles': [{'x': 0, 'y': 0.1, 'size': [1, 0.1]}]}, 'start: expected a point outside obstacle 0'),
         ({**SCENE, 'hand_radius': -1}, r'hand_radius: expected a number in \[0, 1\] m, got -1'),
         (obstacle(r=1), r'obstacles\[0\]\.r: expected a known field: x, .*, got 1'),
         (obstacle(2, id=3), r'obstacles\[1\].id: expected another id .*, got 3'),
         (obstacle(id='a;b'), r"obstacles\[0\].id: expected .*, got 'a;b'"),
         ({**SCENE, 'start': [0.1, 0.02]}, r'start: expected a point outside obstacle cup, of radius 0.03 m, got .*, 0.02 m from'),
         ({**SCENE, 'goal': [0.2, 0.1]}, 'goal: expected a point outside obstacle 1, of radius 0.02 m, got .*, 0 m from'),
-        (obstacle(id=None), r'obstacles\[0\].id: expected a whole number, or a name .*, got None'),
-        (obstacle(id='a' * 41), r"obstacles\[0\].id: expected .* of at most 40 characters, got 'aaaa"),
         ({**SCENE, 'obstacles': 20_001 * [{}]}, 'obstacles: expected a list of at most 20000, got one of 20001'),
         ({**without('goal'), 'goals': 257 * [[0, 0]]}, 'goals: expected a list of at most 256, got one of 257'),
         ({**SCENE, 'guess': 10_001 * [[0, 0]]}, 'guess: expected a list of at most 10000, got one of 10001'),
-        ({**SCENE, 'guess': 0.1}, 'guess: expected a mapping of fields, got 0.1'),
-        ({**SCENE, 'guess': {}}, 'guess.amplitude: expected a number, got nothing'),
         ({**SCENE, 'guess': {'amplitude': 'big'}}, r"guess.amplitude: expected a number in .*, got 'big'"),
-        ({**SCENE, 'guess': {'amplitude': 0.1, 'side': 1}}, r'guess\.side: expected a known field: amplitude, kind, got 1'),
         ({**SCENE, 'guess': [[0, 0], [0]]}, r'guess\[1\]: expected a list of 2 numbers, got \[0\]'),
         ({**without('goal'), 'goals': [[1, 0], [1, 1]], 'guess': {'amplitude': 0}}, 'guess: expected one goal, .*, got 2 goals'),
         ({'start': [0, 0], 'goal': [0, 0], 'guess': {'amplitude': 0.1}}, 'guess: expected a goal away from the start, got both'),
@@ -197,11 +154,9 @@ def test_a_wrong_field_is_named(scene: object, message: str) -> None:
         ('s.yaml', '!!python/object/apply:os.getcwd []', 'not a YAML file: tags (!name) and aliases (*name) are not supported'),
         ('s.json', '{"start": [0, 0]', 'not a JSON file'),
         ('s.json', '{"start": [0, 0], "start": [1, 1]}', 'the key start is given twice'),
-        ('s.json', '[' * 100_000, 'expected at most 20 mappings and lists within each other'),
         ('s.json', '[' * 21 + ']' * 21, 'expected at most 20 mappings and lists within each other'),
         ('s.yaml', '[' * 1000, 'expected at most 20 mappings and lists within each other'),
         ('s.yaml', 'start: &a [0, 0]\ngoal: *a', 'tags (!name) and aliases (*name) are not supported'),
-        ('s.yaml', 'start: !!timestamp 0', 'tags (!name) and aliases (*name) are not supported'),
         ('s.yaml', '\x00', 'not a YAML file'),
     ],
 )
@@ -211,13 +166,7 @@ def test_a_file_that_cannot_be_parsed_is_refused(tmp_path: Path, name: str, text
         load_scene(tmp_path / name)
 
 
-@pytest.mark.parametrize('name', ['s.json', 's.yaml'])
-def test_a_mark_of_the_byte_order_is_skipped(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_text('\ufeff{"start": [0, 0], "goal": [1, 0], "duration_s": 2}', 'utf-8')
-    assert load_scene(tmp_path / name).duration_s == 2.0
-
-
-@pytest.mark.parametrize('number', ['1:30', '-1:30', '1:30.5', '190:20:30'])
+@pytest.mark.parametrize('number', ['1:30', '190:20:30'])
 def test_numbers_of_base_60_are_texts_as_for_ros(tmp_path: Path, number: str) -> None:
     (tmp_path / 's.yaml').write_text(f'{{start: [0, 0], goal: [1, 0], duration_s: {number}}}', 'utf-8')
     with pytest.raises(SceneError, match=f'^duration_s: expected a .*, got .?{re.escape(number)}'):
@@ -225,8 +174,8 @@ def test_numbers_of_base_60_are_texts_as_for_ros(tmp_path: Path, number: str) ->
 
 
 @pytest.mark.parametrize('name', ['s.json', 's.yaml'])
-@pytest.mark.parametrize('number', ['9' * 25, '-' + '9' * 400, '9' * 5000, '1e400', '-1.0e+400'])
-@pytest.mark.parametrize('field', ['steps', 'max_candidates', 'duration_s', 'start_stddev', 'eta'])
+@pytest.mark.parametrize('number', ['9' * 25, '-' + '9' * 400, '9' * 5000, '1e400'])
+@pytest.mark.parametrize('field', ['steps', 'duration_s'])
 def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(
     tmp_path: Path, name: str, number: str, field: str
 ) -> None:
@@ -238,68 +187,6 @@ def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(
     assert len(str(caught.value)) < 300
 
 
-@pytest.mark.parametrize('digits', [30, 400, 5000])
-def test_whole_numbers_of_any_size_are_refused_where_python_passes_them(digits: int) -> None:
-    value = 10**digits
-    with pytest.raises(
-        ParameterError, match=r'^foc.steps: expected a number in \[5, 400\], got (1000|a whole number of 16610 bits)'
-    ):
-        Config().with_values({'foc.steps': value})
-    with pytest.raises(SceneError, match=r'^radius: expected a number in \[0, 1\], got (1000|a whole number of 16610 bits)'):
-        check_number('radius', value, 0.0, 1.0)
-    with pytest.raises(SceneError, match=r'^start: expected (finite )?numbers'):
-        check_vector('start', [value, 0.0], 2)
-
-
-def test_repeated_keys_are_found_with_one_look_at_each_key() -> None:
-    class Key:
-        compared = 0
-
-        def __init__(self, name: int) -> None:
-            self.name = name
-
-        def __hash__(self) -> int:
-            return hash(self.name)
-
-        def __eq__(self, other: object) -> bool:
-            Key.compared += 1
-            return isinstance(other, Key) and self.name == other.name
-
-    names: list[Any] = [Key(each) for each in (*range(3000), 2999)]
-    with pytest.raises(ValueError, match='given twice'):
-        check_keys(names)
-    assert Key.compared < 10
-
-
-@pytest.mark.parametrize(
-    'make',
-    [
-        lambda n: '{' + ','.join(f'"k{i}": 1' for i in range(n // 10)) + '}',
-        lambda n: f'{{"start": [0, 0], "goal": [1, 0], "steps": "{"9" * n}"}}',
-    ],
-)
-def test_the_time_grows_with_the_size_of_a_file_and_not_with_its_square(tmp_path: Path, make: Callable[[int], str]) -> None:
-    def measure(size: int) -> float:
-        (tmp_path / 's.json').write_text(make(size), 'utf-8')
-        times = []
-        for _ in range(3):
-            began = time.process_time()
-            with pytest.raises(SceneError):
-                load_scene(tmp_path / 's.json')
-            times.append(time.process_time() - began)
-        return min(times)
-
-    assert measure(480_000) < 64 * measure(30_000)  # 16 times the size: a square would be 256 times
-
-
-def test_a_missing_file_and_a_binary_file_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FocError, match=r'none\.yaml: cannot be read: No such file'):
-        load_scene(tmp_path / 'none.yaml')
-    (tmp_path / 'b.yaml').write_bytes(b'\xff\xfe\xfa')
-    with pytest.raises(FocError, match=r'b\.yaml: not a YAML file'):
-        load_scene(tmp_path / 'b.yaml')
-
-
 def test_a_guess_is_a_minimum_jerk_line_with_a_bulge_to_its_left() -> None:
     guess = parse_scene(
         {**without('obstacles'), 'start': [0, 0], 'goal': [0.3, 0], 'guess': {'amplitude': -0.05, 'kind': 'text'}}
@@ -308,24 +195,6 @@ def test_a_guess_is_a_minimum_jerk_line_with_a_bulge_to_its_left() -> None:
     assert np.allclose(guess, np.column_stack([0.3 * (10 * r**3 - 15 * r**4 + 6 * r**5), -0.05 * np.sin(np.pi * r)]))
     turned = guess_path(np.zeros(2), np.array([0.0, 0.3]), 40, amplitude=0.05)
     assert np.allclose(turned[20], [-0.05, 0.15])
-
-
-def test_a_guess_leads_through_points() -> None:
-    start, goal = np.zeros(2), np.array([2.0, 0.0])
-    path = guess_path(start, goal, 100, via=np.array([[1.0, 1.0]]))
-    assert path[0].tolist() == [0, 0] and np.allclose(path[50], [1, 1]) and np.allclose(path[-1], [2, 0])
-    assert np.allclose(np.abs(path[:, 1]), np.minimum(path[:, 0], 2 - path[:, 0]))
-    timed = np.random.default_rng(1).standard_normal((11, 2))
-    assert np.array_equal(guess_path(start, goal, 10, via=timed), timed)
-
-
-def test_the_plant_is_a_field() -> None:
-    foc = parse_scene(
-        {'start': [0, 0], 'goal': [0.3, 0], 'plant': 'damped_mass', 'plant_mass': 2, 'plant_damping': 3e0}
-    ).config.foc
-    assert (foc.plant, foc.plant_mass, foc.plant_damping) == ('damped_mass', 2.0, 3.0)
-    with pytest.raises(SceneError, match=r'^plant: expected one of triple_integrator, damped_mass'):
-        parse_scene({'start': [0, 0], 'goal': [0.3, 0], 'plant': 'spring'})
 
 
 def test_all_errors_of_a_scene_are_found_at_once() -> None:

@@ -74,6 +74,7 @@ def list_commands(clone: Path, target: str) -> str:
 def test_it_says_what_it_does(clone: Path) -> None:
     told = re.findall(r'echo [\'"](setup: \w+)', list_commands(clone, 'setup'))
     assert told == ['setup: creating', 'setup: installing', 'setup: ready']
+    assert 'setup: ready; next: make demo' in list_commands(clone, 'setup')
 
 
 def test_linters_and_peers_are_installed_by_their_targets_only(clone: Path) -> None:

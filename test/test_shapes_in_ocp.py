@@ -1,28 +1,24 @@
-"""Boxes, capsules and hulls in the optimal control problem: noisy movements, shapes that are the same, frames, derivatives."""
+"""Boxes, capsules and hulls in the optimal control problem: noisy movements, shapes that are the same, and a moving frame."""
 
 from dataclasses import replace
 from statistics import NormalDist
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
-from hypothesis import strategies as st
 from reach_helpers import bowed, reach, solved
 
 from foc_ros.core.obstacles.risk import k_of_eta
-from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles, make_box_polygon
+from foc_ros.core.obstacles.shapes import Box, Capsule, Hull, Shape, collect_obstacles, make_box_polygon
 from foc_ros.core.ocp.monte_carlo import wilson
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
-from foc_ros.core.types import Obstacles, Solution, Status, make_obstacles
+from foc_ros.core.types import Solution, Status, make_obstacles
 
 GOAL = np.array([0.3, 0.0])
 SAMPLES = 20_000
 Z = NormalDist().inv_cdf(1 - 1e-3 / 1000)
 """Of all counts of this file together, one in a thousand runs is off by more."""
 GUESS = bowed((0, 0), GOAL, 50, 0.09)
-SEEDS = st.integers(0, 10_000)
-FEW = settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much])
 FIXED = {'strategy': 'fixed', 'tau': 3e-4, 'lam': 1e4}
 SETTINGS = {'fixed': FIXED, 'lv': {'strategy': 'lv'}, 'hc': {'strategy': 'hc'}, 'optimal': {'strategy': 'optimal'}}
 EVERY = pytest.mark.parametrize('strategy', SETTINGS)
@@ -73,7 +69,7 @@ def count_clear(problem: Problem, solution: Solution, shape: Shape) -> int:
 
 @MONTE_CARLO
 @pytest.mark.parametrize('name', SHAPES)
-@pytest.mark.parametrize('eta', [0.8, 0.95])
+@pytest.mark.parametrize('eta', [0.9])
 def test_noisy_movements_stay_clear_of_the_true_shape_as_often_as_promised(strategy, name, eta):
     problem = make_reach(SHAPES[name], eta=eta)
     solution = solved(problem, GUESS, strategy)
@@ -107,8 +103,7 @@ def add_vertices(corners: np.ndarray, each: int) -> np.ndarray:
 
 
 @EVERY
-@pytest.mark.parametrize('yaw', [0.0, 0.5, -1.1])
-@pytest.mark.parametrize('radius', [0.0, 0.01])
+@pytest.mark.parametrize(('yaw', 'radius'), [(0.0, 0.01), (0.5, 0.0), (-1.1, 0.01)])
 def test_a_box_and_the_same_box_as_a_polygon_of_64_vertices(strategy, yaw, radius):
     corners, rest = make_box_polygon((0.06, 0.04), yaw), ([[0.14, -0.01]], [radius], [0.1 * radius])
     box = reach(collect_obstacles([Box((0.14, -0.01), (0.06, 0.04), yaw, radius, 0.1 * radius)]), noise=(0.1, 0.1))
@@ -117,7 +112,7 @@ def test_a_box_and_the_same_box_as_a_polygon_of_64_vertices(strategy, yaw, radiu
 
 
 @EVERY
-@pytest.mark.parametrize('angle', [0.0, 0.46, 2.0])
+@pytest.mark.parametrize('angle', [0.46, 2.0])
 def test_a_capsule_and_a_box_without_width(strategy, angle):
     half = 0.033 * np.array([np.cos(angle), np.sin(angle)])
     capsule = Capsule(np.array([0.14, 0.0]) - half, np.array([0.14, 0.0]) + half, radius=0.02, radius_stddev=0.002)
@@ -129,122 +124,6 @@ def test_a_capsule_and_a_box_without_width(strategy, angle):
     first = solved(make_reach(capsule), GUESS, **SETTINGS[strategy])
     for box in boxes:
         same(first, solved(make_reach(box), GUESS, **SETTINGS[strategy]))
-
-
-@EVERY
-def test_a_circle_and_a_box_without_size(strategy):
-    circle = Circle((0.14, 0.01), radius=0.03, radius_stddev=0.002, velocity=(0.01, 0.02), centre_stddev=0.001)
-    rest = {'radius': 0.03, 'radius_stddev': 0.002, 'velocity': (0.01, 0.02), 'centre_stddev': 0.001}
-    shapes = [
-        Box((0.14, 0.01), size=(0.0, 0.0), yaw=1.0, **rest),
-        Capsule((0.14, 0.01), (0.14, 0.01), **rest),
-        Hull([(0.14, 0.01)] * 3, **rest),
-        Box((0.14, 0.01), size=(2e-9, 2e-9), yaw=1.0, **rest),
-    ]
-    first = solved(make_reach(circle), GUESS, **SETTINGS[strategy])
-    for shape in shapes:
-        same(first, solved(make_reach(shape), GUESS, **SETTINGS[strategy]), tolerance=1e-4 if strategy in ('lv', 'hc') else 1e-5)
-
-
-@EVERY
-def test_the_order_of_vertices_and_the_place_of_the_centre_do_not_matter(strategy):
-    corners = make_box_polygon((0.06, 0.04), 0.3)
-    first = reach(make_obstacles([[0.14, 0.0]], [0.01], [0.001], polygons=[corners]), noise=(0.1, 0.1))
-    rolled = reach(make_obstacles([[0.14, 0.0]], [0.01], [0.001], polygons=[np.roll(corners, 2, axis=0)]), noise=(0.1, 0.1))
-    shift = np.array([0.013, -0.007])
-    moved = reach(make_obstacles([np.add([0.14, 0.0], shift)], [0.01], [0.001], polygons=[corners - shift]), noise=(0.1, 0.1))
-    answer = solved(first, GUESS, **SETTINGS[strategy])
-    for other in (rolled, moved):
-        same(answer, solved(other, GUESS, **SETTINGS[strategy]))
-
-
-def random_shapes(generator: np.random.Generator) -> list[Shape]:
-    """Return one to three shapes of all kinds near the straight way."""
-    made: list[Shape] = []
-    for _ in range(generator.integers(1, 4)):
-        centre = np.array([generator.uniform(0.09, 0.21), generator.uniform(-0.06, 0.06)])
-        rest = {'radius': generator.uniform(0.008, 0.02), 'radius_stddev': generator.uniform(0.001, 0.003)}
-        half = generator.uniform(-0.03, 0.03, 2)
-        kinds = [
-            lambda at=centre, rest=rest: Circle(at, **rest),
-            lambda at=centre, rest=rest: Box(at, generator.uniform(0.01, 0.06, 2), generator.uniform(-3, 3), **rest),
-            lambda at=centre, rest=rest, half=half: Capsule(at - half, at + half, **rest),
-            lambda at=centre, rest=rest: Hull(at + generator.uniform(-0.03, 0.03, (5, 2)), **rest),
-        ]
-        made.append(kinds[generator.integers(4)]())
-    return made
-
-
-def random_reach(seed: int) -> tuple[Obstacles, np.ndarray]:
-    generator = np.random.default_rng(seed)
-    amplitude = float(generator.choice([-1, 1]) * generator.uniform(0.07, 0.13))
-    return collect_obstacles(random_shapes(generator)), bowed((0, 0), GOAL, 40, amplitude)
-
-
-def solve(obstacles: Obstacles, guess, strategy: str, goal=GOAL, start=(0.0, 0.0), eta=0.8) -> Solution:
-    problem = reach(obstacles, goal=goal, start=start, steps=40, noise=(0.1, 0.1), eta=eta)
-    return solved(problem, guess, **SETTINGS[strategy])
-
-
-def well_posed(obstacles: Obstacles, guess, strategy: str) -> Solution:
-    """Solve a scene in which rounding decides nothing: see `test_invariance.py`."""
-    assume(solve(obstacles, guess, strategy, eta=0.87).status is Status.SOLVED)
-    solution = solve(obstacles, guess, strategy)
-    assert solution.status is Status.SOLVED
-    assume(strategy == 'fixed' or solution.lam <= 1.0 or solution.eta < 0.8 + 1e-4)
-    return solution
-
-
-def alike(first: Solution, second: Solution, moved) -> None:
-    """Within what the samples of the curves of `lv` and `hc` leave open."""
-    assert second.status is Status.SOLVED
-    assert second.effort == pytest.approx(first.effort, rel=2e-2)
-    assert np.abs(second.path - moved(first.path)).max() < 4e-3
-
-
-def transform(obstacles: Obstacles, map_: np.ndarray, shift: float = 0.0) -> Obstacles:
-    """Return obstacles turned or mirrored; of a mirrored polygon the order of the vertices turns round."""
-    vertices = obstacles.vertices @ map_.T
-    if np.linalg.det(map_) < 0.0:
-        for row, corners in enumerate(obstacles.corners):
-            vertices[row, :corners] = vertices[row, :corners][::-1].copy()
-    return replace(obstacles, centre=obstacles.centre @ map_.T + shift, velocity=obstacles.velocity @ map_.T, vertices=vertices)
-
-
-@EVERY
-@FEW
-@given(SEEDS)
-def test_mirror(strategy, seed):
-    obstacles, guess = random_reach(seed)
-    flip = np.diag([1.0, -1.0])
-    mirrored = transform(obstacles, flip)
-    alike(well_posed(obstacles, guess, strategy), solve(mirrored, guess @ flip, strategy), lambda path: path @ flip)
-
-
-@EVERY
-@FEW
-@given(SEEDS, st.integers(1, 3), st.floats(-5, 5))
-def test_quarter_turns_and_shift(strategy, seed, quarters, shift):
-    """Only by quarter turns: the model's noise acts along two axes."""
-    obstacles, guess = random_reach(seed)
-    turn = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), quarters)
-
-    def moved(points):
-        return points @ turn.T + shift
-
-    first = well_posed(obstacles, guess, strategy)
-    there = transform(obstacles, turn, shift)
-    alike(first, solve(there, moved(guess), strategy, goal=moved(GOAL), start=moved(np.zeros(2))), moved)
-
-
-@EVERY
-@FEW
-@given(SEEDS, st.randoms(use_true_random=False))
-def test_order_and_duplicates_of_obstacles(strategy, seed, random):
-    obstacles, guess = random_reach(seed)
-    rows = [*range(len(obstacles)), *range(len(obstacles))]
-    random.shuffle(rows)
-    alike(well_posed(obstacles, guess, strategy), solve(obstacles.take(rows), guess, strategy), lambda path: path)
 
 
 @EVERY
@@ -264,22 +143,3 @@ def test_a_box_that_moves_and_the_same_problem_in_its_frame(strategy):
         lambda path: path - drift,
         1e-3 if strategy in ('lv', 'hc') else 1e-5,
     )
-
-
-@pytest.mark.parametrize('strategy', ['lv', 'optimal'])
-def test_an_uncertain_centre_takes_more_effort_and_a_larger_one_more(strategy):
-    box = SHAPES['rotated box']
-    efforts = []
-    for stddev in (0.0, 0.003, 0.004):
-        solution = solved(make_reach(replace(box, centre_stddev=stddev)), GUESS, strategy)
-        assert solution.status is Status.SOLVED
-        efforts.append(solution.effort)
-    assert efforts[0] * 1.001 < efforts[1] < efforts[2] / 1.001
-
-
-@EVERY
-def test_a_hand_with_a_radius_and_larger_shapes_are_the_same(strategy):
-    shapes = [SHAPES['rotated box'], Circle((0.2, -0.06), radius=0.02)]
-    grown = reach(collect_obstacles(shapes).grow(0.008), goal=GOAL, noise=(0.1, 0.1))
-    larger = make_reach(*(replace(each, radius=each.radius + 0.008) for each in shapes))
-    same(solved(grown, GUESS, **SETTINGS[strategy]), solved(larger, GUESS, **SETTINGS[strategy]))

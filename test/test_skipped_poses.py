@@ -13,10 +13,9 @@ from message_helpers import SECOND, message_types, pose_stamped
 
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.errors import MessageError
 from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import Prediction
-from foc_ros.io.bags import TYPESTORE, BagReader
+from foc_ros.io.bags import BagReader
 from foc_ros.ros.intake import Intake
 
 TYPES = message_types('rosbags')
@@ -115,55 +114,6 @@ def test_a_hand_at_250_hz_with_jitter_is_unaffected(tmp_path: Path) -> None:
     (found, counts), (expected, _) = predict(bag, CONFIG), predict(bag, replace_values(CONFIG, {'estimator.min_interval_s': 0.0}))
     assert 'hand_skipped' not in counts
     assert found and are_equal(found, expected)
-
-
-def serialize(message: Any, *, little_endian: bool = True) -> bytes:
-    return bytes(TYPESTORE.serialize_cdr(message, 'geometry_msgs/msg/PoseStamped', little_endian=little_endian))
-
-
-@pytest.fixture
-def reader() -> Any:
-    pytest.importorskip('rclpy')
-    from foc_ros.ros import serialized_poses
-
-    return serialized_poses
-
-
-@pytest.mark.parametrize('little_endian', [True, False])
-@pytest.mark.parametrize('frame_id', ['', 'world', 'a frame with a longer name', 'Raum \u00e4'])
-def test_a_serialized_pose_is_read_as_it_was_written(reader: Any, frame_id: str, little_endian: bool) -> None:
-    for stamp_ns in (0, 1, 10 * SECOND + 7, (2**31 - 1) * SECOND + SECOND - 1):
-        message = pose_stamped(TYPES, (math.inf, -0.25, 1e-300), stamp_ns, frame_id)
-        message.pose.orientation.x = 0.5
-        data = serialize(message, little_endian=little_endian)
-        assert reader.read_stamp(data) == stamp_ns
-        read = reader.deserialize_pose(data)
-        assert (read.header.stamp.sec, read.header.stamp.nanosec) == divmod(stamp_ns, SECOND)
-        assert read.header.frame_id == frame_id
-        assert (read.pose.position.x, read.pose.position.y, read.pose.position.z) == (math.inf, -0.25, 1e-300)
-        turned = read.pose.orientation
-        assert (turned.x, turned.y, turned.z, turned.w) == (0.5, 0.0, 0.0, 1.0)
-
-
-def test_what_rclpy_serializes_is_read(reader: Any) -> None:
-    from rclpy.serialization import serialize_message
-
-    data = serialize_message(pose_stamped(message_types('rclpy'), (1.0, 2.0, 3.0), 5 * SECOND + 6, 'odd'))
-    assert reader.read_stamp(data) == 5 * SECOND + 6
-    assert reader.deserialize_pose(data).pose.position.z == 3.0
-
-
-def test_wrong_bytes_are_no_pose_and_have_no_stamp(reader: Any) -> None:
-    message = pose_stamped(TYPES, (1.0, 2.0, 3.0))
-    good = serialize(message)
-    for data in (b'', b'\0\1\0\0', good[:12], good[:30], good[:-1], b'\xff' * 40, good[:12] + b'\xff' * 60):
-        with pytest.raises(MessageError, match=f'expected a serialized geometry_msgs/PoseStamped, got {len(data)} other bytes'):
-            reader.deserialize_pose(data)
-    for data in (b'', good[:12], b'\xff' * 40):
-        assert reader.read_stamp(data) == 0
-    for sec, nanosec in ((-1, 0), (1, SECOND)):
-        message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
-        assert reader.read_stamp(serialize(message)) == 0
 
 
 def estimate(step_ms: int, seed: int) -> tuple[float, float]:

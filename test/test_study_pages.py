@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from datetime import datetime
+from importlib.metadata import version
+from itertools import islice
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED
-from foc_ros.core.errors import InputError
+from foc_ros.core.config import Config
+from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.io.bags import BagReader, Item
+from foc_ros.reporting import evaluation_report, simulation_report
 from foc_ros.reporting.draw import open_figure
 from foc_ros.reporting.evaluation_report import _draw_reliability
+from foc_ros.reporting.example import FEW, render_example, warn_of_few
 from foc_ros.reporting.fit_report import write_report
+from foc_ros.reporting.page import place_legend, render_page, render_tables
 
+RECORDING = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 ANSWER = {
+    'recordings': 2,
     'parameters': {
         'likelihood.beta': {'value': 0.5, 'interval': [0.4, 0.7], 'how': 'classes taken', 'given': 1.0},
         'foc.noise_x': {'value': 0.08, 'interval': [None, None], 'how': 'spread', 'given': 0.05},
@@ -68,3 +80,85 @@ def test_a_reliability_plot_has_error_bars_and_counts() -> None:
         ends = [segment[:, 1].tolist() for segment in bars.get_segments()]
         assert ends == [pytest.approx([0.2, 0.7]), pytest.approx([0.8, 0.95])]
     assert [text.get_text() for text in axes.texts] == ['3', '40']
+
+
+class Recorded:
+    """The packaged recording, as one of a folder of recordings, or one that cannot be read."""
+
+    def __init__(self, is_broken: bool = False) -> None:
+        self.is_broken = is_broken
+
+    def items(self) -> Iterator[Item]:
+        if self.is_broken:
+            raise RecordingError('broken')
+        with BagReader(RECORDING) as reader:
+            yield from islice(reader, 250)
+
+
+def test_a_recording_is_pictured_with_its_prediction_and_one_that_cannot_be_read_is_passed_over() -> None:
+    config = Config()
+    html = render_example({'broken': Recorded(is_broken=True), 'whole': Recorded()}, config)
+    assert html.count('<img') == 1 and 'whole, 0.' in html and 'after the hand began to move' in html
+    assert render_example({'broken': Recorded(is_broken=True)}, config) == ''
+
+
+def test_a_page_names_what_made_it_and_no_path() -> None:
+    config = Config().with_values({'foc.eta': 0.8, 'homotopy.library': '/home/someone/mine.json'})
+    page = render_page('x', '<p>body</p>', (), config)
+    footer = page.partition('<footer')[2].partition('</footer>')[0]
+    assert f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; ' in footer
+    assert 'processors' in footer and 'foc.eta = 0.8' in footer and 'homotopy.library = mine.json' in footer
+    assert 'someone' not in page and str(Path.cwd()) not in page
+    assert 'All parameters have their defaults.' in render_page('x', '', (), Config())
+
+
+def test_words_are_explained_once_where_they_stand_first() -> None:
+    tables = (('First', ('', 'gain [nat]'), [('foc', '1')]), ('Second', ('', 'gain [nat]', 'ECE'), [('foc', '1', '0')]))
+    html = render_tables(tables, {'nat': 'a unit', 'ECE': 'an error', 'Brier': 'not here'})
+    assert html.count('nat: a unit') == html.count('ECE: an error') == 1 and 'Brier' not in html
+    assert html.index('First') < html.index('nat: a unit') < html.index('Second') < html.index('ECE: an error')
+
+
+def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
+    assert warn_of_few(FEW, 'recordings') == [] and warn_of_few(FEW - 1, 'recordings')[0].startswith(
+        f'Few recordings ({FEW - 1})'
+    )
+    write_report(tmp_path, 'x', ANSWER)
+    page = (tmp_path / 'fit.html').read_text(encoding='utf-8')
+    assert '<p class="warning">Few recordings (2)' in page and 'held out: scored on' in page
+    assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
+
+
+def test_legends_are_below_the_axes_and_cover_nothing() -> None:
+    with open_figure(6.4, 4.6) as figure:
+        axes = figure.subplots()
+        for number in range(6):
+            axes.plot([0, 1], [0, number], label=f'baseline number {number}')
+        axes.plot([0, 1], [1, 0], label='baseline number 0')
+        place_legend(figure)
+        figure.draw_without_rendering()
+    (legend,) = figure.legends
+    assert len(legend.get_texts()) == 6
+    assert not legend.get_window_extent().overlaps(axes.get_tightbbox())
+
+
+def test_results_are_told_in_plain_words_first() -> None:
+    scores = {'right': 0.8, 'log_likelihood': float(np.log(0.5))}
+    answer = {
+        'recordings': 3,
+        'predictions': 40,
+        'questions': {'way': {'foc': scores, 'uniform': {'right': 0.5, 'log_likelihood': float(np.log(0.25))}}},
+        'positions': {
+            'displacement_m': {'likelihood-weighted': {'final': {'0.5': 0.0314}}},
+            'inside_all': {'0.9': {'0.5': 0.87}},
+        },
+    }
+    told = ' '.join(evaluation_report.summarise(answer))
+    for words in ('3 recordings', '40 moments', 'in 80 % of them', 'probability of 50 %', 'gives it 25 %', '31 mm', 'held 87 %'):
+        assert words in told
+    cell = {'operator': 'changes_way', 'collision_rate': 0.1, 'completion_s': 1.234}
+    cells = [cell | {'assistance': 'none'}, cell | {'assistance': 'foc', 'collision_rate': 0.05, 'completion_s': None}]
+    assert simulation_report.summarise(cells)[1:] == [
+        'Changes way: collisions in 5 % of the trials with guidance; '
+        'collisions in 10 % of the trials and 1.23 s for a movement without guidance.'
+    ]

@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 from fit_recordings import write_tables
 
-from foc_ros.analysis.fitting.tables import COMPARISON_TITLES, list_commands, make_sentences, make_tables
 from foc_ros.cli.main import main
-from foc_ros.cli.options import Study
 from foc_ros.io.terminal import COLUMNS, show_counter, show_table
 
 ROOT = Path(__file__).parents[1]
@@ -29,7 +27,7 @@ def find_widest(printed: str) -> int:
     'arguments',
     [
         ['solve', 'scene.yaml', '--monte-carlo', '100'],
-        ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap')],
+        ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'), '--params', 'slow.yaml'],
         ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1'],
         ['evaluate', 'data', '--workers', '1'],
     ],
@@ -40,26 +38,10 @@ def test_the_output_of_a_command_fits(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path('scene.yaml').write_text(SCENE)
+    Path('slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}')
     if 'data' in arguments:
         write_tables(Path('data'), count=2)
     assert main(arguments) == 0
-    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
-
-
-def test_the_tables_of_a_fit_fit(capsys: pytest.CaptureFixture[str]) -> None:
-    estimate = {'given': 0.123456, 'value': 1234.56, 'interval': [1.23456e-7, 1.23456e7], 'how': 'covariance of the predictions'}
-    measures = {name: {'before': 0.0634, 'after': 0.0961} for name in COMPARISON_TITLES}
-    answer = {
-        'recordings': 6,
-        'parameters': {'guidance.progress_speed_of_the_reference': estimate},
-        'chosen': {'duration.model': {'given': 'fitts', 'value': 'fixed'}},
-        'scores': {'inside_all_90': {'without the recording': 0.9}},
-        'comparison': measures,
-        'warnings': ['a long warning ' * 10],
-        'output': 'o.yaml',
-        'node': ['python -m foc_ros node --ros-args --params-file o.yaml'],
-    }
-    Study().show(answer, make_tables(answer), make_sentences(answer), 'fit.html', list_commands(answer))
     assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
 
 

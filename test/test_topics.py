@@ -45,11 +45,6 @@ def test_topics_are_found(topics: dict[str, str], expected: dict[str, str]) -> N
     assert len(set(roles.values())) == len(roles)
 
 
-def test_a_choice_overrides_names() -> None:
-    topics = {**PLAIN, '/left/measured_cp': POSE, '/right/measured_cp': POSE}
-    assert assign_topics(topics, {'hand_pose': '/right/measured_cp'})['hand_pose'] == '/right/measured_cp'
-
-
 @pytest.mark.parametrize(
     ('topics', 'chosen', 'message'),
     [

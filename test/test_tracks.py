@@ -11,7 +11,7 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.duration import CHANGE_S, limit_change
 from foc_ros.core.hand.kalman import update
 from foc_ros.core.predict import predict
-from foc_ros.core.tracks import LEAD, NO_TRACKS, SMOOTHING_S, Track, Tracks, interpolate_rest, take_rest
+from foc_ros.core.tracks import NO_TRACKS, SMOOTHING_S, Track, Tracks
 from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
 
 CONFIG = replace_values(Config(), {'foc.steps': 20})
@@ -40,18 +40,6 @@ def number(*predictions: tuple[Candidate, ...]) -> list[list[int]]:
 
 
 OVER, UNDER = make_class({'a': LEFT}), make_class({'a': RIGHT})
-
-
-def test_a_class_keeps_its_number_at_another_rank_and_with_obstacles_left_out() -> None:
-    longer = make_class({'a': LEFT, 'b': RIGHT})
-    assert number((OVER, UNDER), (UNDER, OVER)) == [[0, 1], [1, 0]]
-    assert number((longer, UNDER), (UNDER, OVER), (make_class({}),))[1] == [1, 0]
-    assert number((OVER,), (UNDER, make_class({'a': LEFT}, goal=1))) == [[0], [1, 2]]
-    assert number((make_class({}), longer), (make_class({'a': LEFT, 'b': RIGHT, 'c': LEFT}),))[1] == [1]
-
-
-def test_two_candidates_do_not_continue_one_track() -> None:
-    assert sorted(number((OVER,), (make_class({'a': LEFT, 'b': LEFT}), make_class({'a': LEFT, 'b': RIGHT})))[1]) == [0, 1]
 
 
 def test_a_class_that_is_missing_for_a_short_time_keeps_its_number() -> None:
@@ -99,47 +87,6 @@ def test_likelihoods_follow_a_filter_of_the_stated_time_constant() -> None:
         for label, share in found.items():
             assert share == pytest.approx(rest * first[label] + (1.0 - rest) * after[label], abs=5e-3)
             assert abs(first[label] - after[label]) > 0.05, 'the scene is no test'
-
-
-def test_nothing_is_kept_for_a_goal_that_is_another_one() -> None:
-    _, tracks = predict_at(0, 0.004, NO_TRACKS)
-    moved = np.array([[0.3, 0.2]])
-    prediction, fresh = (predict_at(1, 0.004, each, goals=moved)[0] for each in (tracks, NO_TRACKS))
-    assert find_likelihoods(prediction) == pytest.approx(find_likelihoods(fresh), abs=1e-6)
-    assert {each.way for each in prediction.candidates}.isdisjoint({0, 1}), 'no number is given twice'
-
-
-def test_the_most_likely_class_stays_until_another_leads() -> None:
-    prediction, tracks = predict_at(0, 0.0, NO_TRACKS)
-    first, second = (replace(each, likelihood=share) for each, share in zip(prediction.candidates, (0.5, 0.5), strict=True))
-    for kept in (first, second):
-        known = replace(tracks, most_likely=kept.way)
-        assert known.choose_most_likely([first, second]).way == kept.way
-    leading = [replace(first, likelihood=0.5 + LEAD), replace(second, likelihood=0.5 - LEAD)]
-    assert replace(tracks, most_likely=second.way).choose_most_likely(leading).way == first.way
-    assert tracks.choose_most_likely([]) is None
-
-
-def test_a_new_movement_repeats_no_number() -> None:
-    first, tracks = predict_at(0, 0.0, NO_TRACKS)
-    second, tracks = predict_at(1, 0.0, tracks)
-    third, _ = predict_at(2, 0.0, tracks.forget())
-    assert [{each.way for each in made.candidates} for made in (first, second, third)] == [{0, 1}, {0, 1}, {2, 3}]
-
-
-def test_the_rest_of_an_answer_is_where_the_answer_was_at_that_time_and_begins_at_the_hand() -> None:
-    rng = np.random.default_rng(3)
-    mean, covariance = rng.normal(size=(21, 6)), rng.normal(size=(21, 6, 6))
-    means, covariances = (interpolate_rest(each, 10.0) for each in (mean, covariance))
-    np.testing.assert_allclose(means[::2], mean[10:], atol=1e-12)
-    np.testing.assert_allclose(covariances[1::2], (covariance[10:-1] + covariance[11:]) / 2, atol=1e-12)
-    solution = predict_at(0, 0.0, NO_TRACKS)[0].candidates[0].solution
-    place = np.array([0.011, -0.007])
-    rest = take_rest(solution, 0.1, place, 'failed')
-    np.testing.assert_allclose(rest.path[0], place, atol=1e-12)
-    np.testing.assert_allclose(rest.mean[-1], solution.mean[-1], atol=1e-9)
-    assert rest.times[-1] == pytest.approx(solution.times[-1] - 0.1) and rest.message.startswith('failed; the answer is from 0.1')
-    assert take_rest(solution, float(solution.times[-1]), place, '') is None
 
 
 def reaching(x: float, tracks: Tracks):

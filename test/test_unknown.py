@@ -41,8 +41,7 @@ def total(prediction: Prediction) -> float:
     return sum(each.likelihood for each in prediction.candidates) + prediction.unknown + prediction.other
 
 
-@pytest.mark.parametrize('status', [Status.LEFT_CLASS, Status.ITERATION_LIMIT, Status.INFEASIBLE])
-@pytest.mark.parametrize('number', [0, 1, 2])
+@pytest.mark.parametrize(('number', 'status'), [(0, Status.LEFT_CLASS), (1, Status.ITERATION_LIMIT), (2, Status.INFEASIBLE)])
 def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(
     monkeypatch: pytest.MonkeyPatch, status: Status, number: int
 ) -> None:
@@ -57,12 +56,6 @@ def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(
     assert total(found) == pytest.approx(1.0)
     np.testing.assert_allclose(failed.mean[0], HAND.mean, atol=1e-12)
     np.testing.assert_allclose(failed.mean[-1, :2], GOALS[0], atol=1e-9)
-
-
-def test_a_class_that_the_wanted_eta_rules_out_has_no_share(monkeypatch: pytest.MonkeyPatch) -> None:
-    let_fail(monkeypatch, 1, Status.ETA_UNREACHABLE)
-    found = ask()
-    assert [each.likelihood > 0.0 for each in found.candidates] == [True, True, True, False]
 
 
 @pytest.mark.parametrize('horizon_s', [1000.0, 0.0])

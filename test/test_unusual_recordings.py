@@ -93,13 +93,8 @@ def test_a_killed_sqlite_recorder_leaves_a_log_that_is_read_with_a_warning(tmp_p
 @pytest.mark.parametrize(
     'options',
     [
-        {'repeat_channels': False},
-        {'repeat_schemas': False},
         {'use_statistics': False},
-        {'index_types': IndexType.NONE},
         {'index_types': IndexType.MESSAGE},
-        {'index_types': IndexType.CHUNK},
-        {'use_chunking': False},
         {'use_chunking': False, 'repeat_channels': False, 'repeat_schemas': False},
         {'compression': CompressionType.LZ4, 'use_summary_offsets': False, 'enable_crcs': False},
         {'repeat_channels': False, 'use_statistics': False, 'index_types': IndexType.NONE, 'repeat_schemas': False},
@@ -107,20 +102,6 @@ def test_a_killed_sqlite_recorder_leaves_a_log_that_is_read_with_a_warning(tmp_p
 )
 def test_every_record_of_a_summary_is_optional(tmp_path: Path, options: dict[str, Any]) -> None:
     write_mcap(tmp_path / 'lean.mcap', SHORT, per_chunk=7, **options)
-    assert read(tmp_path / 'lean.mcap') == WHOLE
-
-
-def test_a_summary_without_counts_for_each_channel_is_completed(tmp_path: Path) -> None:
-    write_mcap(tmp_path / 'whole.mcap', SHORT, enable_crcs=False, use_summary_offsets=False)
-    data = bytearray((tmp_path / 'whole.mcap').read_bytes())
-    (start,) = struct.unpack_from('<Q', data, len(data) - 8 - 20)
-    while data[start] != 0x0B:  # statistics
-        start += 9 + struct.unpack_from('<Q', data, start + 1)[0]
-    (length,) = struct.unpack_from('<Q', data, start + 1)
-    counts = start + 9 + length - 3 * 10  # of three channels, at its end
-    struct.pack_into('<Q', data, start + 1, length - 3 * 10)
-    struct.pack_into('<I', data, counts - 4, 0)
-    (tmp_path / 'lean.mcap').write_bytes(data[:counts] + data[counts + 3 * 10 :])
     assert read(tmp_path / 'lean.mcap') == WHOLE
 
 
@@ -142,14 +123,7 @@ def test_a_file_may_end_without_a_footer(tmp_path: Path) -> None:
         assert read(tmp_path / 'short.mcap') == WHOLE
 
 
-def test_a_folder_of_sqlite_files_without_metadata_is_a_bag(tmp_path: Path) -> None:
-    write_sqlite(tmp_path / 'one_0.db3', WHOLE[:9]).close()
-    write_sqlite(tmp_path / 'one_1.db3', WHOLE[9:]).close()
-    assert read(tmp_path) == WHOLE
-
-
-@pytest.mark.parametrize('kind', ['.mcap', '.db3'])
-@pytest.mark.parametrize('is_folder', [True, False])
+@pytest.mark.parametrize(('kind', 'is_folder'), [('.mcap', True), ('.db3', False)])
 def test_files_and_messages_may_be_compressed(tmp_path: Path, kind: str, is_folder: bool) -> None:
     plain, bag = tmp_path / f'plain{kind}', tmp_path / 'bag'
     bag.mkdir()
@@ -172,10 +146,7 @@ def test_files_and_messages_may_be_compressed(tmp_path: Path, kind: str, is_fold
     ('metadata', 'words'),
     [
         ('', 'not the metadata of a bag, and not used'),
-        ('hello', 'not the metadata of a bag, and not used'),
-        ('rosbag2_bagfile_information: {version: 99}', 'not the metadata of a bag, and not used'),
         ('rosbag2_bagfile_information: {relative_file_paths: [], message_count: 3}', 'it names no file'),
-        ('rosbag2_bagfile_information: {relative_file_paths: 7', 'not the metadata of a bag, and not used'),
         ('rosbag2_bagfile_information: {relative_file_paths: [other.db3], message_count: 3}', 'of another bag, and not used'),
         (
             'rosbag2_bagfile_information: {relative_file_paths: [one.mcap], message_count: 3}',
@@ -193,20 +164,6 @@ def test_wrong_metadata_is_named_and_hides_nothing(tmp_path: Path, metadata: str
     (bag / 'metadata.yaml').write_text(metadata)
     with pytest.warns(FocWarning, match=words):
         assert read(bag) == WHOLE
-
-
-@pytest.mark.parametrize('count', [3, 99])
-def test_a_wrong_number_hides_no_file_that_states_its_own(tmp_path: Path, count: int) -> None:
-    bag = write_bag(tmp_path / 'one', SHORT)
-    write_metadata(bag, ['one.mcap'], count)
-    with pytest.warns(FocWarning, match=f'metadata.yaml is wrong: it states {count} messages, and the files hold {len(WHOLE)}'):
-        assert len(list(BagRecording('one', bag).items())) == len(WHOLE)
-    write_mcap(bag / 'one.mcap', SHORT, use_statistics=False)
-    with pytest.warns(FocWarning, match=f'states {count} messages'):
-        assert read(bag) == WHOLE
-    if count > len(WHOLE):  # the file states nothing, so that messages may have been lost
-        with pytest.raises(RecordingError, match=r'metadata\.yaml states 99 messages'):
-            list(BagRecording('one', bag).items())
 
 
 @pytest.mark.parametrize('has_metadata', [True, False])
@@ -232,9 +189,7 @@ def test_a_file_that_the_metadata_do_not_name_is_named(tmp_path: Path) -> None:
         assert read(bag) == WHOLE
 
 
-@pytest.mark.parametrize(
-    'name', ['a%20b', 'a#b', 'a?mode=rw', "it's", 'a "b"', 'a b', 'été 手', '%41', 'a&immutable=0', '-x', 'a\nb']
-)
+@pytest.mark.parametrize('name', ['a%20b', 'a?mode=rw', "it's", 'été 手', '-x', 'a\nb'])
 @pytest.mark.parametrize('kind', ['.mcap', '.db3'])
 def test_a_path_opens_the_file_that_it_names(tmp_path: Path, name: str, kind: str) -> None:
     (tmp_path / name).mkdir()
@@ -252,8 +207,7 @@ def test_a_path_opens_the_file_that_it_names(tmp_path: Path, name: str, kind: st
     assert read(file) == WHOLE
 
 
-@pytest.mark.parametrize('wrong', [b'', b'\x00', b'\x00\x01\x00\x00', b'\x00\x03' + bytes(60), bytes(500), b'?!' * 40])
-@pytest.mark.parametrize('topic', ['/hand_pose', '/obstacles', '/goals'])
+@pytest.mark.parametrize(('topic', 'wrong'), [('/hand_pose', b''), ('/obstacles', bytes(500)), ('/goals', b'?!' * 40)])
 def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], topic: str, wrong: bytes
 ) -> None:
@@ -268,7 +222,7 @@ def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(
 SHORT_KINDS = {topic: made.__msgtype__ for topic, _, made in SHORT}
 
 
-@pytest.mark.parametrize('zeros', range(9))
+@pytest.mark.parametrize('zeros', [1, 4, 8])
 def test_zeros_after_a_message_are_padding(tmp_path: Path, zeros: int) -> None:
     padded = [(topic, stamp_ns, raw + bytes(zeros)) for topic, stamp_ns, raw in WHOLE]
     write_sqlite(tmp_path / 'one.db3', padded).close()
@@ -375,15 +329,3 @@ def test_a_compressed_message_does_not_fill_the_memory(
     write_sqlite(tmp_path / 'one.db3', packed).close()
     assert main(['replay', str(tmp_path / 'one.db3')]) == 0
     assert 'hand_pose_invalid 1' in capsys.readouterr().out
-
-
-def test_a_value_that_is_no_message_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    database = write_sqlite(tmp_path / 'one.db3')
-    (key,) = database.execute("SELECT id FROM topics WHERE name = '/hand_pose'").fetchone()
-    for value in (None, 10**12, 'text', 0.5):
-        database.execute('INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)', (key, WHOLE[-1][1], value))
-    database.commit()
-    database.close()
-    (tmp_path / 'link.db3').symlink_to(tmp_path / 'one.db3')
-    assert main(['replay', str(tmp_path / 'link.db3')]) == 0
-    assert 'hand_pose_invalid 4' in capsys.readouterr().out

@@ -43,15 +43,6 @@ def test_rviz_shows_every_output_it_can_display() -> None:
     assert cloud['Channel Name'] == 'likelihood'
 
 
-def test_rviz_uses_a_compatible_quality_of_service() -> None:
-    for display in rviz()['Displays']:
-        if 'Topic' in display:
-            wanted = 'Best Effort' if display['Topic']['Value'] == '/hand_pose' else 'Reliable'
-            assert (display['Topic']['Reliability Policy'], display['Topic']['Durability Policy']) == (wanted, 'Volatile')
-    (tool,) = [each for each in rviz()['Tools'] if each['Class'].endswith('/SetGoal')]
-    assert TYPES[tool['Topic']['Value']] == 'geometry_msgs/msg/PoseStamped'
-
-
 def leaves(layout: Any) -> Iterator[str]:
     if isinstance(layout, str):
         yield layout

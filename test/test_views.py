@@ -11,18 +11,9 @@ from report_samples import START_NS, prediction, predictions, samples, scene, wi
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import LEFT, RIGHT, HandSample, Prediction, Status, describe_class, make_obstacles
 from foc_ros.io.bags import TYPESTORE
-from foc_ros.reporting.views import (
-    CandidateView,
-    HandTrajectory,
-    Snapshot,
-    assign_slots,
-    build_candidate_tracks,
-    build_hand_trajectory,
-    build_snapshot,
-    is_same_prediction,
-    parse_label,
-    read_snapshot,
-)
+from foc_ros.reporting.received import is_same_prediction, read_snapshot
+from foc_ros.reporting.tracks import assign_slots, build_candidate_tracks
+from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot, parse_label
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
 
@@ -64,12 +55,11 @@ def test_the_motor_noise_is_kept_beside_the_total_uncertainty() -> None:
     np.testing.assert_array_equal(view.covariance, 3.0 * view.motor_covariance)
 
 
-def test_a_trajectory_leaves_late_samples_out_and_knows_where_the_hand_was() -> None:
+def test_a_trajectory_leaves_late_samples_out() -> None:
     made = samples()
     hand = build_hand_trajectory([*made[:20], made[5], made[19], *made[20:]])
     assert list(hand.stamps_ns) == [sample.stamp_ns for sample in made]
-    for stamp_ns, row in ((made[0].stamp_ns - 5, 0), (made[70].stamp_ns + 1, 70), (made[-1].stamp_ns, -1)):
-        np.testing.assert_array_equal(hand.position_at(stamp_ns), made[row].position)
+    np.testing.assert_array_equal(hand.positions, [sample.position for sample in made])
 
 
 def test_velocity() -> None:
@@ -94,14 +84,21 @@ def test_movements_are_found_where_they_are_and_tremor_is_none() -> None:
 def test_the_messages_hold_everything_that_a_report_shows(plane: str) -> None:
     """Also when another class is the most likely one by hysteresis, and after serialisation."""
     made = replace(prediction(START_NS, np.array([0.01, -0.02])), most_likely='goal1:+1-post')
+    statuses = Status.DEADLINE, Status.COMPROMISED, Status.ESTIMATED
+    ended = [
+        replace(each, solution=replace(each.solution, status=status))
+        for each, status in zip(made.candidates, statuses, strict=False)
+    ]
+    made = replace(made, candidates=(*ended, *made.candidates[len(ended) :]))
     messages = encode_prediction_cloud(made, plane, TYPES), encode_likelihoods(made, TYPES)
     carried = [TYPESTORE.deserialize_cdr(TYPESTORE.serialize_cdr(each, each.__msgtype__), each.__msgtype__) for each in messages]
     read, known = read_snapshot(*carried, plane, *scene()), build_snapshot(made)
     assert (read.stamp_ns, read.most_likely) == (known.stamp_ns, known.most_likely)
     assert [each.label for each in read.candidates] == [each.label for each in known.candidates]
     assert read.candidates[0].label == 'goal1:+1-post'
+    assert read.is_late and {each.status for each in read.candidates} == set(statuses)
     for got, expected in zip(read.candidates, known.candidates, strict=True):
-        for name in ('description', 'is_compromised', 'likelihood', 'effort', 'cost_ratio', 'eta'):
+        for name in ('description', 'status', 'likelihood', 'effort', 'cost_ratio', 'eta'):
             assert getattr(got, name) == getattr(expected, name)
         for name in ('times', 'path', 'velocity', 'speed', 'covariance', 'motor_covariance'):
             np.testing.assert_allclose(getattr(got, name), getattr(expected, name), rtol=1e-6, atol=1e-8)

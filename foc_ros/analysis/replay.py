@@ -23,8 +23,7 @@ from foc_ros.io.terminal import show_progress
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
 from foc_ros.ros.intake import DROPPED, Intake
 from foc_ros.ros.messages.encode_guidance import Place
-from foc_ros.ros.transform_tree import TransformTree
-from foc_ros.ros.transforms import Transforms
+from foc_ros.ros.transforms import Transforms, TransformTree
 
 
 @dataclass(frozen=True)

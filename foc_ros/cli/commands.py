@@ -103,7 +103,7 @@ def solve(scene: Existing, /, *, json: bool = False, monte_carlo: Samples | None
         check_picture('--plot', plot)
     problem = load_scene(scene)
     if plot is not None:
-        from foc_ros.reporting.draw import plot_outcomes  # a missing library is reported before the work
+        from foc_ros.reporting.figures import plot_outcomes  # a missing library is reported before the work
     from foc_ros.analysis.solve import make_table, solve_to_values
     from foc_ros.io.terminal import show_table, show_text
 

@@ -29,8 +29,9 @@ from foc_ros.io import topics
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter, Item
 from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
-from foc_ros.reporting.report import write_report
-from foc_ros.reporting.views import HandTrajectory, Snapshot, build_hand_trajectory, parse_label, read_snapshot
+from foc_ros.reporting.received import read_snapshot
+from foc_ros.reporting.report import describe_late, write_report
+from foc_ros.reporting.views import HandTrajectory, Snapshot, build_hand_trajectory, parse_label
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
 from foc_ros.ros.messages.decode_poses import decode_stamp
@@ -138,14 +139,16 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
         'recording': f'{_measure_duration_s(items):.1f} s, played over DDS to the node in real time',
         'hand samples': str(len(recorder.samples)),
         'delay from hand sample to prediction': f'{median:.1f} ms (median), {late:.1f} ms (99th percentile)',
-        'counters of the node': ', '.join(counts),
     }
     hand = build_hand_trajectory(recorder.samples)
-    write_report(output / 'report', 'Reaching among obstacles, live', hand, recorder.snapshots, facts)
+    counters = {'counters of the node': ', '.join(counts)}
+    write_report(output / 'report', 'Reaching among obstacles, live', hand, recorder.snapshots, {**facts, **counters})
     show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
     print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
     show_address(output / 'report' / 'index.html')
     show_text(describe_lead(hand, recorder.snapshots))
+    if words := describe_late(recorder.snapshots):
+        show_text(words)
     return 0
 
 

@@ -96,7 +96,7 @@ def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = 
         print(f'foc_ros fit: {output} is not written; --allow positions writes it all the same', file=sys.stderr)
         return 2
     write_parameter_file('--output', output, found.config)
-    write_report(data.resolve().name, answer)
+    write_report(data.resolve().name, answer, recordings, found.config)
     study.show(answer, fitting.make_tables(answer), fitting.make_sentences(answer), FIT_PAGE, fitting.list_commands(answer))
     return warn_all('fit', [f'{name}: {reason}' for name, reason in found.failed.items()])
 
@@ -139,7 +139,7 @@ def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = F
     differ = 'the label differs from the recorded path'
     warn_all('evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
     answer |= {'failed': failed, 'labels_not_taken': mismatches}
-    write_report(data.resolve().name, answer)
+    write_report(data.resolve().name, answer, recordings, study.params)
     study.show(answer, report.make_tables(answer), answer['verdict'], EVALUATION_PAGE)
     return 2 if failed else 0
 
@@ -185,7 +185,7 @@ def simulate(
     with study.open_workers():
         results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params)
     cells = summarise(results, seed)
-    write_report(cells, results)
+    write_report(cells, results, study.params)
     study.show({'cells': cells, 'seed': seed}, make_tables(cells), (), SIMULATION_PAGE)
     return 0
 

@@ -19,7 +19,7 @@ from foc_ros.core.predict import warm_up
 from foc_ros.core.types import Prediction
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND
-from foc_ros.ros.guidance_loop import GuidanceLoop
+from foc_ros.ros.guidance import GuidanceLoop
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.encode_guidance import Place
 

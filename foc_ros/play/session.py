@@ -324,7 +324,7 @@ class Session:
         if self._tasks is not None and snapshot.candidates:
             self._tasks.note_most_likely(stamp_ns * 1e-9, snapshot.candidates[0].way)
         if hand is not None and not self._is_blind:
-            candidates = scene.view_candidates(snapshot.begin_at(np.array(hand.position)), self._slots)
+            candidates = scene.view_candidates(snapshot, self._slots)
             shares = {'unknown': round(snapshot.unknown_share, 4), 'other': round(snapshot.other_share, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)
 

@@ -1,9 +1,9 @@
 """Pictures for print, by matplotlib: scenes with candidates, the measured hand, likelihoods and speeds.
 
 Every picture shows the same thing in the same way. A path is a solid line that begins at the hand, and is the thicker the more
-likely it is; it is dotted if it avoids the obstacles less surely than wanted. A path that is no proper prediction, because it
-could not be solved or leads through an obstacle, is a ghost: pale, with the reason beside it. Colours are those of Okabe and Ito,
-which can be told apart without perception of hue, and a letter stands beside each.
+likely it is; it is dotted if it is not known to avoid the obstacles as surely as wanted. A path that is no proper prediction,
+because it could not be solved or leads through an obstacle, is a ghost: pale, with the reason beside it. Colours are those of
+Okabe and Ito, which can be told apart without perception of hue, and a letter stands beside each.
 """
 
 from __future__ import annotations
@@ -12,29 +12,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from string import ascii_uppercase
-from textwrap import fill
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.obstacles.geometry import find_limits, trace_obstacle
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 
-from .views import (
-    COLOURS,
-    SLOTS,
-    CandidateTracks,
-    CandidateView,
-    HandTrajectory,
-    Snapshot,
-    UnsolvedView,
-    build_candidate_views,
-    build_snapshot,
-    build_unsolved_views,
-)
+from .legend import describe_in_legend
+from .tracks import CandidateTracks
+from .views import COLOURS, LIKELY, SLOTS, CandidateView, HandTrajectory, Snapshot, UnsolvedView
 
 try:
     import matplotlib as mpl
@@ -52,20 +41,11 @@ GHOST_COLOUR = '#777777'
 STDDEVS = 1.0
 """Size of ellipses and rings in standard deviations."""
 ELLIPSES_PER_CANDIDATE = 8
-LONGEST_WORDS = 60
-"""Number of characters in the words of a class beyond which the legend has its label only."""
 NAMED_OBSTACLES = 30
 """The obstacles of larger scenes are drawn without their ids."""
-LEGEND_PT, NARROW_IN = 8.0, 3.5
-"""Size of the text of a legend, where there is room for it [pt], and the width below which its lines are shorter [in]."""
-COLUMNS, NARROW_COLUMNS = 62, 40
-"""Characters in a line of a legend."""
-MOTOR_NOISE = 'motor noise, which eta is about: one standard deviation'
-TOTAL = 'total uncertainty of the most likely path, likewise'
-"""The two ellipses in the legend."""
-LABELS_IN = 0.5
-"""Height of the labels below axes [in]."""
-WIDTH_IN = 6.4
+MOTOR_NOISE, TOTAL = 'motor noise, one standard deviation', 'all uncertainty of the most likely path'
+RADIUS_STDDEV = 'standard deviation of its radius'
+"""Ellipses, and the ring around an obstacle, in the legend."""
 STYLE = {
     'font.size': 10,
     'axes.spines.top': False,
@@ -82,9 +62,6 @@ METADATA: dict[str, dict[str, str | None]] = {
     '.svg': {'Creator': MARK, 'Date': None},
 }
 """What a picture says of itself, by its format; without its date it is the same file each time."""
-
-_PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
-"""Subplot and place of axes before a legend took a part of it."""
 
 Bounds = tuple[float, float, float, float]
 """Limits of x, then of y [m]."""
@@ -173,14 +150,11 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
     """
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
         ring = STDDEVS * float(obstacles.radius_stddev[row])
-        looks: list[tuple[float, dict[str, Any]]] = [
-            (0.0, {'facecolor': '0.65', 'edgecolor': '0.35', 'linewidth': 0.8, 'label': 'obstacle'})
-        ]
+        look = {'facecolor': '0.65', 'edgecolor': '0.35', 'linewidth': 0.8, 'zorder': 1.0, 'label': 'obstacle'}
+        axes.add_patch(make_obstacle_patch(obstacles, row, 0.0, **look))
         if ring:
-            look = {'facecolor': '0.88', 'edgecolor': '0.7', 'linewidth': 0.6, 'label': 'standard deviation of its radius'}
-            looks.insert(0, (ring, look))
-        for growth, look in looks:
-            axes.add_patch(make_obstacle_patch(obstacles, row, growth, **look))
+            look = {'facecolor': '0.88', 'edgecolor': '0.7', 'linewidth': 0.6, 'zorder': 0.9, 'label': RADIUS_STDDEV}
+            axes.add_patch(make_obstacle_patch(obstacles, row, ring, **look))
         if len(obstacles) <= NAMED_OBSTACLES:
             axes.text(*centre, name, ha='center', va='center', fontsize=8, clip_on=True)
     for number, goal in enumerate(goals):
@@ -195,7 +169,8 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
 def draw_candidates(axes: Any, snapshot: Snapshot, slots: Mapping[str, int]) -> None:
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
-    Motor noise is filled; only the most likely candidate has its total uncertainty, too. Ghosts have their reasons beside them.
+    Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
+    has its total uncertainty, too. Ghosts have their reasons beside them.
     """
     ghosts = [(lost.path, describe_in_legend(lost), snapshot.describe_ghost(lost)) for lost in snapshot.unsolved]
     for rank, each in reversed(list(enumerate(snapshot.candidates))):
@@ -205,7 +180,8 @@ def draw_candidates(axes: Any, snapshot: Snapshot, slots: Mapping[str, int]) -> 
             ghosts.append((each.curve, describe_in_legend(each, letter, reason), reason))
         else:
             style = get_candidate_style(slots.get(each.label), each.likelihood, each.is_compromised)
-            _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
+            if rank == 0 or each.likelihood >= LIKELY:
+                _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
             axes.plot(*each.curve.T, zorder=3, label=describe_in_legend(each, letter), **style)
             draw_tag(axes, each.path[int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))], letter, style['color'])
     for number, (curve, label, reason) in enumerate(ghosts):
@@ -233,58 +209,10 @@ def _draw_ellipses(axes: Any, candidate: CandidateView, colour: str, is_total: b
             axes.add_patch(ellipse)
 
 
-def describe_in_legend(view: CandidateView | UnsolvedView, letter: str = ' ', reason: str = '') -> str:
-    """Return the line of the legend that describes a candidate; reason: why it is a ghost."""
-    # the words of a class with many obstacles would leave no room for the plot
-    name = f'{view.label}  {view.description}' if len(view.description) <= LONGEST_WORDS else view.label
-    if isinstance(view, UnsolvedView):
-        return f'{letter}    - %  {name}; {view.reason}'
-    words = f'; {"estimated" if view.is_estimated else "compromised"}: eta {view.eta:.3f}' if view.is_compromised else ''
-    return f'{letter}  {100 * view.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
-
-
-def draw_legend(axes: Any, title: str | None = None) -> None:
-    """Write everything that is drawn on axes into a legend below them, in a part of their place, so that it covers nothing.
-
-    The text is as small as the place needs. A second call replaces the legend of the first.
-    """
-    figure, name = axes.figure, f'legend {id(axes)}'
-    for earlier in [each for each in figure.axes if each.get_gid() == name]:
-        earlier.remove()
-    slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
-    named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    candidates = [label for label in named if '%  ' in label]
-    candidates.sort(key=lambda label: float(label.partition('%')[0][1:].strip().replace('-', '-1')), reverse=True)
-    labels = candidates + [label for label in named if label not in candidates]
-    width_in, height_in = figure.get_figwidth() * place.width, figure.get_figheight() * place.height
-    columns = NARROW_COLUMNS if width_in < NARROW_IN else COLUMNS
-    texts = [fill(label, columns, subsequent_indent=' ' * (10 if label in candidates else 0)) for label in labels]
-    lines = sum(1 + text.count('\n') for text in texts) + (title is not None)
-    size_pt = min(LEGEND_PT, 72.0 * width_in / (0.62 * (columns + 5)))
-    wanted_in = min(lines * 1.35 * size_pt / 72.0 + 0.05, 0.5 * height_in)
-    size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (1.35 * max(lines, 1)))
-    gap_in = 0.0 if figure.get_layout_engine() else LABELS_IN
-    parts = [max(height_in - wanted_in - gap_in, 0.2 * height_in), gap_in, wanted_in]
-    if slot is None:
-        bottom = place.y0 + place.height * (gap_in + wanted_in) / sum(parts)
-        axes.set_position((place.x0, bottom, place.width, place.y1 - bottom))
-        below = figure.add_axes((place.x0, place.y0, place.width, place.height * wanted_in / sum(parts)))
-    else:
-        parts = [each for each in parts if each]
-        rows = slot.subgridspec(len(parts), 1, height_ratios=parts, hspace=0.0)
-        axes.set_subplotspec(rows[0])
-        below = figure.add_subplot(rows[-1])
-    below.set(gid=name)
-    below.axis('off')
-    handles = [named[label] for label in labels]
-    look = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
-    below.legend(handles, texts, title=title, loc='upper left', prop={'family': 'monospace', 'size': size_pt}, **look)
-
-
 def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: Span) -> None:
     """Draw the measured hand within a span [ns]: black before now, pale after it, a dot at its position now."""
     past, future = hand.between(span[0], now_ns), hand.between(now_ns, span[1])
-    axes.plot(*hand.positions[future].T, color='0.55', linewidth=1.4, zorder=4, label='hand later, not known to the prediction')
+    axes.plot(*hand.positions[future].T, color='0.55', linewidth=1.4, zorder=4, label='hand later, not known yet')
     axes.plot(*hand.positions[past].T, color='black', linewidth=2.0, zorder=4, label='hand before')
     draw_hand_now(axes, hand.positions[past][-1:])
 
@@ -320,7 +248,7 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
     if unknown.any():
         look = {'facecolor': 'none', 'edgecolor': '0.6', 'hatch': '////', 'linewidth': 0.0, 'step': 'mid'}
         axes.fill_between(times, 1.0 - unknown, 1.0, label='unknown, or another goal', **look)
-        axes.legend(loc='lower left', fontsize=7)
+        axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, frameon=False, fontsize=7)
     axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
     axes.tick_params(labelbottom=False)
 
@@ -345,113 +273,3 @@ def draw_tag(axes: Any, position: Any, text: str, colour: str) -> None:
     if text.strip():
         box = {'boxstyle': 'circle,pad=0.18', 'facecolor': 'white', 'edgecolor': colour, 'linewidth': 1.4}
         axes.text(*position, text, fontsize=7.5, ha='center', va='center', zorder=7, bbox=box, clip_on=True)
-
-
-def draw_snapshot(axes: Any, snapshot: Snapshot, bounds: Bounds, slots: Mapping[str, int] | None = None) -> None:
-    """Draw a scene with the candidates in it, the hand and a legend; slots: by label, in order of likelihood if not given."""
-    if snapshot.hand is not None:
-        snapshot = snapshot.begin_at(snapshot.hand)
-    draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
-    draw_candidates(axes, snapshot, number_labels(snapshot.candidates) if slots is None else slots)
-    if snapshot.hand is not None:
-        draw_hand_now(axes, snapshot.hand[None])
-    draw_legend(axes, None if snapshot.candidates else 'no candidate could be solved')
-
-
-def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
-    """Draw a prediction with its obstacles and goals.
-
-    Parameters
-    ----------
-    prediction : Prediction
-        Its candidates are drawn from the hand on, the thicker the more likely, with ellipses of one standard deviation of the
-        position: filled for motor noise, dashed for the total uncertainty of the most likely one. Those without a likelihood, and
-        those that lead through an obstacle, are pale, with the reason beside them.
-    axes : matplotlib.axes.Axes, optional
-        Where to draw; axes of a new pyplot figure by default. The legend takes a part of their place.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes that hold the drawing.
-    """
-    import matplotlib.pyplot as plt
-
-    snapshot = build_snapshot(prediction)
-    bounds = _compute_scene_bounds(snapshot)
-    with plt.rc_context(STYLE):
-        if axes is None:
-            axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, snapshot)), layout='constrained').subplots()
-        draw_snapshot(axes, snapshot, bounds)
-    return axes
-
-
-def plot_outcomes(
-    file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[PredictedCandidate], start: Array
-) -> None:
-    """Write a picture of candidates in their scene, in the format of the file's suffix.
-
-    goals (g, 2), start (2,) [m]. Raises InputError if the suffix is not that of a picture format or the file cannot be written.
-    """
-    views = build_candidate_views(outcomes, len(goals)), None, build_unsolved_views(outcomes, len(goals))
-    save_figure(make_scene_figure(Snapshot(0, obstacles, goals, *views, hand=start)), file)
-
-
-def make_scene_figure(snapshot: Snapshot) -> Figure:
-    """Return a figure of one snapshot: scene, candidates and legend."""
-    bounds = _compute_scene_bounds(snapshot)
-    with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
-        draw_snapshot(figure.subplots(), snapshot, bounds)
-    return figure
-
-
-def make_recording_figure(
-    hand: HandTrajectory, obstacles: Obstacles, goals: Array, spans: Sequence[Span], bounds: Bounds
-) -> Figure:
-    """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each movement."""
-    with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
-        axes = figure.subplots()
-        draw_scene(axes, obstacles, goals, bounds, named=False)
-        axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
-        for number, span in enumerate(spans):
-            draw_movement(axes, hand.positions[hand.between(*span)], number)
-    return figure
-
-
-def make_snapshot_figure(hand: HandTrajectory, tracks: CandidateTracks, row: int, span: Span, bounds: Bounds) -> Figure:
-    """Return a figure of one snapshot during a movement: the scene above, likelihoods and speeds of the whole movement below.
-
-    row: of the snapshot in the tracks; span: start and end [ns] of the movement.
-    """
-    snapshot, slots = tracks.snapshots[row], tracks.slots_at(row)
-    origin_ns = int(hand.stamps_ns[0])
-    now_s, begin_s, end_s = ((stamp - origin_ns) / NANOSECONDS for stamp in (snapshot.stamp_ns, *span))
-    heights = [_get_height(bounds, snapshot) + 0.4, 2.1, 1.9]
-    with open_figure(WIDTH_IN, sum(heights)) as figure:
-        scene, likelihoods, speeds = figure.subplots(3, 1, height_ratios=heights)
-        draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
-        draw_candidates(scene, snapshot, slots)
-        draw_hand(scene, hand, snapshot.stamp_ns, span)
-        draw_legend(scene)
-        draw_likelihoods(likelihoods, tracks.between(*span), origin_ns)
-        draw_speeds(speeds, hand, snapshot, slots, span, origin_ns)
-        for axes in (likelihoods, speeds):
-            axes.axvline(now_s, color='0.4', linewidth=1.0)
-            axes.set_xlim(begin_s, end_s)
-        scene.set_title(f'at {now_s:.2f} s')
-    return figure
-
-
-def _compute_scene_bounds(snapshot: Snapshot) -> Bounds:
-    hand = [] if snapshot.hand is None else [snapshot.hand[None]]
-    return compute_bounds(snapshot.obstacles, snapshot.goals, (*snapshot.candidates, *snapshot.unsolved), *hand)
-
-
-def _get_height(bounds: Bounds, snapshot: Snapshot | None = None) -> float:
-    """Return the height [in] of a scene with equal axes, its axis labels and a legend of candidates."""
-    height = float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.6
-    if snapshot is None:
-        return height
-    texts = [describe_in_legend(each) for each in snapshot.candidates] + [describe_in_legend(each) for each in snapshot.unsolved]
-    lines = sum(-(-len(text) // (COLUMNS - 10)) for text in texts) + 6
-    return height + lines * 1.35 * LEGEND_PT / 72.0

@@ -16,7 +16,8 @@ from foc_ros.core.obstacles.geometry import find_limits
 from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
 
 from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, Span, compute_bounds, compute_ellipse_axes
-from .views import CandidateTracks, CandidateView, HandTrajectory, Snapshot, UnsolvedView
+from .tracks import CandidateTracks
+from .views import LIKELY, CandidateView, HandTrajectory, Snapshot, UnsolvedView
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
 """Units [m], [m/s], [s]."""
@@ -114,13 +115,14 @@ class _ReportData:
 def encode_candidate(snapshot: Snapshot, candidate: CandidateView, is_most_likely: bool) -> dict[str, Any]:
     """Return one candidate of a snapshot.
 
-    ghost: why it is no proper prediction, or ''; t and v: at some of the steps; motor: ellipses of the motor noise; total: of the
+    ghost: why it is no proper prediction, or ''; t and v: at some of the steps; motor: ellipses of the motor noise, none of a
+    candidate that is less than LIKELY; total: of the
     total uncertainty of the most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard
     deviation, and the angle of the greater one [degrees].
     """
     points = select_evenly(len(candidate.path), PATH_POINTS)
     marks = select_evenly(len(candidate.path), ELLIPSES_PER_CANDIDATE + 1)[1:]
-    is_drawn = is_most_likely and candidate.is_widened
+    is_drawn, is_likely = is_most_likely and candidate.is_widened, is_most_likely or candidate.likelihood >= LIKELY
     return {
         'label': candidate.label,
         'description': candidate.description,
@@ -131,7 +133,7 @@ def encode_candidate(snapshot: Snapshot, candidate: CandidateView, is_most_likel
         **_encode_points(candidate.curve, PATH_POINTS),
         't': _quantise_differences(candidate.times[points], TIME),
         'v': _quantise_differences(candidate.speed[points], SPEED),
-        'motor': _encode_ellipses(candidate.path[marks], candidate.motor_covariance[marks]),
+        'motor': _encode_ellipses(candidate.path[marks], candidate.motor_covariance[marks]) if is_likely else [],
         'total': _encode_ellipses(candidate.path[marks], candidate.covariance[marks]) if is_drawn else [],
     }
 

@@ -12,12 +12,25 @@ from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED
 from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.report import GAP_TITLE, make_tables
 from foc_ros.analysis.evaluation.scores import TENTHS
+from foc_ros.analysis.recordings import Recording
+from foc_ros.core.config import Config
 from foc_ros.io.outputs import EVALUATION_PAGE
 
 from .draw import open_figure
-from .page import render_figure, render_list, render_page, render_pictures, render_table, write_page
+from .example import render_example, warn_of_few
+from .page import (
+    place_legend,
+    render_figure,
+    render_list,
+    render_page,
+    render_pictures,
+    render_tables,
+    write_page,
+)
 
-WIDTH_IN, HEIGHT_IN = 6.4, 4.2
+WIDTH_IN, HEIGHT_IN = 6.4, 4.6
+WEIGHTED, AHEAD_S, LEVEL = 'likelihood-weighted', '0.5', '0.9'
+"""The predicted position, the time ahead [s] and the probability of a region that the summary is about."""
 COUNTS = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
 CAPTIONS = {
     PATH_CLASS: 'Homotopy class through the obstacles still ahead: mean log-likelihood of the true class above a uniform guess.',
@@ -26,13 +39,62 @@ CAPTIONS = {
 }
 
 
-def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None:
-    """Write the page; answer: as of `evaluate --json`. Raises InputError where that cannot be done."""
-    tables = ''.join(render_table(columns, rows, heading) for heading, columns, rows in make_tables(answer))
-    warnings = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
-    body = render_list(answer['verdict']) + render_pictures(_draw_questions(answer['questions'])) + tables
-    page = render_page(f'Evaluation: {title}', body, warnings)
-    write_page(directory, EVALUATION_PAGE, page)
+ASKED = {PATH_CLASS: 'path past the obstacles', GOAL: 'goal', GAP: 'gap in the next row of obstacles'}
+EXPLANATIONS = {
+    'nat': 'the unit of a natural logarithm of a probability. 0.69 nat more mean twice the probability for what really happened.',
+    'above uniform': 'compared with a guess that finds all answers equally likely. 0 is no better than this; more is better.',
+    'tenths': 'the first column is about the beginning of the movement, when little is known, the last one about its end.',
+    'gain': 'the log-likelihood above uniform [nat], averaged over the whole movement.',
+    'ECE': 'the expected calibration error: how far the stated probabilities are from the shares that come true. 0 is best.',
+    'Brier': 'the mean squared error of the probabilities. 0 is best.',
+    'correct': 'how often the likeliest answer is the true one.',
+    'leads from': 'the part of the movement from which on the true answer stays the likeliest one. Less is better.',
+    'average': 'the distance of the predicted from the true position, over all times until then.',
+    'final': 'this distance at that time alone.',
+    'Negative log-density': 'how improbable the true position was. Less is better: both a wrong place and a wrong width count.',
+    'inside': 'how often the true position is in the region that should hold this share of them. The share itself is best.',
+    'held out': 'each recording is scored with the settings that fit the others best, so that none has been learnt by heart.',
+    'best setting': 'the one that fits all recordings best.',
+}
+"""What the words in headings and columns mean."""
+
+
+def write_report(
+    directory: Path,
+    title: str,
+    answer: Mapping[str, Any],
+    recordings: Mapping[str, Recording] | None = None,
+    config: Config | None = None,
+) -> None:
+    """Write the page; answer: as of `evaluate --json`, of recordings. Raises InputError where that cannot be done."""
+    body = render_list(summarise(answer), 'In short')
+    body += render_example(recordings, config) if recordings and config else ''
+    body += render_pictures(_draw_questions(answer['questions']))
+    body += render_list(answer['verdict'], 'Compared with simpler predictors') + render_tables(make_tables(answer), EXPLANATIONS)
+    failed = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
+    warnings = [*warn_of_few(answer['recordings'], 'recordings'), *failed]
+    write_page(directory, EVALUATION_PAGE, render_page(f'Evaluation: {title}', body, warnings, config))
+
+
+def summarise(answer: Mapping[str, Any]) -> list[str]:
+    """Return the main results of `evaluate --json` in plain words."""
+    sentences = [f'{answer["recordings"]} recordings were predicted, at {answer["predictions"]} moments on the way.']
+    for name, asked in ASKED.items():
+        if name in answer['questions']:
+            ours, guess = (answer['questions'][name][each] for each in (PUBLISHED, UNIFORM))
+            chances = [100.0 * np.exp(each['log_likelihood']) for each in (ours, guess)]
+            sentences.append(
+                f'The likeliest {asked} was the one that the hand took in {100.0 * ours["right"]:.0f} % of them. The true '
+                f'one had a probability of {chances[0]:.0f} % (geometric mean); a guess among equals gives it {chances[1]:.0f} %.'
+            )
+    positions = answer['positions']
+    error_m, share = positions['displacement_m'][WEIGHTED]['final'][AHEAD_S], positions['inside_all'][LEVEL][AHEAD_S]
+    if error_m is not None:
+        sentences.append(f'{AHEAD_S} s ahead, the predicted position was {1e3 * error_m:.0f} mm from the true one on average.')
+    if share is not None:
+        level = 100.0 * float(LEVEL)
+        sentences.append(f'The region that should hold {level:.0f} % of the true positions then held {100.0 * share:.0f} %.')
+    return sentences
 
 
 def _draw_questions(questions: Mapping[str, Any]) -> Iterator[str]:
@@ -43,6 +105,7 @@ def _draw_questions(questions: Mapping[str, Any]) -> Iterator[str]:
             for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
                 with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
                     draw(figure.subplots(), name, questions[name])
+                    place_legend(figure)
                 yield render_figure(figure, words)
 
 
@@ -57,7 +120,6 @@ def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:
     axes.set(xlabel='tenth of the distance', xticks=range(1, TENTHS + 1))
     axes.set_ylabel(GAP_TITLE.split(':')[0] if name == GAP else 'log-likelihood above uniform [nat]')
     axes.axhline(0.0, color='0.4', linewidth=0.8)
-    axes.legend(fontsize='small')
 
 
 def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> None:
@@ -72,4 +134,3 @@ def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> Non
             place = {'xy': (each['confidence'], each['right']), 'xytext': (5, -9), 'textcoords': 'offset points'}
             axes.annotate(str(each['count']), **place, fontsize=7, color=line.get_color())
     axes.set(xlabel='probability of the likeliest answer', ylabel='share of true answers', aspect='equal')
-    axes.legend(fontsize='small')

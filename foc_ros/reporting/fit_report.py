@@ -15,10 +15,13 @@ from foc_ros.analysis.fitting.fit import (
     format_scores,
     make_verdict,
 )
+from foc_ros.analysis.recordings import Recording
+from foc_ros.core.config import Config
 from foc_ros.io.outputs import FIT_PAGE
 
 from .draw import get_class_style, open_figure
-from .page import render_figure, render_list, render_page, render_pictures, render_table, write_page
+from .example import render_example, warn_of_few
+from .page import render_figure, render_list, render_page, render_pictures, render_table, render_tables, write_page
 
 WIDTH_IN, LINE_IN = 6.4, 0.34
 CAPTION = (
@@ -26,19 +29,44 @@ CAPTION = (
 )
 
 
-def write_report(directory: Path, title: str, answer: Mapping[str, Any]) -> None:
-    """Write the page; answer: as of `fit --json`. Raises InputError where that cannot be done."""
-    warnings = [*answer['warnings'], *(f'{name}: {reason}' for name, reason in answer['failed'].items())]
+EXPLANATIONS = {
+    'nat': 'the unit of a natural logarithm of a probability. 0.69 nat more mean twice the probability for what really happened.',
+    'above uniform': 'compared with a guess that finds all answers equally likely. 0 is no better than this guess.',
+    'log-likelihood': 'the logarithm of the probability of what the hand really did. More is better.',
+    'log-density': 'how probable the true positions were. More is better; of a negative log-density less is better.',
+    'region of 90 %': 'should hold 90 % of the true positions.',
+    '90 % ellipse': 'should hold 90 % of the true positions, if the hand takes the likeliest path.',
+    'held out': 'scored on recordings that were left out of the fit, so that it cannot have learnt them by heart.',
+    '95 %': 'the interval within which the value would come out from other recordings of this kind; wide means: not well known.',
+}
+"""What the words in headings, columns and rows mean."""
+
+
+def write_report(
+    directory: Path,
+    title: str,
+    answer: Mapping[str, Any],
+    recordings: Mapping[str, Recording] | None = None,
+    config: Config | None = None,
+) -> None:
+    """Write the page; answer: as of `fit --json`, of recordings, with the fitted configuration.
+
+    Raises InputError where that cannot be done.
+    """
+    count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
-    body = (
-        render_list(make_verdict(answer))
-        + render_table(COMPARISON_COLUMNS, format_comparison(answer), 'Before and after')
-        + _draw_parameters(answer['parameters'])
-        + render_table(PARAMETER_COLUMNS, format_parameters(answer))
-        + render_table(SCORE_COLUMNS, format_scores(answer), 'Scores')
-        + render_table((), commands, 'Run the node with these parameters')
+    tables = (
+        ('Before and after', COMPARISON_COLUMNS, format_comparison(answer)),
+        ('Parameters', PARAMETER_COLUMNS, format_parameters(answer)),
+        ('Scores', SCORE_COLUMNS, format_scores(answer)),
     )
-    write_page(directory, FIT_PAGE, render_page(f'Fit: {title}', body, warnings))
+    fitted = f'{len(answer["parameters"])} parameters were fitted to {count} recordings.'
+    body = render_list([fitted, *make_verdict(answer)], 'In short')
+    body += render_example(recordings, config) if recordings and config else ''
+    body += _draw_parameters(answer['parameters']) + render_tables(tables, EXPLANATIONS)
+    body += render_table((), commands, 'Run the node with these parameters')
+    warnings = [*warn_of_few(count, 'recordings'), *answer['warnings'], *failed]
+    write_page(directory, FIT_PAGE, render_page(f'Fit: {title}', body, warnings, config))
 
 
 def _draw_parameters(parameters: Mapping[str, Any]) -> str:

@@ -64,7 +64,7 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
 
 def _make_table(snapshot: Snapshot, title: str) -> Table:
     table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
-    table.caption = '* eta is below the wanted one: compromised, or estimated'
+    table.caption = '* not known to keep the wanted eta: compromised, or estimated'
     for name, width in COLUMNS.items():
         table.add_column(name, width=width, no_wrap=True, justify='right' if width < 10 else 'left')
     for each in snapshot.candidates[:ROWS]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,18 +15,12 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.types import NANOSECONDS, HandSample, Status
 from foc_ros.io.outputs import MARK, OVERVIEW, REPORT_FILES, check_report
 
-from .draw import Span, make_recording_figure, make_snapshot_figure, save_figure
+from .draw import Span, save_figure
 from .encode import compute_recording_bounds, encode_report, round_number
+from .figures import make_recording_figure, make_snapshot_figure
 from .page import render
-from .views import (
-    CandidateTracks,
-    CandidateView,
-    HandTrajectory,
-    Snapshot,
-    build_candidate_tracks,
-    build_hand_trajectory,
-    build_snapshot,
-)
+from .tracks import CandidateTracks, build_candidate_tracks
+from .views import NOTED, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
 
 MOST_PICTURES = 8
 SINGLE_MOVEMENT_FRACTIONS = (0.1, 0.3, 0.5, 0.7)
@@ -35,8 +29,8 @@ FRACTION = 0.3
 """Fraction of its duration at which each of several movements is pictured."""
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""
-NOTED = 0.01
-"""Likelihood from which a compromised candidate is worth a warning."""
+LATE_SHARE = 0.05
+"""Share of the predictions that were not finished from which the page warns of a busy computer."""
 COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candidates not solved', 'counters of the node')
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
 Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
@@ -88,7 +82,6 @@ def write_report(
     if not len(hand.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
     spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
-    snapshots = [each.begin_at(hand.position_at(each.stamp_ns)) for each in snapshots]
     tracks = build_candidate_tracks(snapshots)
     facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots, int(hand.stamps_ns[0]))
     data = encode_report(hand, tracks, spans, compute_recording_bounds(hand, snapshots))
@@ -144,9 +137,26 @@ def _select_rows(snapshots: Sequence[Snapshot], spans: Sequence[Span]) -> dict[i
     return selected
 
 
+def describe_late(snapshots: Sequence[Snapshot]) -> str:
+    """Return for how many predictions the computer was too busy and what to change, '' where they were too few to matter."""
+    late = sum(each.is_late for each in snapshots)
+    if late <= LATE_SHARE * len(snapshots):
+        return ''
+    return (
+        f'This computer was too busy for {late} of {len(snapshots)} predictions, which show paths that are not finished. '
+        'End other programs, or let the node do less: a smaller rate_hz or homotopy.max_candidates, or a longer budget_s.'
+    )
+
+
 def _collect_facts(snapshots: Sequence[Snapshot]) -> dict[str, str]:
     solve_ms = [1e3 * each.solve_s for each in snapshots if each.solve_s is not None]
-    facts = {'predictions': str(len(snapshots)), 'candidates solved': str(sum(len(each.candidates) for each in snapshots))}
+    views = [view for each in snapshots for view in each.candidates if view.likelihood >= NOTED]
+    counts = [sum(view.status is status for view in views) for status in (Status.SOLVED, Status.COMPROMISED)]
+    facts = {
+        'predictions': str(len(snapshots)),
+        f'paths with at least {100 * NOTED:.0f} %': f'{len(views)}; they avoid the obstacles as surely as wanted: {counts[0]}, '
+        f'less surely: {counts[1]}, as far as estimated: {len(views) - sum(counts)}',
+    }
     if solve_ms:
         median, late = np.percentile(solve_ms, [50, 99])
         facts['time per prediction'] = f'{median:.1f} ms (median), {late:.1f} ms (99th percentile)'
@@ -154,28 +164,31 @@ def _collect_facts(snapshots: Sequence[Snapshot]) -> dict[str, str]:
 
 
 def _collect_warnings(snapshots: Sequence[Snapshot], origin_ns: int) -> list[PageWarning]:
-    times_s = [round((each.stamp_ns - origin_ns) / NANOSECONDS, 4) for each in snapshots]
-    empty = [time_s for time_s, each in zip(times_s, snapshots, strict=True) if not each.candidates]
-    ended: dict[str, list[float]] = {}
-    for time_s, each in zip(times_s, snapshots, strict=True):
-        lost = [view.status for view in each.unsolved]
-        for status in lost + [Status.COMPROMISED.value for view in each.candidates if _is_noted(view)]:
-            ended.setdefault(status, []).append(time_s)
-    warnings = [] if snapshots else [PageWarning('There is no prediction.')]
-    if empty:
-        warnings.append(PageWarning(f'In {len(empty)} of {len(snapshots)} predictions no candidate could be solved.', empty[0]))
-    for status, at in sorted(ended.items()):
+    def find(is_found: Callable[[Snapshot], bool]) -> list[float]:
+        return [_measure_seconds(each, origin_ns) for each in snapshots if is_found(each)]
+
+    if not snapshots:
+        return [PageWarning('There is no prediction.')]
+    warnings, count = [], len(snapshots)
+    if at := find(lambda each: not each.candidates):
+        warnings.append(PageWarning(f'In {len(at)} of {count} predictions no candidate could be solved.', at[0]))
+    if words := describe_late(snapshots):
+        warnings.append(PageWarning(words, find(lambda each: each.is_late)[0]))
+    if at := find(lambda each: bool(each.candidates) and each.candidates[0].status is Status.COMPROMISED):
+        words = f'In {len(at)} of {count} predictions the most likely path avoids the obstacles less surely than wanted'
+        warnings.append(PageWarning(f'{words}. Remedy: {Status.COMPROMISED.remedy}.', at[0]))
+    lost: dict[str, list[float]] = {}
+    for each in snapshots:
+        for view in each.unsolved:
+            lost.setdefault(view.status, []).append(_measure_seconds(each, origin_ns))
+    for status, at in sorted(lost.items()):
         words = f'{len(at)} candidate{"s" if len(at) > 1 else ""} ended with status {status}. Remedy: {Status(status).remedy}.'
         warnings.append(PageWarning(words, at[0]))
     return warnings
 
 
-def _is_noted(view: CandidateView) -> bool:
-    """Return whether a candidate is compromised, and likely enough for a warning.
-
-    Messages of the node do not tell an estimated candidate from a compromised one; most of these are unlikely.
-    """
-    return view.is_compromised and not view.is_estimated and view.likelihood >= NOTED
+def _measure_seconds(snapshot: Snapshot, origin_ns: int) -> float:
+    return round((snapshot.stamp_ns - origin_ns) / NANOSECONDS, 4)
 
 
 def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:
@@ -187,6 +200,7 @@ def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:
             {
                 'label': each.label,
                 'description': each.description,
+                'status': each.status.value,
                 'compromised': each.is_compromised,
                 **{name: round_number(getattr(each, name)) for name in ('likelihood', 'effort', 'cost_ratio', 'eta')},
                 'end': [round_number(value) for value in each.path[-1]],

@@ -11,10 +11,12 @@ import numpy as np
 from foc_ros.analysis.simulation import FOC, NONE
 from foc_ros.analysis.simulation.operators import Task
 from foc_ros.analysis.simulation.study import COLUMNS, PairResult, Trial, make_tables
+from foc_ros.core.config import Config
 from foc_ros.io.outputs import SIMULATION_PAGE
 
 from .draw import draw_scene, get_class_style, open_figure
-from .page import render_figure, render_page, render_pictures, render_table, write_page
+from .example import warn_of_few
+from .page import place_legend, render_figure, render_list, render_page, render_pictures, render_tables, write_page
 
 DRAWN = ('collision_rate', 'completion_s', 'opposing_impulse')
 """Measures with a figure."""
@@ -26,18 +28,55 @@ NEWTONS_PER_M = 60.0
 BORDER_M = 0.04
 
 
-def write_report(directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[PairResult]) -> None:
+EXPLANATIONS = {
+    'collisions': 'trials in which the hand entered an obstacle.',
+    'time': 'from the beginning of the movement to the arrival.',
+    'clearance': 'the least distance from an obstacle; negative within one.',
+    'effort': 'the integral of the square of the force of the operator.',
+    'opposing impulse': 'force of the guidance against the direction in which the operator wants to go, added up over time.',
+    'mean opposing force': 'the same on average, in parts of the greatest force of the guidance.',
+    'wrong way': 'where the operator takes another path than predicted: how much more it costs than without guidance.',
+    'bootstrap interval': 'the mean would be in it in 95 of 100 such studies. Two rules whose intervals overlap may be alike.',
+}
+"""What the words in headings and columns mean."""
+SUMMARISED = {'collision_rate': 'collisions in {:.0f} % of the trials', 'completion_s': '{:.2f} s for a movement'}
+
+
+def write_report(
+    directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[PairResult], config: Config | None = None
+) -> None:
     """Write the page; cells: of `simulate --json`. Raises InputError where that cannot be done."""
-    tables = ''.join(render_table(columns, rows, heading) for heading, columns, rows in make_tables(cells))
-    figures, trials = render_pictures(_render_measures(cells)), render_pictures(_render_trials(results))
-    body = f'{figures}{tables}<h2>Single trials</h2>{trials}'
-    write_page(directory, SIMULATION_PAGE, render_page('Closed-loop study of guidance', body))
+    body = render_list(summarise(cells), 'In short') + render_pictures(_render_measures(cells))
+    body += render_tables(make_tables(cells), EXPLANATIONS)
+    body += f'<h2>Single trials</h2>{render_pictures(_render_trials(results))}'
+    warnings = warn_of_few(min(cell['trials'] for cell in cells), 'trials of each operator') if cells else []
+    write_page(directory, SIMULATION_PAGE, render_page('Closed-loop study of guidance', body, warnings, config))
+
+
+def summarise(cells: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return for each operator what guidance changes, in plain words."""
+    sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
+    for operator in dict.fromkeys(cell['operator'] for cell in cells):
+        by_rule = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}
+        told = [
+            ' and '.join(
+                words.format(COLUMNS[name][1] * by_rule[rule][name])
+                for name, words in SUMMARISED.items()
+                if by_rule[rule][name] is not None
+            )
+            + f' {"with" if rule == FOC else "without"} guidance'
+            for rule in (FOC, NONE)
+            if rule in by_rule
+        ]
+        sentences.append(f'{operator.replace("_", " ").capitalize()}: {"; ".join(told)}.')
+    return sentences
 
 
 def _render_measures(cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     for name in DRAWN:
         with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
             _draw_measure(figure.subplots(), cells, name)
+            place_legend(figure)
         yield render_figure(figure, f'{COLUMNS[name][0]}: mean over the paired trials, with its bootstrap interval of 95 %.')
 
 
@@ -53,9 +92,8 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
         errors = np.maximum(np.abs(bounds.T - means), 0.0)
         axes.errorbar(at, means, errors, fmt='o', markersize=4, capsize=2, color=get_class_style(number)[0], label=rule)
     axes.set_xticks(range(len(operators)), [name.replace('_', '\n') for name in operators])
-    axes.set(ylabel=heading)
+    axes.set(ylabel=heading, xlim=(-0.5, len(operators) - 0.5))
     axes.set_ylim(bottom=0.0)
-    axes.legend(fontsize='small')
 
 
 def _render_trials(results: Sequence[PairResult]) -> Iterator[str]:
@@ -65,6 +103,7 @@ def _render_trials(results: Sequence[PairResult]) -> Iterator[str]:
             continue
         with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
             _draw_trial(figure.subplots(), result.task, result.trials)
+            place_legend(figure)
         words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
         yield render_figure(figure, f'Operator {result.operator}. {words}')
 
@@ -83,4 +122,3 @@ def _draw_trial(axes: Any, task: Task, trials: Mapping[str, Trial]) -> None:
             rows = np.linspace(0, len(trial.position) - 1, ARROWS).astype(int)
             options = {'angles': 'xy', 'scale_units': 'xy', 'scale': NEWTONS_PER_M, 'width': 0.004, 'color': look['color']}
             axes.quiver(*trial.position[rows].T, *trial.assistance[rows].T, zorder=6, **options)
-    axes.legend(fontsize='small', loc='upper left')

@@ -1,4 +1,4 @@
-"""Topics of the node: message types and quality of service, and the emptying of a subscription's queue."""
+"""Topics of the node: message types and quality of service, the emptying of a subscription's queue, and transforms from tf2."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any
 
-from rclpy.callback_groups import CallbackGroup
+import numpy as np
 from rclpy.duration import Infinite
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -22,13 +22,16 @@ from rclpy.qos import (
     qos_check_compatible,
 )
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.time import Time
 
 from foc_ros.core.types import Prediction, name_goal
 from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
 from .messages.encode_guidance import GUIDANCE_OUTPUTS, LIVE_OUTPUTS, TWIST, TWIST_TYPE
 from .messages.encode_prediction import GOAL_LIKELIHOOD_TYPE, OUTPUTS, encode_goal_likelihoods
+from .messages.plane import Transform, compute_rotation
 from .messages.types import MessageTypes, find_message_class
+from .transforms import TransformUnavailableError
 
 INPUTS = (GOALS, GOAL, CLOUD, MARKERS, COLLISION, DETECTIONS, HAND)
 """Input topics in the order in which the executor takes their messages: the scene before the hand."""
@@ -44,15 +47,15 @@ OVERRIDABLE = QoSOverridingOptions(
 )
 
 
-def create_subscriptions(node: Node, receive: Callable[[str, Any], None], hand_group: CallbackGroup) -> dict[str, Any]:
-    """Create the subscriptions, by topic; each calls `receive(topic, message)`, with a serialized message for the hand.
+def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dict[str, Any]:
+    """Create the subscriptions, by topic; each calls `receive(topic, message)`.
 
     A message of `BEST_EFFORT` is a complete state; those of the other inputs are changes, or are sent once, and are received
     reliably. A scene that was published once, before the start of the node, is received with
     `qos_overrides./obstacles.subscription.durability: transient_local`, reliably, but then not from volatile or best-effort
-    publishers. Inputs of `find_missing_packages` have no subscription. hand_group: callback group of the hand.
+    publishers. Inputs of `find_missing_packages` have no subscription.
 
-    The endpoints here have no event callbacks, because each of them lengthens every wake-up of the executor:
+    The endpoints here have no event callbacks, because each of them lengthens every wake-up of rclpy's plain executor:
     `describe_incompatible_publishers` and `describe_incompatible_subscriptions` find the same in the graph.
     """
     subscriptions = {}
@@ -67,8 +70,6 @@ def create_subscriptions(node: Node, receive: Callable[[str, Any], None], hand_g
             role,
             partial(receive, role),
             _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH),
-            callback_group=hand_group if role == HAND else None,
-            raw=role == HAND,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
             qos_overriding_options=OVERRIDABLE,
         )
@@ -178,10 +179,7 @@ def take_queued(subscription: Any) -> list[Any]:
     """Take the messages from a subscription's queue, at most as many as it holds, because it may be filled meanwhile."""
     messages: list[Any] = []
     with subscription.handle:
-        while len(messages) < HAND_DEPTH:
-            taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-            if taken is None:
-                break
+        while len(messages) < HAND_DEPTH and (taken := subscription.handle.take_message(subscription.msg_type, subscription.raw)):
             messages.append(taken[0])
     return messages
 
@@ -190,3 +188,51 @@ def _build_qos(reliability: QoSReliabilityPolicy, depth: int) -> QoSProfile:
     """Return a new profile, because rclpy writes the overrides of a topic into its profile."""
     volatile, keep_last = QoSDurabilityPolicy.VOLATILE, QoSHistoryPolicy.KEEP_LAST
     return QoSProfile(reliability=reliability, durability=volatile, history=keep_last, depth=depth)
+
+
+class TfListener:
+    """A buffer of tf2 and its listener; a jump of the node's clock back in time clears it.
+
+    Parameters
+    ----------
+    node
+        The node that subscribes to `/tf` and `/tf_static`.
+    notify
+        Called after each transform that arrives, in the thread of the node's executor.
+
+    Raises
+    ------
+    ImportError
+        If `tf2_ros` is not installed.
+    """
+
+    def __init__(self, node: Node, notify: Callable[[], None]) -> None:
+        import tf2_ros
+
+        self._unavailable = tf2_ros.TransformException
+        self._notify = notify
+        self._buffer: Any = tf2_ros.Buffer(node=node)
+        self._listener = tf2_ros.TransformListener(self, node)
+
+    def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
+        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0, without waiting.
+
+        Raises TransformUnavailableError.
+        """
+        try:
+            found = self._buffer.lookup_transform(target, source, Time(nanoseconds=stamp_ns))
+        except self._unavailable as error:
+            raise TransformUnavailableError(' '.join(str(error).split())) from None
+        shift = found.transform.translation
+        translation = np.array([shift.x, shift.y, shift.z])
+        return Transform(compute_rotation(found.transform.rotation), translation, Time.from_msg(found.header.stamp).nanoseconds)
+
+    def set_transform(self, transform: Any, authority: str) -> None:
+        """Take a transform from the listener."""
+        self._buffer.set_transform(transform, authority)
+        self._notify()
+
+    def set_transform_static(self, transform: Any, authority: str) -> None:
+        """Take a transform that never changes from the listener."""
+        self._buffer.set_transform_static(transform, authority)
+        self._notify()

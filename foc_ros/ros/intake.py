@@ -13,10 +13,9 @@ from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
-from .messages.decode_markers import MarkerTable
-from .messages.decode_objects import CollisionTable, decode_detections
+from .messages.decode_objects import CollisionTable, MarkerTable, decode_detections
 from .messages.decode_point_cloud import decode_point_cloud
-from .messages.decode_poses import decode_goal, decode_goals, decode_hand_sample, decode_stamp
+from .messages.decode_poses import Place, decode_goal, decode_goals, decode_hand_sample, decode_stamp, stay
 from .transforms import Arrival
 
 DROPPED = '_dropped_'
@@ -43,14 +42,14 @@ class Intake:
         self._markers_unchanged = (-math.inf, math.inf)
         self._collisions = CollisionTable()
         self._counts: Counter[str] = Counter()
-        self._handlers: dict[str, Callable[[Any], SampleStatus]] = {
+        self._handlers: dict[str, Callable[[Any, Place], SampleStatus]] = {
             topics.HAND: self._take_hand,
             topics.CLOUD: self._take_cloud,
             topics.MARKERS: self._take_markers,
             topics.COLLISION: self._take_collision_object,
             topics.DETECTIONS: self._take_detections,
-            topics.GOALS: lambda message: pipeline.set_goals(*decode_goals(message, pipeline.config.plane)),
-            topics.GOAL: lambda message: pipeline.set_goals(*decode_goal(message, pipeline.config.plane)),
+            topics.GOALS: lambda message, place: pipeline.set_goals(*decode_goals(message, pipeline.config.plane, place)),
+            topics.GOAL: lambda message, place: pipeline.set_goals(*decode_goal(message, pipeline.config.plane, place)),
         }
 
     @property
@@ -59,21 +58,21 @@ class Intake:
         return {**self.pipeline.counts, **self._counts}
 
     def take_arrival(self, role: str, arrival: Arrival) -> SampleStatus | None:
-        """Take one message that was transformed, or could not be; None if it cannot be decoded."""
+        """Take one message whose transform is known, or is not needed or missing; None if it cannot be decoded."""
         if arrival.is_inexact:
             self._counts[f'transform_newest_{role}'] += 1
-        return self.take(role, arrival.message, arrival.error)
+        return self.take(role, arrival.message, arrival.place, arrival.error)
 
-    def take(self, role: str, message: Any, transform_error: str = '') -> SampleStatus | None:
+    def take(self, role: str, message: Any, place: Place = stay, transform_error: str = '') -> SampleStatus | None:
         """Take one message, or the error of its decoding; None if it cannot be decoded.
 
-        transform_error: why it is not in the working frame.
+        place: gives its frame and the transform to there; transform_error: why that is not the working frame.
         """
         refused_before = self.pipeline.refused
         try:
             if isinstance(message, MessageError):
                 raise message
-            status = self._handlers[role](message)
+            status = self._handlers[role](message, place)
         except MessageError as error:
             self.refuse(role, error)
             return None
@@ -103,11 +102,6 @@ class Intake:
         if count:
             self._counts[f'{role}{DROPPED}{reason}'] += count
 
-    def count_skipped(self) -> SampleStatus:
-        """Count a hand pose that is skipped."""
-        self._counts['hand_skipped'] += 1
-        return SampleStatus.SKIPPED
-
     def remove_source(self, source: str) -> None:
         """Forget the obstacles of one source, such as 'cloud' or 'markers', as if none of its messages had been received."""
         self.pipeline.remove_source(source)
@@ -116,10 +110,11 @@ class Intake:
         if source == 'markers':
             self._markers, self._markers_ns, self._markers_unchanged = MarkerTable(), 0, (-math.inf, math.inf)
 
-    def _take_hand(self, message: Any) -> SampleStatus:
+    def _take_hand(self, message: Any, place: Place) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
-            return self.count_skipped()
-        self.sample = sample = decode_hand_sample(message, self.pipeline.config.plane)
+            self._counts['hand_skipped'] += 1
+            return SampleStatus.SKIPPED
+        self.sample = sample = decode_hand_sample(message, self.pipeline.config.plane, place)
         status = self.pipeline.add_hand_sample(sample)
         still = self._still
         is_same = still is not None and (*still.position, still.height) == (*sample.position, sample.height)
@@ -130,21 +125,21 @@ class Intake:
             self._set_markers(self._markers)
         return status
 
-    def _take_cloud(self, message: Any) -> SampleStatus:
-        cloud = decode_point_cloud(message, self.pipeline.config.plane)
+    def _take_cloud(self, message: Any, place: Place) -> SampleStatus:
+        cloud = decode_point_cloud(message, self.pipeline.config.plane, place)
         status = self.pipeline.set_obstacles('cloud', cloud.obstacles, cloud.stamp_ns, cloud.frame_id)
         return self._count_dropped(topics.CLOUD, cloud.dropped, status)
 
-    def _take_detections(self, message: Any) -> SampleStatus:
+    def _take_detections(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config
-        found = decode_detections(message, config.plane, config.scene.marker_radius_stddev)
+        found = decode_detections(message, config.plane, config.scene.marker_radius_stddev, place)
         status = self.pipeline.set_obstacles(topics.DETECTIONS, found.obstacles, found.stamp_ns, found.frame_id)
         return self._count_dropped(topics.DETECTIONS, found.dropped, status)
 
-    def _take_collision_object(self, message: Any) -> SampleStatus:
+    def _take_collision_object(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config
         before = self._collisions if self.pipeline.frame_id in (None, self._collisions.frame_id) else CollisionTable()
-        table = before.with_message(message)
+        table = before.with_message(message, place)
         table = replace(table, stamp_ns=self._ignore_small_steps_back(before.stamp_ns, table.stamp_ns))
         obstacles = table.obstacles(config.plane, config.scene.marker_radius_stddev)
         status = self.pipeline.set_obstacles(topics.COLLISION, obstacles, table.stamp_ns, table.frame_id)
@@ -157,11 +152,11 @@ class Intake:
         is_slightly_behind = stamp_ns and 0 < newest_ns - stamp_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS
         return newest_ns if is_slightly_behind else stamp_ns
 
-    def _take_markers(self, message: Any) -> SampleStatus:
+    def _take_markers(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config
         # markers received before the working frame was known are discarded if they are in another frame
         before = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerTable()
-        markers = before.with_message(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev)
+        markers = before.with_message(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev, place)
         return self._count_dropped(topics.MARKERS, markers.dropped, self._set_markers(markers))
 
     def _set_markers(self, markers: MarkerTable) -> SampleStatus:

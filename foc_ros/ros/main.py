@@ -6,19 +6,19 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import FrameType
 from typing import Any
 
 from foc_ros.core.errors import FocError, list_messages, print_warnings
 
-from .parameters import check_parameters
+from .parameters import check_parameter_files
 
 SPIN_S = 0.1
 """Longest time between two checks of the stop flag [s]."""
 SWITCH_S = 0.0002
-"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]. An update of guidance
-gives the interpreter away several times, so with 0.001 it took up to 12 ms (`scripts/stress.py rates`)."""
+"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]: an update of guidance
+gives the interpreter away several times."""
 END_S = 0.5
 """Time after which a prediction that is still being computed does not delay the end of the process [s]."""
 
@@ -31,9 +31,7 @@ class StopSignals:
     """
 
     def __init__(self) -> None:
-        self.is_requested = False
-        self._leave: Callable[[], object] = lambda: None
-        self._is_deferred = False
+        self.is_requested = self._is_deferred = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._request)
 
@@ -41,21 +39,9 @@ class StopSignals:
         """Let the signals set the flag from now on."""
         self._is_deferred = True
 
-    def resume(self, leave: Callable[[], object]) -> None:
-        """Let the signals end the process at once again, after what is to be done before that."""
-        self._leave, self._is_deferred = leave, False
-        if self.is_requested:
-            self._end()
-
     def _request(self, _number: int, _frame: FrameType | None) -> None:
         self.is_requested = True
         if not self._is_deferred:
-            self._end()
-
-    def _end(self) -> None:
-        try:
-            self._leave()
-        finally:
             os._exit(0)
 
 
@@ -70,73 +56,63 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = ['foc_node', *(sys.argv[1:] if arguments is None else arguments)]
     try:
         with print_warnings('foc_node'):
-            check_parameters(given)
+            check_parameter_files(given)
     except FocError as error:
         return _reject(error)
     import rclpy
-    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.executors import ExternalShutdownException
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
+    from .node import FocNode
+
     context = rclpy.Context()
+    stop.defer()
     try:
         extra = remove_ros_args(given)[1:]
         if extra:
             raise FocError(f'unrecognized arguments: {" ".join(extra)} (those of ROS follow --ros-args)')
         rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
-        stop.defer()
-        forerunner = _join_graph(context)
+        node = FocNode(context=context)
     except (FocError, RuntimeError, ValueError) as error:
         context.try_shutdown()
         if 'initialize logging' in str(error):
             error.add_note('ROS_LOG_DIR names another directory for the log')
         return _reject(error)
-    stop.resume(forerunner.destroy_node)
-    from .node import FocNode
-
-    stop.defer()
-    try:
-        node = FocNode(context=context)
-    except (FocError, RuntimeError, ValueError) as error:
-        context.try_shutdown()
-        return _reject(error)
-    finally:
-        forerunner.destroy_node()
     sys.setswitchinterval(SWITCH_S)
     gc.collect()
     gc.freeze()  # these objects stay alive: a full collection over them would delay a prediction by 80 ms
-    executor = SingleThreadedExecutor(context=context)
+    executor = create_executor(context)
     executor.add_node(node)
     while not stop.is_requested and context.ok():
         try:
-            node.polling.spin_once(executor, SPIN_S)
+            executor.spin_once(timeout_sec=SPIN_S)
+            node.rest()
         except ExternalShutdownException:
             break
         except Exception as error:
             node.report(error)
-    executor.shutdown()
+    executor.remove_node(node)
     node.destroy_node()
+    executor.shutdown()
     context.try_shutdown()
     if node.is_busy_after(END_S):
         os._exit(0)  # otherwise the interpreter waits for the computation
     return 0
 
 
-def _join_graph(context: Any) -> Any:
-    """Create a hidden node, with which DDS finds the other programs while the solver is loaded: this may take it 3 s.
+def create_executor(context: Any) -> Any:
+    """Return rclpy's executor that is called for each event, where rclpy has it (since 7.1.4), and its plain one elsewhere.
 
-    It has no services and no log, so that it needs no permissions besides those of the node.
+    The plain one looks at every topic, service and timer of the node for each message.
     """
-    import rclpy
+    try:
+        from rclpy.experimental.events_executor import EventsExecutor
+    except ImportError:
+        from rclpy.executors import SingleThreadedExecutor
 
-    return rclpy.create_node(
-        '_foc_start',
-        context=context,
-        use_global_arguments=False,
-        enable_rosout=False,
-        start_parameter_services=False,
-        parameter_overrides=[rclpy.Parameter('start_type_description_service', value=False)],
-    )
+        return SingleThreadedExecutor(context=context)
+    return EventsExecutor(context=context)
 
 
 def _reject(error: Exception) -> int:

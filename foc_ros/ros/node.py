@@ -4,7 +4,7 @@ The pipeline holds the model and the memory and is driven by message stamps, so 
 the same messages, apart from candidates that `budget_s` leaves to an estimate. The node adds the clocks: it makes no prediction
 from an input that has fallen silent, and publishes none that has become too old.
 
-A prediction is computed in another thread, guidance in a third one (`guidance_loop`), and all else in that of the executor. What
+A prediction is computed in another thread, guidance in a third one (`guidance`), and all else in that of the executor. What
 is received or asked for meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state
 of the managed node, nothing that was computed before is published.
 
@@ -29,7 +29,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import FocError, MessageError
+from foc_ros.core.errors import FocError
 from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.predict import warm_up
 from foc_ros.io.class_library import load_library
@@ -38,6 +38,7 @@ from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MAR
 from .endpoints import (
     INPUTS,
     GoalTopics,
+    TfListener,
     create_command_subscription,
     create_publishers,
     create_subscriptions,
@@ -46,21 +47,19 @@ from .endpoints import (
     find_missing_packages,
     take_queued,
 )
-from .guidance_topics import GuidanceTopics
+from .guidance import GuidanceTopics
 from .health import SOURCE_TOPICS, THROTTLE_S, Freshness, Monitor, encode_diagnostics
 from .intake import Intake
-from .lifecycle import answer_refused_transitions
 from .messages.encode_prediction import encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_autostart, declare_parameters
-from .queue_polling import QueuePolling
-from .serialized_poses import deserialize_pose, read_stamp
-from .tf_listener import TfListener
 from .transforms import Arrival, Transforms
 from .worker import Computation, Worker
 
 RETRY_S = 0.01
 """Time between two checks of messages that are held until their transform is known [s]."""
+REST_S, LONGEST_REST_S = 0.004, 0.02
+"""Shortest and longest time for which the poses of a fast hand gather before they are taken together [s]."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
 """Inputs of which each message replaces the one before: of several in the queue, the newest that is accepted is used."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -80,7 +79,7 @@ class FocNode(LifecycleNode):
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
         self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
-        self._has_predicted = False
+        self._has_predicted, self._is_hand_fast, self._hand_s = False, False, 0.0
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._goal_topics = GoalTopics(self)
@@ -90,14 +89,13 @@ class FocNode(LifecycleNode):
         except ImportError:  # tf2 is optional
             self._tf = None
         self._retries = self.create_timer(RETRY_S, self._take_held, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.polling = QueuePolling(self._take_queued_poses, self._find_unneeded_s)
         self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(SetBool, '~/engage', self._engage)
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_timer(1.0, self._publish_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        answer_refused_transitions(self)
+        self._answer_refused_transitions()
         if autostart and (self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS):
             raise FocError(self._start_error)
 
@@ -107,7 +105,7 @@ class FocNode(LifecycleNode):
         try:
             warm_up(self._live_parameters.config)
             self._outputs = create_publishers(self)
-            self._inputs = create_subscriptions(self, self._receive, self.polling)
+            self._inputs = create_subscriptions(self, self._receive)
             self._inputs[COMMAND] = create_command_subscription(self, self._blend_command)
             self._guidance.create()
         except Exception as error:
@@ -144,6 +142,16 @@ class FocNode(LifecycleNode):
         """Return to the unconfigured state."""
         return self.on_cleanup(state)
 
+    def rest(self) -> None:
+        """Wait after a pose of a fast hand, so that several are taken at once; the end of a prediction ends the wait.
+
+        To wake up for each pose at 1 kHz would cost more than to use it, and would delay the threads of guidance and prediction.
+        """
+        if self._is_hand_fast:
+            self._is_hand_fast = False
+            unneeded_s = 0.0 if self.pipeline.config.guidance.enabled else self.pipeline.until_due_s
+            self._worker.wait(min(max(unneeded_s, REST_S), LONGEST_REST_S))
+
     def report(self, error: Exception) -> None:
         """Count and log an internal error."""
         self._monitor.note_error(error)
@@ -164,6 +172,25 @@ class FocNode(LifecycleNode):
     def is_busy_after(self, seconds: float) -> bool:
         """Return whether a prediction is still being computed after so many seconds."""
         return self._worker.is_busy_after(seconds)
+
+    def _answer_refused_transitions(self) -> None:
+        """Make `~/change_state` answer `success: false` to a transition that does not start in the present state.
+
+        rclpy raises an exception in the service instead, and the caller waits without end.
+        """
+        service = self._service_change_state  # rclpy has no public way to it
+        change = service.callback
+
+        def change_or_refuse(request: Any, response: Any) -> Any:
+            try:
+                return change(request, response)
+            except Exception as error:
+                wanted = request.transition.label or request.transition.id
+                self.get_logger().warning(f'transition {wanted} is refused: {" ".join(str(error).split())}')
+                response.success = False
+                return response
+
+        service.callback = change_or_refuse
 
     def _create_pipeline(self) -> None:
         if hasattr(self, 'pipeline'):
@@ -191,56 +218,31 @@ class FocNode(LifecycleNode):
         self.pipeline.reconfigure(config)
         self._guidance.loop.reconfigure(config)
 
-    def _receive(self, role: str, message: Any) -> None:
-        """Take a message and those in the queue behind it, and predict once, from the newest hand pose.
+    def _receive(self, role: str, *messages: Any) -> None:
+        """Take messages and those in the queue behind them, and predict once, from the newest hand pose.
 
         Markers are taken one message at a time, because every message counts and takes time; the hand has its turn in between.
         """
-        messages = [message] if role == MARKERS else [message, *take_queued(self._inputs[role])]
-        if role == HAND:
-            self.polling.note_message()
-            self._take_poses(messages)
-            return
-        for each in messages:
-            self._transforms.add(role, each, monotonic())
+        if role not in self._inputs:
+            return  # the executor still held messages when the node was cleaned up
+        waiting = [] if role == MARKERS else take_queued(self._inputs[role])
+        now_s = monotonic()
+        for each in (*messages, *waiting):
+            self._transforms.add(role, each, now_s)
+        if role == HAND and messages:
+            self._is_hand_fast = bool(waiting) or now_s - self._hand_s < REST_S / 2.0
+            self._hand_s = now_s
         self._take_released(role)
-
-    def _take_queued_poses(self) -> int:
-        """Take the hand poses that wait, and return their number."""
-        poses = take_queued(self._inputs[HAND]) if HAND in self._inputs else []
-        self._take_poses(poses)
-        return len(poses)
-
-    def _find_unneeded_s(self) -> float:
-        """Return for how long no hand pose is needed [s]: until a prediction is due, unless guidance follows the hand."""
-        return 0.0 if self.pipeline.config.guidance.enabled else self.pipeline.until_due_s
-
-    def _take_poses(self, poses: list[bytes]) -> None:
-        """Take serialized hand poses. One that is skipped is not deserialized, unless it has to wait for those before it."""
-        is_taken, now_s = False, monotonic()
-        for each in poses:
-            if not self._transforms.holds(HAND) and self.intake.is_skipped(read_stamp(each)):
-                self._note(HAND, self.intake.count_skipped(), now_s)
-                continue
-            try:
-                self._transforms.add(HAND, deserialize_pose(each), now_s)
-            except MessageError as error:
-                self.intake.refuse(HAND, error)
-                self._note(HAND, None, now_s)
-            is_taken = self._take_released(HAND) or is_taken
-        if is_taken and self.pipeline.is_due:
-            self._predict()
 
     def _take_held(self) -> None:
         """Take the held messages whose transform has arrived, or will not arrive any more."""
         for role in self._transforms.roles:
-            if self._take_released(role) and role == HAND and self.pipeline.is_due:
-                self._predict()
+            self._take_released(role)
         if not self._transforms.roles:
             self._retries.cancel()
 
-    def _take_released(self, role: str) -> bool:
-        """Take the messages of an input that are not held; return whether one was used."""
+    def _take_released(self, role: str) -> None:
+        """Take the messages of an input that are not held, and predict if a hand pose was used and a prediction is due."""
         arrivals = self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, monotonic())
         is_taken = False
         for each in reversed(list(arrivals)) if role in COMPLETE else arrivals:
@@ -249,7 +251,8 @@ class FocNode(LifecycleNode):
                 break
         if self._retries.is_canceled() and self._transforms.roles:
             self._retries.reset()
-        return is_taken
+        if is_taken and role == HAND and self.pipeline.is_due:
+            self._predict()
 
     def _take(self, role: str, arrival: Arrival) -> bool:
         status = self.intake.take_arrival(role, arrival)
@@ -304,8 +307,7 @@ class FocNode(LifecycleNode):
             self._publish_prediction(ended)
         except Exception as error:
             self._recover(error)
-        if self.polling.is_polling:
-            self.polling.take()  # the newest pose is predicted from
+        self._receive(HAND)  # the next prediction is made from the newest pose, though the executor had no time for it yet
         if self.pipeline.is_due:
             self._predict()
 
@@ -343,7 +345,7 @@ class FocNode(LifecycleNode):
         self._guidance.loop.note_hand(None, monotonic())
 
     def _publish_health(self) -> None:
-        self.polling.take()  # a hand whose poses wait here is not silent
+        self._receive(HAND)  # a hand whose poses wait here is not silent
         self._report_missing_packages()
         self._goal_topics.remove_absent()
         clock_reason, present = self._find_clock_reason(), self._worker.present

@@ -1,12 +1,8 @@
-"""The parameters of `foc_ros.core.config` as a ROS 2 parameter file, which the node and the commands read alike.
-
-`python -m foc_ros.ros.parameters > config/foc.yaml` writes the file with every default.
-"""
+"""The parameters of `foc_ros.core.config` as a ROS 2 parameter file, which the node and the commands read alike."""
 
 from __future__ import annotations
 
 import re
-import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -17,7 +13,7 @@ import yaml
 
 from foc_ros.core.config import Config, Parameter, flatten, list_parameters, replace_values
 from foc_ros.core.errors import InputError, ParameterError, warn
-from foc_ros.io.documents import parse_yaml, read_document
+from foc_ros.io.documents import read_document
 
 NODE = '/foc'
 """Name of the node, with its namespace, unless it is started with another one."""
@@ -41,29 +37,17 @@ def load_parameter_file(path: Path | str) -> Config:
     return replace_values(Config(), _read_values(path, NODE, is_needed=True))
 
 
-def check_parameters(arguments: Sequence[str]) -> None:
-    """Raise FocError for wrong parameters in the ROS arguments of a node, before the node is imported, which takes seconds.
+def check_parameter_files(arguments: Sequence[str]) -> None:
+    """Raise FocError for a parameter file in the ROS arguments of a node that the commands would refuse, too.
 
-    A parameter file is refused where the commands refuse it, also for a key that is given twice, of which ROS takes the last.
-    This leaves to the node what it cannot read as simply as ROS would: parameters of one node among several, and texts that
-    PyYAML takes for dates or numbers. The node checks all that it is given.
+    ROS reads some of them in another way: of a key that is given twice it takes the last, and it skips a section that is not for
+    the node without a word. The node itself checks the values that result from files and arguments.
     """
-    values: dict[str, object] = {}
     names = {'node': 'foc', 'ns': ''} | {key.replace('name', 'node'): value for key, value in _REMAP.findall(' '.join(arguments))}
     node = f'/{names["ns"].strip("/")}/{names["node"]}'.replace('//', '/')
-    for option, given in pairwise(arguments):
+    for option, path in pairwise(arguments):
         if option == '--params-file':
-            values.update(_read_values(given, node, is_needed=False))
-        elif option in ('-p', '--param'):
-            name, _, text = given.partition(':=')
-            try:
-                value = parse_yaml(text)
-            except (ValueError, yaml.YAMLError):
-                return
-            if ':' in name or (name in KNOWN and isinstance(KNOWN[name].default, str) and not isinstance(value, str)):
-                return
-            values.update(_flatten_group({name: value}))
-    replace_values(Config(), values)
+            _read_values(path, node, is_needed=False)
 
 
 def _read_values(path: Path | str, node: str, *, is_needed: bool) -> dict[str, object]:
@@ -162,7 +146,3 @@ def _describe(parameter: Parameter) -> str:
     if bound.read_only:
         parts.append('fixed once the node runs')
     return '; '.join(parts)
-
-
-if __name__ == '__main__':
-    sys.stdout.write(dump_parameter_file(Config()))

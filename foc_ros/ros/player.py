@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from importlib import import_module
 from types import TracebackType
-from typing import Any
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -19,6 +17,7 @@ from foc_ros.io import topics
 from foc_ros.io.bags import Item
 
 from .isolated_node import NodeDiedError
+from .messages.types import find_message_class
 
 CONNECT_S = 30.0
 """Timeout of the connection to the node, which starts in about one second."""
@@ -57,7 +56,9 @@ class Player:
         # The node may ask for transient local inputs; only the stream of hand poses does without.
         latched = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._publishers = {
-            role: self._node.create_publisher(_load_message(topics.TYPES[role]), role, DEPTH if role == topics.HAND else latched)
+            role: self._node.create_publisher(
+                find_message_class(topics.TYPES[role]), role, DEPTH if role == topics.HAND else latched
+            )
             for role in sorted({item.role for item in self._items})
         }
         for topic, kind in self._outputs.items():
@@ -66,7 +67,7 @@ class Player:
                 self._last_received = time.monotonic()
                 self._receive(topic, raw)
 
-            self._node.create_subscription(_load_message(kind), topic, receive, DEPTH, raw=True)
+            self._node.create_subscription(find_message_class(kind), topic, receive, DEPTH, raw=True)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -121,8 +122,3 @@ class Player:
     def _find_unconnected(self) -> list[str]:
         inputs = [f'/{role}' for role, publisher in self._publishers.items() if not publisher.get_subscription_count()]
         return inputs + [topic for topic in self._outputs if not self._node.count_publishers(topic)]
-
-
-def _load_message(kind: str) -> Any:
-    package, _, name = kind.split('/')
-    return getattr(import_module(f'{package}.msg'), name)

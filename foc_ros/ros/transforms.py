@@ -8,20 +8,28 @@ their order. Node and replay share this: times are those of the steady clock in 
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator
-from functools import partial
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-from foc_ros.core.config import Config
-from foc_ros.core.types import NANOSECONDS
-from foc_ros.io.topics import HAND
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
 
-from .messages.decode_poses import check_hand_pose, decode_frame, decode_stamp
-from .messages.transform_messages import Transform, transform_message
+from foc_ros.core.config import Config
+from foc_ros.core.errors import MessageError
+from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.io.topics import HAND, MARKERS
+
+from .messages.decode_objects import ADD
+from .messages.decode_poses import Place, check_hand_pose, decode_frame, decode_stamp, stay
+from .messages.plane import Transform
 
 MOST_HELD = 1000
 """Largest number of messages of one input that are held: 1 s of a hand at 1 kHz."""
+KEPT_NS = 10 * NANOSECONDS
+"""Time for which transforms are kept, that of tf2 [ns]; one that is older than that means that the recording starts again."""
 
 
 class TransformUnavailableError(Exception):
@@ -41,12 +49,13 @@ class TransformSource(Protocol):
 class Arrival(NamedTuple):
     """A message that can be taken.
 
-    message: in the working frame, or unchanged; received_s: when it arrived [s]; error: why it could not be transformed, empty if
-    it could or did not have to be; is_inexact: whether the newest transform was taken instead of that for its stamp.
+    received_s: when it arrived [s]; place: gives the frame and the transform of its headers; error: why it is not in the working
+    frame, empty if it is; is_inexact: whether the newest transform was taken instead of that for its stamp.
     """
 
     message: Any
     received_s: float
+    place: Place = stay
     error: str = ''
     is_inexact: bool = False
 
@@ -85,45 +94,158 @@ class Transforms:
             message, received_s = queue[0]
             is_overdue = now_s - received_s >= config.frames.tolerance_s or len(queue) > MOST_HELD
             try:
-                transformed, is_inexact = self._transform(role, message, frame_id, config, is_overdue)
-                arrival = Arrival(transformed, received_s, is_inexact=is_inexact)
+                place, is_inexact = self._find_place(role, message, frame_id, config, is_overdue)
+                arrival = Arrival(message, received_s, place, is_inexact=is_inexact)
             except TransformUnavailableError as error:
                 if not is_overdue:
                     break
-                arrival = Arrival(message, received_s, f'no transform to {frame_id}: {error}')
-            except Exception as error:  # the message is not checked yet
-                arrival = Arrival(message, received_s, f'cannot be transformed to {frame_id}: {" ".join(str(error).split())}')
+                arrival = Arrival(message, received_s, error=f'no transform to {frame_id}: {error}')
+            except Exception:  # the message is not checked yet, and will be refused
+                arrival = Arrival(message, received_s)
             queue.popleft()
             yield arrival
 
-    def _transform(self, role: str, message: Any, frame_id: str | None, config: Config, is_overdue: bool) -> tuple[Any, bool]:
-        """Return a message in the working frame, and whether the newest transform was taken for it."""
+    def _find_place(self, role: str, message: Any, frame_id: str | None, config: Config, is_overdue: bool) -> tuple[Place, bool]:
+        """Return the transforms for the headers of a message, and whether the newest one was taken for one of them."""
         is_unneeded = role == HAND and self._is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
-            return message, False
+            return stay, False
         if role == HAND:
-            check_hand_pose(message.pose)  # a transform would move the position 0
-        try:
-            return transform_message(role, message, frame_id, config.plane, partial(self._find, frame_id)), False
-        except TransformUnavailableError:
-            if not is_overdue:
-                raise
-        find = partial(self._find_newest, frame_id, config.frames.tolerance_s)
-        return transform_message(role, message, frame_id, config.plane, find), True
+            check_hand_pose(message.pose)  # one without data does not wait for a transform
+        # markers that delete others have no position and often no frame
+        headers = [each.header for each in message.markers if each.action == ADD] if role == MARKERS else [message.header]
+        found: dict[tuple[str, int], Transform] = {}
+        is_inexact = False
+        for given in map(_identify, headers):
+            if given[0] == frame_id or given in found:
+                continue
+            try:
+                found[given] = self._source.look_up(frame_id, *given)
+            except TransformUnavailableError as reason:
+                if not is_overdue:
+                    raise
+                found[given], is_inexact = self._find_newest(frame_id, *given, config.frames.tolerance_s, reason), True
 
-    def _find(self, frame_id: str, header: Any) -> Transform:
+        def place(header: Any) -> tuple[str, Transform]:
+            transform = found.get(_identify(header))
+            return stay(header) if transform is None else (frame_id, transform)
+
+        return place, is_inexact
+
+    def _find_newest(self, target: str, source: str, stamp_ns: int, tolerance_s: float, reason: Exception) -> Transform:
+        """Return the newest transform instead of that for a stamp [ns], if its stamp differs by the tolerance [s] at most."""
         assert self._source is not None
-        return self._source.look_up(frame_id, decode_frame(header), decode_stamp(header))
+        newest = self._source.look_up(target, source, 0)
+        late_s = (stamp_ns - newest.stamp_ns) / NANOSECONDS
+        if abs(late_s) > tolerance_s:
+            text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
+            raise TransformUnavailableError(f'{text} (frames.tolerance_s is {tolerance_s:g})') from None
+        return newest
 
-    def _find_newest(self, frame_id: str, tolerance_s: float, header: Any) -> Transform:
-        """Return the transform for a header or else the newest one, if its stamp differs by the tolerance [s] at most."""
-        try:
-            return self._find(frame_id, header)
-        except TransformUnavailableError as reason:
-            assert self._source is not None
-            newest = self._source.look_up(frame_id, decode_frame(header), 0)
-            late_s = (decode_stamp(header) - newest.stamp_ns) / NANOSECONDS
-            if abs(late_s) > tolerance_s:
-                text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
-                raise TransformUnavailableError(f'{text} (frames.tolerance_s is {tolerance_s:g})') from None
-            return newest
+
+def _identify(header: Any) -> tuple[str, int]:
+    """Return frame and stamp [ns] of a header."""
+    return decode_frame(header), decode_stamp(header)
+
+
+@dataclass
+class _Frame:
+    """A frame with its parent and its poses in it, rotation and position (3,) [m], by stamp [ns]; a static one has one pose."""
+
+    parent: str
+    is_static: bool
+    stamps: list[int] = field(default_factory=list)
+    poses: list[tuple[Rotation, Array]] = field(default_factory=list)
+
+    def add(self, stamp_ns: int, rotation: Rotation, position: Array) -> None:
+        """Keep a pose, and forget those that are too old."""
+        if self.is_static or (self.stamps and stamp_ns < self.stamps[-1] - KEPT_NS):
+            self.stamps, self.poses = [], []
+        place = bisect_right(self.stamps, stamp_ns)
+        self.stamps.insert(place, stamp_ns)
+        self.poses.insert(place, (rotation, position))
+        old = bisect_right(self.stamps, self.stamps[-1] - KEPT_NS)
+        del self.stamps[:old], self.poses[:old]
+
+    def find(self, name: str, stamp_ns: int) -> tuple[Rotation, Array]:
+        """Return the pose at a stamp; raise TransformUnavailableError outside the known stamps."""
+        after = bisect_right(self.stamps, stamp_ns)
+        if self.is_static or (after and self.stamps[after - 1] == stamp_ns):
+            return self.poses[after - 1]
+        if not 0 < after < len(self.stamps):
+            nearest_ns = self.stamps[min(after, len(self.stamps) - 1)]
+            relation = 'after the newest' if after else 'before the oldest'
+            distance = f'{abs(stamp_ns - nearest_ns) / NANOSECONDS:.3g} s'
+            raise TransformUnavailableError(f'the stamp is {distance} {relation} transform from {name} to {self.parent}')
+        (earlier, start), (later, end) = self.poses[after - 1 : after + 1]
+        share = (stamp_ns - self.stamps[after - 1]) / (self.stamps[after] - self.stamps[after - 1])
+        turn = Slerp([0.0, 1.0], Rotation.concatenate([earlier, later]))
+        return turn(share), (1.0 - share) * start + share * end
+
+
+class TransformTree:
+    """The frames of a recording, looked up as tf2 does, without ROS; a `TransformSource`.
+
+    A frame has one parent. Between the stamps of two messages the translation is interpolated linearly, the rotation along the
+    shortest arc.
+    """
+
+    def __init__(self) -> None:
+        self._frames: dict[str, _Frame] = {}
+
+    def add(self, message: Any, *, is_static: bool) -> int:
+        """Add the transforms of a tf2_msgs/TFMessage, and return how many are left out.
+
+        These have a wrong stamp, a number that is not finite, no rotation, or one frame as both parent and child.
+        """
+        left_out = 0
+        for each in message.transforms:
+            position = np.array([getattr(each.transform.translation, axis) for axis in 'xyz'], dtype=float)
+            quaternion = np.array([getattr(each.transform.rotation, axis) for axis in 'xyzw'], dtype=float)
+            child, parent = str(each.child_frame_id).lstrip('/'), decode_frame(each.header)
+            try:
+                stamp_ns = decode_stamp(each.header)
+            except MessageError:
+                stamp_ns = -1
+            if stamp_ns < 0 or not (np.isfinite([*position, *quaternion]).all() and quaternion.any()) or child == parent:
+                left_out += 1
+                continue
+            frame = self._frames.get(child)
+            if frame is None or (frame.parent, frame.is_static) != (parent, is_static):
+                frame = self._frames[child] = _Frame(parent, is_static)
+            frame.add(stamp_ns, Rotation.from_quat(quaternion), position)
+        return left_out
+
+    def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
+        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.
+
+        Raises TransformUnavailableError.
+        """
+        up, down = self._list_ancestors(source), self._list_ancestors(target)
+        common = next((name for name in up if name in down), None)
+        if common is None:
+            known = ', '.join(sorted({*self._frames, *(each.parent for each in self._frames.values())})) or 'none'
+            raise TransformUnavailableError(f'{source} and {target} are not connected; known frames: {known}')
+        chain, back = up[: up.index(common)], down[: down.index(common)]
+        if not stamp_ns:
+            frames = [self._frames[name] for name in (*chain, *back)]
+            stamp_ns = min((frame.stamps[-1] for frame in frames if not frame.is_static), default=0)
+        rotation, position = self._compose(chain, stamp_ns)
+        inverse, offset = self._compose(back, stamp_ns)
+        inverse = inverse.inv()
+        return Transform((inverse * rotation).as_matrix(), inverse.apply(position - offset), stamp_ns)
+
+    def _list_ancestors(self, name: str) -> list[str]:
+        """Return a frame and the frames above it, its parent first."""
+        names = [name]
+        while (frame := self._frames.get(names[-1])) is not None and frame.parent not in names:
+            names.append(frame.parent)
+        return names
+
+    def _compose(self, chain: list[str], stamp_ns: int) -> tuple[Rotation, Array]:
+        """Return the pose of the first frame of a chain in the parent of the last one."""
+        rotation, position = Rotation.identity(), np.zeros(3)
+        for name in chain:
+            turn, shift = self._frames[name].find(name, stamp_ns)
+            rotation, position = turn * rotation, turn.apply(position) + shift
+        return rotation, position

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from time import sleep
 
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from foc_ros.core.pipeline import PredictionTask
@@ -49,13 +47,13 @@ class Worker:
 
     def __init__(self, node: Node, notify: Callable[[], None]) -> None:
         self.present: Computation | None = None
-        self._ended: Any = node.create_guard_condition(notify)
+        self._node, self._notify, self._is_stopped = node, notify, False
         self._threads = ThreadPoolExecutor(1, 'prediction')
 
     def start(self, task: PredictionTask, received_s: float, start_s: float) -> None:
         """Begin to compute a task. The result of the task before must have been taken."""
         self.present = Computation(task, received_s, start_s, self._threads.submit(task.run))
-        self.present.result.add_done_callback(self._notify)
+        self.present.result.add_done_callback(self._announce)
 
     def take(self) -> Computation | None:
         """Return the present computation and forget it, if it has ended; otherwise return None."""
@@ -64,16 +62,26 @@ class Worker:
         ended, self.present = self.present, None
         return ended
 
+    def wait(self, seconds: float) -> None:
+        """Wait for the end of the present computation, at most for some seconds; for so many if there is none."""
+        if self.present is None:
+            sleep(seconds)
+        else:
+            wait([self.present.result], seconds)
+
     def is_busy_after(self, seconds: float) -> bool:
         """Wait for the present computation for at most so many seconds; return whether it has not ended then."""
         return self.present is not None and bool(wait([self.present.result], seconds).not_done)
 
     def stop(self) -> None:
-        """Accept no more tasks, and let the present one end when it next checks its deadline."""
+        """Accept no more tasks, and let the present one end when it next checks its deadline; its end is not announced."""
+        self._is_stopped = True
         if self.present is not None:
             self.present.task.deadline.cancel()
         self._threads.shutdown(wait=False, cancel_futures=True)
 
-    def _notify(self, _: object) -> None:
-        with suppress(InvalidHandle):  # the node was destroyed meanwhile
-            self._ended.trigger()
+    def _announce(self, _: object) -> None:
+        """Let the executor call `notify`; this happens in the thread of the computation."""
+        executor = self._node.executor
+        if executor is not None and not self._is_stopped:
+            executor.create_task(self._notify)

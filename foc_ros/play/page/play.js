@@ -25,9 +25,9 @@ const hand = new Hand(canvas, toScene, (time) => moveHand(time, EVENT_MS));
 let isSceneChanged = false;
 const arranging = new Arranging(canvas, toScene, () => { isSceneChanged = true; });
 const view = { unknown: 0, other: 0, scene: arranging.scene, selected: null, goal: null, phase: 'none', candidates: [], hand, hidden: false, touchedMs: -Infinity };
-// What the page measures: frames per second, the median time from an input to the drawn prediction that was made from it [ms], and
-// how many predictions were drawn.
-const measured = { fps: 0, delayMs: null, predictions: 0, delays: [] };
+// What the page measures: frames per second, the time from an input to the drawn prediction that was made from it [ms], which is the
+// median and of nine in ten, and how many predictions were drawn.
+const measured = { fps: 0, delayMs: null, mostMs: null, predictions: 0, delays: [] };
 // For scripts: what is drawn, what is measured, and a new scene in place of the present one.
 globalThis.play = {
   view,
@@ -47,6 +47,8 @@ let waitingEvents = [];
 const frames = [];
 let predictedMs = 0;
 const OLD_MS = 1000; // after which a prediction is not shown any more
+const LATE_MS = 150; // median time from an input to the drawn prediction above which the status line is not green
+let measuredMs = 0; // when this time was measured last
 const REFUSED_MS = 6000; // for which the status line says that something was refused
 let task = { phase: 'none' };
 let job = null;
@@ -141,7 +143,9 @@ const handlers = {
     byId('download').hidden = !message.report;
   },
   status({ level, text }) {
-    showStatus(level, text);
+    const isLate = level === 'well' && measured.delayMs > LATE_MS && performance.now() - measuredMs < OLD_MS;
+    if (isLate) showStatus('waiting', `predictions come ${Math.round(measured.delayMs)} ms late: this computer is busy; end other programs`);
+    else showStatus(level, text);
   },
   prediction({ event, candidates, unknown, other }) {
     [view.unknown, view.other] = [unknown, other];
@@ -231,7 +235,11 @@ function setArranging(on) {
 let shownWays = '';
 // Writes the table of candidates, with bars in the colours of their paths, if it has changed.
 function showWays() {
-  const rows = view.hidden ? [] : view.candidates.filter(({ likelihood }) => likelihood !== null);
+  const known = view.hidden ? [] : view.candidates.filter(({ likelihood }) => likelihood !== null);
+  const rows = known.filter((each) => each.likelihood >= NOTED);
+  const others = known.filter((each) => each.likelihood < NOTED);
+  const rest = others.reduce((sum, each) => sum + each.likelihood, 0);
+  if (others.length) rows.push({ slot: null, likelihood: rest, words: `${others.length} more, each below 1 %`, ghost: '' });
   for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
   const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost }) => [slot, Math.round(100 * likelihood), words, ghost]));
   if (key === shownWays) return;
@@ -250,13 +258,14 @@ function showWays() {
 function measure(time) {
   const now = performance.now();
   measured.delays.push(...waitingEvents.map((event) => now - event));
+  if (waitingEvents.length) measuredMs = now;
   measured.delays.splice(0, Math.max(measured.delays.length - DELAYS, 0));
   waitingEvents = [];
   frames.push(time);
   while (frames[0] < time - COUNTED_MS) frames.shift();
   if (frames.length > 1) measured.fps = (1000 * (frames.length - 1)) / (time - frames[0]);
   const sorted = [...measured.delays].sort((a, b) => a - b);
-  measured.delayMs = sorted.length ? sorted[Math.floor(sorted.length / 2)] : null;
+  [measured.delayMs, measured.mostMs] = [0.5, 0.9].map((share) => (sorted.length ? sorted[Math.floor(share * sorted.length)] : null));
 }
 
 // Moves the hand until a time [ms], and sends its position, if the last one was sent some time before [ms]; for every event, and for
@@ -286,7 +295,8 @@ function frame(time) {
     shownMs = time;
     showWays();
     showJob();
-    const delay = measured.delayMs === null ? '' : `, ${Math.round(measured.delayMs)} ms from your hand to the drawn prediction`;
+    const [delayMs, mostMs] = [measured.delayMs, measured.mostMs].map(Math.round);
+    const delay = measured.delayMs === null ? '' : `, ${delayMs} ms from your hand to the drawn prediction (median; nine in ten within ${mostMs} ms)`;
     byId('numbers').textContent = `${Math.round(measured.fps)} frames a second${delay}`;
   }
 }

@@ -6,11 +6,16 @@ Text is escaped by the templates. HTML that a function below returns may be join
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+import os
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
+from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.io.outputs import MARK, check_replaceable
 
@@ -53,19 +58,29 @@ def write_page(directory: Path, name: str, page: str) -> None:
         raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
 
 
-def render_page(title: str, body: str, warnings: Sequence[str] = ()) -> str:
-    """Return a page with a title, warnings on top, and a body of HTML."""
-    return render('frame.html', title=title, body=body, warnings=warnings)
+def render_page(title: str, body: str, warnings: Sequence[str] = (), config: Config | None = None) -> str:
+    """Return a page with a title, warnings on top, a body of HTML, and what made it: program, date, machine, parameters."""
+    system = f'{platform.system()} on {platform.machine()} with {os.cpu_count()} processors, Python {platform.python_version()}'
+    made = f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; {system}.'
+    changed = None if config is None else list_changed(config)
+    return render('frame.html', title=title, body=body, warnings=warnings, made=made, changed=changed)
 
 
-def render_table(columns: Sequence[str], rows: Iterable[Sequence[str]], heading: str = '') -> str:
-    """Return a table as HTML, below a heading if one is given; the first cell of a row is its heading; columns may be empty."""
-    return str(_PARTS.table(columns, rows, heading))
+def list_changed(config: Config) -> dict[str, str]:
+    """Return the parameters that do not have their defaults; of a file only its name."""
+    standard = flatten(Config())
+    changed = {name: value for name, value in flatten(config).items() if value != standard[name]}
+    return {name: Path(value).name if isinstance(value, str) else f'{value}' for name, value in changed.items()}
 
 
-def render_list(sentences: Iterable[str]) -> str:
-    """Return sentences as HTML, one below the other."""
-    return str(_PARTS.list(sentences))
+def render_table(columns: Sequence[str], rows: Iterable[Sequence[str]], heading: str = '', notes: Iterable[str] = ()) -> str:
+    """Return a table as HTML, below a heading and notes that explain it; the first cell of a row is its heading."""
+    return str(_PARTS.table(columns, rows, heading, notes))
+
+
+def render_list(sentences: Iterable[str], heading: str = '') -> str:
+    """Return sentences as HTML, one below the other, below a heading if one is given."""
+    return str(_PARTS.list(sentences, heading))
 
 
 def render_figure(figure: Any, caption: str) -> str:
@@ -78,3 +93,20 @@ def render_figure(figure: Any, caption: str) -> str:
 def render_pictures(figures: Iterable[str]) -> str:
     """Return figures as HTML, as many side by side as the screen has room for."""
     return str(_PARTS.pictures(figures))
+
+
+def render_tables(tables: Iterable[tuple[str, Sequence[str], Sequence[Sequence[str]]]], explanations: Mapping[str, str]) -> str:
+    """Return tables (heading, columns, rows) as HTML, each with the explanations of the words that stand in it first."""
+    left, html = dict(explanations), ''
+    for heading, columns, rows in tables:
+        words = ' '.join((heading, *columns, *(cell for row in rows for cell in row)))
+        notes = [f'{name}: {left.pop(name)}' for name in explanations if name in left and name in words]
+        html += render_table(columns, rows, heading, notes)
+    return html
+
+
+def place_legend(figure: Any, columns: int = 3) -> None:
+    """Write the legend of the axes of a figure below them, where it covers nothing."""
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))  # each label once
+    figure.legend(named.values(), named.keys(), loc='outside lower center', ncols=columns, frameon=False, fontsize='small')

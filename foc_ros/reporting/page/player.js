@@ -15,6 +15,9 @@ const shareOf = (track, row) => { const value = data.tracks[track].share[row - d
 const MOST_MARKS = 3000;
 // Size of an ellipse, in parts of the median, up to which the filter counts as settled.
 const MOST_USUAL = 1.5;
+// Likelihood from which a path counts as likely, and the part of a movement in which the page opens it.
+const LIKELY = 0.05;
+const ON_THE_WAY = [0.15, 0.6];
 const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
 
 // The row of the first value that is not below a bound.
@@ -158,20 +161,36 @@ function show(number) {
   for (const name of ['likelihoods', 'times']) { charts[name].move(time); }
 }
 
-// Returns the first frame of a span whose largest ellipse is of the usual size: before it, the filter of the hand has not settled.
-function settledFrame(from, to) {
+// Returns how many likely paths a frame has: exp of the entropy of their likelihoods; unlikely ones and ghosts do not count.
+function countLikely(frame) {
+  const shares = frame.candidates.filter((each) => !data.labels[each.ghost]).map(({ track }) => shareOf(track, frame.at)).filter((share) => share >= LIKELY);
+  const sum = shares.reduce((before, share) => before + share, 0);
+  return Math.exp(shares.reduce((before, share) => before - (share / sum) * Math.log(share / sum), 0)) * (shares.length > 0);
+}
+
+// Returns the frame of a span that is the most worth seeing: on the way, where the filter of the hand has settled, so that the largest
+// ellipse has the usual size, and with several likely paths.
+function openingFrame(from, to) {
   const sizes = data.frames.slice(from, to + 1).map((frame) => Math.max(0, ...frame.candidates.flatMap((each) => (each.total.length ? each.total : each.motor).map((ellipse) => ellipse[2]))));
   const usual = [...sizes].sort((a, b) => a - b)[Math.floor(sizes.length / 2)];
-  return from + Math.max(0, sizes.findIndex((size) => size > 0 && size <= MOST_USUAL * usual));
+  const settled = sizes.map((size, row) => [size, from + row]).filter(([size]) => size > 0 && size <= MOST_USUAL * usual).map(([, row]) => row);
+  const [begin, end] = ON_THE_WAY.map((share) => frameTimes[from] + share * (frameTimes[to] - frameTimes[from]));
+  const onTheWay = settled.filter((row) => frameTimes[row] >= begin && frameTimes[row] <= end);
+  return (onTheWay.length ? onTheWay : settled.length ? settled : [from]).reduce((best, row) => (countLikely(data.frames[row]) > countLikely(data.frames[best]) ? row : best));
+}
+
+// Returns the rows of the first and the last frame of a movement, of the whole recording for -1.
+function framesOf(movement) {
+  const [from, to] = movement < 0 ? [-Infinity, Infinity] : data.movements[movement];
+  const inside = frameTimes.flatMap((time, row) => (time >= from && time <= to ? [row] : []));
+  return inside.length ? [inside[0], inside[inside.length - 1]] : [0, frameTimes.length - 1];
 }
 
 function choose(movement) {
-  const [from, to] = movement < 0 ? [-Infinity, Infinity] : data.movements[movement];
-  const inside = frameTimes.flatMap((time, row) => (time >= from && time <= to ? [row] : []));
-  [state.from, state.to] = inside.length ? [inside[0], inside[inside.length - 1]] : [0, frameTimes.length - 1];
+  [state.from, state.to] = framesOf(movement);
   state.focus = null;
   [byId('time').min, byId('time').max] = [state.from, state.to];
-  state.frame = settledFrame(state.from, state.to);
+  state.frame = openingFrame(state.from, state.to);
   drawAll();
 }
 
@@ -232,7 +251,9 @@ scene.canvas.addEventListener('wheel', (event) => {
 scene.canvas.addEventListener('dblclick', () => { zoom(); drawScene(data.frames[state.frame]); });
 writeLegend(byId('signs'), ['hand', 'past', 'later', 'path', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal']);
 zoom();
-choose(data.movements.length > 1 ? 0 : -1);
+const opened = data.movements.map((_, row) => countLikely(data.frames[openingFrame(...framesOf(row))]));
+choice.value = data.movements.length > 1 ? opened.indexOf(Math.max(...opened)) : -1;
+choose(Number(choice.value));
 // A warning leads to its first moment.
 for (const button of document.querySelectorAll('.moment')) {
   button.addEventListener('click', () => {

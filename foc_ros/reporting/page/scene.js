@@ -1,12 +1,14 @@
 // The drawing of a scene on a canvas, for reports and for `play`. One line style means one thing: a solid line is a path, dotted one
-// that avoids the obstacles less surely than wanted, dashed a total uncertainty; a pale wide line is a ghost, which is no proper prediction.
+// that is not known to avoid the obstacles as surely as wanted, dashed a total uncertainty; a pale wide line is a ghost, which is no proper prediction.
 'use strict';
 const FULL = 2 * Math.PI;
 const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9'];
 const LIT = '#E69F00';
 const letterOf = (slot) => (slot === null || slot === undefined ? '' : String.fromCharCode(65 + slot));
 const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot % COLOURS.length]);
-const percent = (share) => (share === null ? '' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
+const percent = (share) => (share === null ? '' : share < 0.0005 ? '< 0.1 %' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
+// Likelihood below which a path has no letter: letters of paths that hardly anybody takes would cover the others.
+const NOTED = 0.01;
 // Lengths come as whole tenths of a millimetre, and a list of them as the first value and then the differences.
 const LENGTH = 1e-4;
 const sums = (steps, unit) => { let sum = 0; return steps.map((step) => unit * (sum += step)); };
@@ -149,7 +151,7 @@ class Scene {
     }
     this.trace(path);
     this.stroke(colour, width, compromised ? [1.2 * width, 1.5 * width] : [], alpha);
-    if (slot === null || slot === undefined) return;
+    if (slot === null || slot === undefined || likelihood < NOTED) return;
     this.disc(middle, 9 * this.unit, ink('--page'), { filled: 1, width: 0 });
     this.disc(middle, 9 * this.unit, colour);
     this.text(letterOf(slot), middle, ink('--ink'));
@@ -206,10 +208,10 @@ const SIGNS = {
   past: ['<path d="M2 7H26" stroke="var(--ink)" stroke-width="3"/>', 'hand before'],
   later: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="1.5"/>', 'hand later, which was not known to the prediction'],
   path: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="4"/>', 'predicted path, the thicker the more likely'],
-  compromised: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="3" stroke-dasharray="3 4"/>', 'dotted: avoids the obstacles less surely than wanted'],
+  compromised: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="3" stroke-dasharray="3 4"/>', 'dotted: not known to avoid the obstacles as surely as wanted'],
   ghost: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="7" opacity=".3"/>', 'pale: no proper prediction, for the reason beside it'],
-  motor: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="#0072B2" fill-opacity=".3" stroke="#0072B2"/>', 'motor noise, which η is about: one standard deviation'],
-  total: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="none" stroke="#0072B2" stroke-dasharray="4 3"/>', 'total uncertainty of the most likely path, likewise'],
+  motor: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="#0072B2" fill-opacity=".3" stroke="#0072B2"/>', 'motor noise, which η is about: one standard deviation; of paths with at least 5 %'],
+  total: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="none" stroke="#0072B2" stroke-dasharray="4 3"/>', 'all uncertainty of the most likely path, likewise'],
   obstacle: ['<circle cx="14" cy="7" r="6.5" fill="var(--ring)"/><circle cx="14" cy="7" r="5" fill="var(--disc)" stroke="var(--soft)"/>', 'obstacle; ring: standard deviation of its radius'],
   goal: ['<circle cx="14" cy="7" r="6" fill="none" stroke="var(--ink)"/>', 'goal'],
 };

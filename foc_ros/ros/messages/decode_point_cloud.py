@@ -13,8 +13,8 @@ from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.shapes import tabulate_boxes
 from foc_ros.core.types import Array, Obstacles, make_obstacles
 
-from .decode_poses import MAX_COORDINATE, decode_frame, decode_stamp
-from .plane import make_heights, project
+from .decode_poses import MAX_COORDINATE, Place, decode_stamp, stay
+from .plane import NO_TRANSFORM, Transform, lift, make_heights, project
 
 REQUIRED = ('x', 'y', 'z', 'radius')
 COLUMNS = (*REQUIRED, 'radius_stddev', 'vx', 'vy', 'vz', 'size_x', 'size_y', 'yaw', 'size_z')
@@ -23,6 +23,9 @@ BOX = COLUMNS[8:11]
 IDENTITY = 'id'
 MAX_ROWS = 20_000
 """Largest number of obstacles in one message, or kept from markers."""
+
+MOST_TILT = 1e-3
+"""Sine of the largest angle between the task plane and the sizes of boxes after a transform."""
 
 _LOWEST = np.array([[0.0 if name.startswith(('radius', 'size')) else -MAX_COORDINATE] for name in COLUMNS])
 _DTYPES = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}
@@ -39,7 +42,7 @@ class DecodedCloud:
     dropped: dict[str, int]
 
 
-def decode_point_cloud(message: Any, plane: str) -> DecodedCloud:
+def decode_point_cloud(message: Any, plane: str, place: Place = stay) -> DecodedCloud:
     """Decode the obstacles of a PointCloud2 and project them onto the task plane; a cloud without rows is an empty scene.
 
     An obstacle is a circle, or a box with rounded corners if its `size_x` or `size_y` is larger than 0. `size_z` is its full
@@ -49,13 +52,16 @@ def decode_point_cloud(message: Any, plane: str) -> DecodedCloud:
     id), in either byte order, organised or not; other fields are skipped. A row with a number that is not finite is dropped and
     counted; of several rows with one id the last is used. Raises MessageError if the layout does not fit the data, a field is
     missing or of the wrong type, a radius, size or deviation is negative, a row with the fields of a box has neither size nor
-    radius, or a number is beyond MAX_COORDINATE.
+    radius, a number is beyond MAX_COORDINATE, or a transform tilts sizes out of the plane, or turns boxes without a yaw.
     """
-    stamp_ns, frame_id = decode_stamp(message.header), decode_frame(message.header)
+    stamp_ns = decode_stamp(message.header)
+    frame_id, transform = place(message.header)
     table = read_table(message)
     if not len(table):
         return DecodedCloud(make_obstacles(), stamp_ns, frame_id, {})
     columns = _read_columns(table)
+    if transform is not NO_TRANSFORM:
+        _transform(columns, table.dtype.names or (), transform, plane)
     is_finite = np.logical_and.reduce(np.isfinite(columns))
     _check_bounds(columns, is_finite)
     is_box = not set(BOX).isdisjoint(table.dtype.names or ())
@@ -127,6 +133,25 @@ def _read_columns(table: NDArray[np.void]) -> Array:
             if name != IDENTITY:
                 columns[COLUMNS.index(name)] = table[name]
     return columns
+
+
+def _transform(columns: Array, names: tuple[str, ...], transform: Transform, plane: str) -> None:
+    """Transform the columns of a message with some names in place: positions, velocities and the yaw of boxes."""
+    rotation, sizes = transform.rotation, [name for name in ('size_x', 'size_y', 'size_z') if name in names]
+    if sizes:
+        tilt = float(np.abs(project((rotation @ lift(np.eye(2), 0.0, plane).T).T, plane)[1]).max())
+        if tilt > MOST_TILT:
+            wanted = 'boxes that the transform leaves in the task plane'
+            raise MessageError(f'fields[{sizes[0]}]', wanted, f'a tilt of {tilt:.3g}')
+    with np.errstate(invalid='ignore', over='ignore'):  # rows that are not finite are dropped
+        if {'size_x', 'size_y'} & set(sizes):
+            if 'yaw' not in names:
+                raise MessageError('fields', 'a field yaw, because the transform turns the boxes', ', '.join(names))
+            yaw = columns[COLUMNS.index('yaw')]
+            axis = project(lift(np.column_stack([np.cos(yaw), np.sin(yaw)]), 0.0, plane) @ rotation.T, plane)[0]
+            yaw[:] = np.arctan2(axis[:, 1], axis[:, 0])
+        columns[:3] = transform.apply(columns[:3].T).T
+        columns[5:8] = rotation @ columns[5:8]
 
 
 def _check_bounds(columns: Array, is_finite: NDArray[np.bool_]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from foc_ros.core.errors import LostHandError, MessageError
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, as_readonly
 
-from .plane import project
+from .plane import NO_TRANSFORM, Transform, project
 
 MAX_COORDINATE = 1e4
 """Largest coordinate of a hand, a goal or an obstacle [m]; a larger one has a wrong unit."""
@@ -20,7 +21,16 @@ NORM_ERROR = 0.1
 """Difference from 1 of the norm of a rotation that is one, rounded or not normalised."""
 
 
-def decode_hand_sample(message: Any, plane: str) -> HandSample:
+Place = Callable[[Any], tuple[str, Transform]]
+"""Function from a std_msgs/Header to the frame in which its message is used, and the transform to there."""
+
+
+def stay(header: Any) -> tuple[str, Transform]:
+    """Return the frame of a header itself: its message is not transformed."""
+    return decode_frame(header), NO_TRANSFORM
+
+
+def decode_hand_sample(message: Any, plane: str, place: Place = stay) -> HandSample:
     """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
 
     Raises LostHandError for a pose without data, and MessageError for a coordinate beyond MAX_COORDINATE and for a stamp of 0,
@@ -30,8 +40,9 @@ def decode_hand_sample(message: Any, plane: str) -> HandSample:
     stamp_ns = decode_stamp(message.header)
     if stamp_ns == 0:
         raise MessageError('header.stamp', 'a time after 0', '0 s')
-    position, height = project(_decode_point(message.pose.position, 'pose.position'), plane)
-    return HandSample(stamp_ns, as_readonly(position), float(height), decode_frame(message.header))
+    frame_id, transform = place(message.header)
+    position, height = project(_decode_point(message.pose.position, 'pose.position', transform), plane)
+    return HandSample(stamp_ns, as_readonly(position), float(height), frame_id)
 
 
 def check_hand_pose(pose: Any) -> None:
@@ -59,19 +70,21 @@ class DecodedGoals(NamedTuple):
     heights: Array
 
 
-def decode_goals(message: Any, plane: str) -> DecodedGoals:
+def decode_goals(message: Any, plane: str, place: Place = stay) -> DecodedGoals:
     """Decode a geometry_msgs/PoseArray; an array without poses gives no goals."""
     if len(message.poses) > MAX_GOALS:
         raise MessageError('poses', f'at most {MAX_GOALS} goals', len(message.poses))
-    points = [_decode_point(pose.position, f'poses[{i}].position') for i, pose in enumerate(message.poses)]
+    frame_id, transform = place(message.header)
+    points = [_decode_point(pose.position, f'poses[{i}].position', transform) for i, pose in enumerate(message.poses)]
     goals, heights = project(np.array(points, dtype=float).reshape(-1, 3), plane)
-    return DecodedGoals(goals, decode_frame(message.header), heights)
+    return DecodedGoals(goals, frame_id, heights)
 
 
-def decode_goal(message: Any, plane: str) -> DecodedGoals:
+def decode_goal(message: Any, plane: str, place: Place = stay) -> DecodedGoals:
     """Decode a geometry_msgs/PoseStamped as one goal; the stamp is not used."""
-    goals, heights = project([_decode_point(message.pose.position, 'pose.position')], plane)
-    return DecodedGoals(goals, decode_frame(message.header), heights)
+    frame_id, transform = place(message.header)
+    goals, heights = project([_decode_point(message.pose.position, 'pose.position', transform)], plane)
+    return DecodedGoals(goals, frame_id, heights)
 
 
 def decode_stamp(header: Any, field: str = 'header.stamp') -> int:
@@ -89,8 +102,8 @@ def decode_frame(header: Any) -> str:
     return str(header.frame_id).lstrip('/')
 
 
-def _decode_point(point: Any, field: str) -> tuple[float, float, float]:
-    coordinates = float(point.x), float(point.y), float(point.z)
+def _decode_point(point: Any, field: str, transform: Transform) -> list[float]:
+    coordinates: list[float] = transform.apply([point.x, point.y, point.z]).tolist()
     for axis, value in zip('xyz', coordinates, strict=True):
         check_coordinate(f'{field}.{axis}', value)
     return coordinates

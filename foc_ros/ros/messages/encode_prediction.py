@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import NANOSECONDS, Obstacles, Prediction
+from foc_ros.core.types import NANOSECONDS, Obstacles, Prediction, Status
 
 from .encode_inputs import encode_hand_pose, encode_table
 from .encode_markers import encode_markers
@@ -33,10 +33,13 @@ CLOUD_ROW = np.dtype(
         *((_MOTOR + pair, '<f4') for pair in _PAIRS),
         ('goal', '<u4'),
         ('way', '<u4'),
+        ('status', '<u4'),
     ]
 )
-"""One time sample of one candidate [m, s, m/s, m^2]; compromised: 1 if eta is below the wanted one; goal: row; way: number
-of the class."""
+"""One time sample of one candidate [m, s, m/s, m^2]; compromised: 1 if eta is below the wanted one, or may be; goal: row; way:
+number of the class; status: row of `STATUSES`."""
+STATUSES = Status.SOLVED, Status.COMPROMISED, Status.ESTIMATED, Status.DEADLINE
+"""Statuses with a likelihood."""
 STAMP = 'stamp_ns:'
 """Beginning of the label with the stamp [ns] of a table of likelihoods, whose message has no header."""
 UNKNOWN, OTHER = 'unknown', 'other'
@@ -72,6 +75,7 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
     rows['goal'] = np.repeat([outcome.candidate.goal for outcome in outcomes], lengths)
     rows['way'] = np.repeat([outcome.way for outcome in outcomes], lengths)
     rows['compromised'] = np.repeat([not outcome.is_solved for outcome in outcomes], lengths)
+    rows['status'] = np.repeat([STATUSES.index(outcome.solution.status) for outcome in outcomes], lengths)
     return rows
 
 

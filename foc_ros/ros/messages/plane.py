@@ -7,7 +7,7 @@ right and the second axis up. For 'xy' and 'yz' that is the view against the thi
 from __future__ import annotations
 
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,29 @@ def project(points: ArrayLike, plane: str) -> tuple[Array, Array]:
     axes, normal = _AXES[plane]
     array = np.asarray(points, dtype=float)
     return array[..., axes], array[..., normal]
+
+
+class Transform(NamedTuple):
+    """A rotation (3, 3) and a translation (3,) [m], from one frame to another, or a pose; stamp_ns: for which it holds [ns]."""
+
+    rotation: Array
+    translation: Array
+    stamp_ns: int = 0
+
+    def apply(self, points: ArrayLike) -> Array:
+        """Return points (..., 3) after the transform; not finite where they are not."""
+        if self is NO_TRANSFORM:
+            return np.asarray(points, dtype=float)
+        with np.errstate(invalid='ignore', over='ignore'):
+            moved: Array = np.asarray(points, dtype=float) @ self.rotation.T + self.translation
+        return moved
+
+    def compose(self, inner: Transform) -> Transform:
+        """Return a pose after the transform."""
+        return Transform(self.rotation @ inner.rotation, self.apply(inner.translation), self.stamp_ns)
+
+
+NO_TRANSFORM = Transform(np.eye(3), np.zeros(3))
 
 
 def compute_rotation(quaternion: Any) -> Array:

@@ -1,16 +1,18 @@
-"""The thread of guidance: updates at `guidance.rate_hz` by the steady clock, whatever the executor and the predictions do.
+"""Guidance of the node: updates at `guidance.rate_hz` by the steady clock in a thread of their own, and their topics.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the
-other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted: the thread
-sleeps after each update, so that others run as well. While guidance is disabled, the thread waits without updates.
+other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted; while it is
+disabled, the thread waits without updates. The loop needs no ROS; `play` uses it too.
 """
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import monotonic
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,10 +20,17 @@ from foc_ros.core.config import Config
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.hand.kalman import FilterState
 from foc_ros.core.types import Prediction
+from foc_ros.io.topics import COMMAND
 
-from .messages.encode_guidance import Place
-from .realtime import ThreadPriority
+from .health import THROTTLE_S
+from .messages.decode_poses import decode_frame
+from .messages.encode_guidance import LIVE_OUTPUTS, TWIST, Place, blend_twist, encode_guidance_markers
+from .messages.types import MessageTypes, RclpyTypes
 
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+REMEDY = 'allow it with `rtprio` in /etc/security/limits.d, or set guidance.realtime_priority to 0'
 LEAST_SLEEP = 0.1
 """Part of the period that the thread sleeps after an update that was late: it must not keep a processor for itself."""
 ZEROS = 2
@@ -65,7 +74,7 @@ class GuidanceLoop:
     report
         Called in the thread with an exception of an update, after which guidance begins anew with a force of zero.
     warn
-        Called in the thread with a text if it may not have its priority.
+        Called in the thread with a text if it may not have its priority, the first time.
     """
 
     def __init__(
@@ -79,7 +88,7 @@ class GuidanceLoop:
         self.output: GuidanceOutput | None = None
         self.place: Place | None = None
         self._publish, self._report, self._warn = publish, report, warn
-        self._priority = 0
+        self._priority, self._wanted_priority, self._has_warned = 0, 0, False
         self._state, self._zeros = GuidanceState(), ZEROS
         self._end, self._enabled = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
@@ -160,15 +169,14 @@ class GuidanceLoop:
 
     def _run(self) -> None:
         """Update once in a period; a late update shifts the following ones."""
-        due_s, priority = monotonic(), ThreadPriority(self._warn)
+        due_s = monotonic()
         while not self._end.wait(max(due_s - monotonic(), 0.0)):
             if self._zeros >= ZEROS and not self._enabled.is_set():
-                priority.set(0)
+                self._set_priority(0)
                 self._enabled.wait()
                 self._state = GuidanceState()
                 continue
-            priority.set(self.newest.config.guidance.realtime_priority)
-            self._priority = priority.priority
+            self._set_priority(self.newest.config.guidance.realtime_priority)
             try:
                 self.update(monotonic())
             except Exception as error:
@@ -177,6 +185,87 @@ class GuidanceLoop:
             period_s = 1.0 / self.newest.config.guidance.rate_hz
             due_s = max(due_s + period_s, monotonic() + LEAST_SLEEP * period_s)
 
+    def _set_priority(self, priority: int) -> None:
+        """Give this thread a priority of SCHED_FIFO, 0 for an ordinary one; threads that it starts have an ordinary one."""
+        if priority == self._wanted_priority:
+            return
+        self._wanted_priority = priority
+        try:
+            policy = (os.SCHED_FIFO if priority else os.SCHED_OTHER) | os.SCHED_RESET_ON_FORK
+            os.sched_setscheduler(0, policy, os.sched_param(priority))
+            self._priority = priority
+        except (OSError, AttributeError) as error:  # Python has these on Linux only
+            if not self._has_warned:
+                self._warn(f'the real-time priority {priority} of guidance is not permitted ({error}): {REMEDY}')
+                self._has_warned = True
+
 
 def _has_ended(output: GuidanceOutput) -> bool:
     return output.status is not GuidanceStatus.GUIDING and not output.force.any() and not output.authority
+
+
+class GuidanceTopics:
+    """Publishes guidance for a node between `create` and `destroy`.
+
+    Attributes: loop, which has to be told what is new; publishers, by the name of the topic below the node's name.
+
+    Parameters
+    ----------
+    node
+        The node to which the topics belong.
+    config
+        All parameters.
+    report
+        Called in the thread of guidance with an exception of an update.
+    """
+
+    def __init__(self, node: Node, config: Config, report: Callable[[Exception], None]) -> None:
+        self._node = node
+        self._thread_types = RclpyTypes()  # messages of the thread of guidance; no other thread uses them
+        self.publishers: dict[str, Any] = {}
+        self.loop = GuidanceLoop(config, self._publish_output, report, node.get_logger().warning)
+
+    def create(self) -> None:
+        """Create the publishers and begin to update."""
+        from .endpoints import create_guidance_publishers  # needs rclpy, and the loop does not
+
+        self.publishers = create_guidance_publishers(self._node)
+        self.loop.start()
+
+    def destroy(self) -> None:
+        """End the updates and destroy the publishers."""
+        self.loop.stop()
+        for publisher in self.publishers.values():
+            self._node.destroy_publisher(publisher)
+        self.publishers = {}
+
+    def encode_markers(self, types: MessageTypes) -> list[Any]:
+        """Return the markers of the last output, none if guidance is disabled or has no hand."""
+        output, newest = self.loop.output, self.loop.newest
+        if output is None or newest.place is None or not newest.config.guidance.enabled:
+            return []
+        return encode_guidance_markers(output, newest.place, types)
+
+    def blend_command(self, command: Any, types: MessageTypes) -> None:
+        """Publish the operator's command with the share of guidance in it, or as it is where there is no guidance."""
+        output, place, config = self.loop.output, self.loop.place, self.loop.newest.config
+        if not config.guidance.enabled:
+            return
+        if output is not None and place is not None and monotonic() - output.t <= config.guidance.hold_s:
+            frame_id = decode_frame(command.header)
+            if frame_id == place.frame_id:
+                command = blend_twist(output, command, config.plane, types)
+            else:
+                text = f'{COMMAND}: frame {frame_id!r} is not the working frame {place.frame_id!r}: not blended'
+                self._node.get_logger().warning(text, throttle_duration_sec=THROTTLE_S)
+        self._publish(TWIST, command)
+
+    def _publish_output(self, output: GuidanceOutput, place: Place) -> None:
+        """Publish an output; this happens in the thread of guidance."""
+        for name, (_, encode) in LIVE_OUTPUTS.items():
+            if name in self.publishers and self.publishers[name].get_subscription_count():
+                self._publish(name, encode(output, place, self._thread_types))
+
+    def _publish(self, name: str, message: Any) -> None:
+        if self._node.context.ok():
+            self.publishers[name].publish(message)

@@ -1,0 +1,60 @@
+"""A recording with its prediction as a picture, for the pages about many recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import islice
+
+from foc_ros.analysis.recordings import Recording
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.config import Config
+from foc_ros.core.errors import FocError
+from foc_ros.core.types import NANOSECONDS
+
+from .figures import make_moment_figure
+from .page import render_figure, render_pictures
+from .report import ONSET_SPEED, ReportCollector
+from .views import HandTrajectory, Snapshot, build_hand_trajectory
+
+MOST_ITEMS = 3_000
+"""Messages of a recording that are read at most."""
+ON_THE_WAY = 0.15, 0.6
+"""Parts of a movement between which a moment is chosen."""
+FEW = 20
+"""Number of recordings below which the page warns."""
+
+
+def warn_of_few(count: int, what: str) -> list[str]:
+    """Return a warning where recordings or trials are few."""
+    words = f'Few {what} ({count}): intervals are wide, and differences may be chance. {FEW} or more tell more.'
+    return [words] if count < FEW else []
+
+
+def render_example(recordings: Mapping[str, Recording], config: Config) -> str:
+    """Return HTML with a picture of a moment of the first recording that can be replayed, '' if there is none."""
+    for name, recording in recordings.items():
+        collected = ReportCollector()
+        try:
+            for step in Replay(config).steps(islice(recording.items(), MOST_ITEMS)):
+                collected.add(step)
+        except FocError:
+            continue  # the page lists what cannot be read
+        hand = build_hand_trajectory(collected.samples)
+        if moment := _choose_moment(hand, [each for each in collected.snapshots if each.candidates]):
+            return '<h2>One recording with its prediction</h2>' + _render_moment(name, hand, *moment)
+    return ''
+
+
+def _choose_moment(hand: HandTrajectory, snapshots: list[Snapshot]) -> tuple[Snapshot, tuple[int, int]] | None:
+    """Return the snapshot of the first movement with the most likely paths, and the start and end of this movement [ns]."""
+    for start_ns, end_ns in hand.find_movements(ONSET_SPEED):
+        begin, end = (start_ns + share * (end_ns - start_ns) for share in ON_THE_WAY)
+        if inside := [each for each in snapshots if begin <= each.stamp_ns <= end]:
+            return max(inside, key=lambda each: each.likely_paths), (start_ns, end_ns)
+    return None
+
+
+def _render_moment(name: str, hand: HandTrajectory, snapshot: Snapshot, span: tuple[int, int]) -> str:
+    seconds = (snapshot.stamp_ns - span[0]) / NANOSECONDS
+    caption = f'{name}, {seconds:.2f} s after the hand began to move.'
+    return render_pictures([render_figure(make_moment_figure(hand, snapshot, span), caption)])

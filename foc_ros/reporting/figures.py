@@ -1,0 +1,154 @@
+"""Whole figures for print: a prediction, a scene, the movements of a recording, a moment of one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
+
+from .draw import (
+    STYLE,
+    Bounds,
+    Span,
+    compute_bounds,
+    draw_candidates,
+    draw_hand,
+    draw_hand_now,
+    draw_likelihoods,
+    draw_movement,
+    draw_scene,
+    draw_speeds,
+    number_labels,
+    open_figure,
+    save_figure,
+)
+from .legend import draw_legend, measure_legend
+from .tracks import CandidateTracks
+from .views import HandTrajectory, Snapshot, build_candidate_views, build_snapshot, build_unsolved_views
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDTH_IN = 6.4
+
+
+def draw_snapshot(axes: Any, snapshot: Snapshot, bounds: Bounds, slots: Mapping[str, int] | None = None) -> None:
+    """Draw a scene with the candidates in it, the hand and a legend; slots: by label, in order of likelihood if not given."""
+    draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
+    draw_candidates(axes, snapshot, number_labels(snapshot.candidates) if slots is None else slots)
+    if snapshot.hand is not None:
+        draw_hand_now(axes, snapshot.hand[None])
+    draw_legend(axes, None if snapshot.candidates else 'no candidate could be solved')
+
+
+def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
+    """Draw a prediction with its obstacles and goals.
+
+    Parameters
+    ----------
+    prediction : Prediction
+        Its candidates are drawn from the hand on, the thicker the more likely, with ellipses of one standard deviation of the
+        position: filled for motor noise, dashed for the total uncertainty of the most likely one. Those without a likelihood, and
+        those that lead through an obstacle, are pale, with the reason beside them.
+    axes : matplotlib.axes.Axes, optional
+        Where to draw; axes of a new pyplot figure by default. The legend takes a part of their place.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes that hold the drawing.
+    """
+    import matplotlib.pyplot as plt
+
+    snapshot = build_snapshot(prediction)
+    bounds = _compute_scene_bounds(snapshot)
+    with plt.rc_context(STYLE):
+        if axes is None:
+            axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, snapshot)), layout='constrained').subplots()
+        draw_snapshot(axes, snapshot, bounds)
+    return axes
+
+
+def plot_outcomes(
+    file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[PredictedCandidate], start: Array
+) -> None:
+    """Write a picture of candidates in their scene, in the format of the file's suffix.
+
+    goals (g, 2), start (2,) [m]. Raises InputError if the suffix is not that of a picture format or the file cannot be written.
+    """
+    views = build_candidate_views(outcomes, len(goals)), None, build_unsolved_views(outcomes, len(goals))
+    save_figure(make_scene_figure(Snapshot(0, obstacles, goals, *views, hand=start)), file)
+
+
+def make_scene_figure(snapshot: Snapshot) -> Figure:
+    """Return a figure of one snapshot: scene, candidates and legend."""
+    bounds = _compute_scene_bounds(snapshot)
+    with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
+        draw_snapshot(figure.subplots(), snapshot, bounds)
+    return figure
+
+
+def make_recording_figure(
+    hand: HandTrajectory, obstacles: Obstacles, goals: Array, spans: Sequence[Span], bounds: Bounds
+) -> Figure:
+    """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each movement."""
+    with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
+        axes = figure.subplots()
+        draw_scene(axes, obstacles, goals, bounds, named=False)
+        axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
+        for number, span in enumerate(spans):
+            draw_movement(axes, hand.positions[hand.between(*span)], number)
+    return figure
+
+
+def make_snapshot_figure(hand: HandTrajectory, tracks: CandidateTracks, row: int, span: Span, bounds: Bounds) -> Figure:
+    """Return a figure of one snapshot during a movement: the scene above, likelihoods and speeds of the whole movement below.
+
+    row: of the snapshot in the tracks; span: start and end [ns] of the movement.
+    """
+    snapshot, slots = tracks.snapshots[row], tracks.slots_at(row)
+    origin_ns = int(hand.stamps_ns[0])
+    now_s, begin_s, end_s = ((stamp - origin_ns) / NANOSECONDS for stamp in (snapshot.stamp_ns, *span))
+    heights = [_get_height(bounds, snapshot) + 0.4, 2.1, 1.9]
+    with open_figure(WIDTH_IN, sum(heights)) as figure:
+        scene, likelihoods, speeds = figure.subplots(3, 1, height_ratios=heights)
+        draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
+        draw_candidates(scene, snapshot, slots)
+        draw_hand(scene, hand, snapshot.stamp_ns, span)
+        draw_legend(scene)
+        draw_likelihoods(likelihoods, tracks.between(*span), origin_ns)
+        draw_speeds(speeds, hand, snapshot, slots, span, origin_ns)
+        for axes in (likelihoods, speeds):
+            axes.axvline(now_s, color='0.4', linewidth=1.0)
+            axes.set_xlim(begin_s, end_s)
+        scene.set_title(f'at {now_s:.2f} s')
+    return figure
+
+
+def make_moment_figure(hand: HandTrajectory, snapshot: Snapshot, span: Span) -> Figure:
+    """Return a figure of one snapshot with the hand during a movement, whose start and end [ns] are span."""
+    bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
+    with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
+        axes = figure.subplots()
+        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
+        draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
+        draw_hand(axes, hand, snapshot.stamp_ns, span)
+        draw_legend(axes)
+    return figure
+
+
+def _compute_scene_bounds(snapshot: Snapshot) -> Bounds:
+    hand = [] if snapshot.hand is None else [snapshot.hand[None]]
+    return compute_bounds(snapshot.obstacles, snapshot.goals, (*snapshot.candidates, *snapshot.unsolved), *hand)
+
+
+def _get_height(bounds: Bounds, snapshot: Snapshot | None = None) -> float:
+    """Return the height [in] of a scene with equal axes, its axis labels and a legend of candidates."""
+    height = float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.6
+    if snapshot is None:
+        return height
+    return height + measure_legend((*snapshot.candidates, *snapshot.unsolved))

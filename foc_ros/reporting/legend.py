@@ -1,0 +1,91 @@
+"""The legend of a scene: its candidates with their classes in words, and the signs; below the axes, so that it covers nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import fill
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from .views import CandidateView, UnsolvedView
+
+LONGEST_WORDS = 60
+"""Number of characters in the words of a class beyond which the legend has its label only."""
+SIZE_PT, NARROW_IN = 8.0, 3.5
+"""Size of the text, where there is room for it [pt], and the width below which lines are shorter and signs in one column [in]."""
+COLUMNS, NARROW_COLUMNS = 70, 40
+"""Characters in a line of a candidate."""
+LABELS_IN = 0.5
+"""Height of the labels below axes [in]."""
+LINE = 1.35
+"""Height of a line, in parts of the size of its text."""
+SIGNS = 6
+"""Signs of a scene at most, but for those of a hand that moves."""
+_PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
+"""Subplot and place of axes before a legend took a part of it."""
+
+
+def describe_in_legend(view: CandidateView | UnsolvedView, letter: str = ' ', reason: str = '') -> str:
+    """Return the line of a candidate; reason: why it is a ghost."""
+    # the words of a class with many obstacles would leave no room for the plot
+    name = view.description if 0 < len(view.description) <= LONGEST_WORDS else view.label
+    if isinstance(view, UnsolvedView):
+        return f'{letter}    - %  {name}; {view.reason}'
+    words = f'; {"estimated" if view.is_estimated else "compromised"}: eta {view.eta:.3f}' if view.is_compromised else ''
+    return f'{letter}  {100 * view.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
+
+
+def measure_legend(candidates: Sequence[CandidateView | UnsolvedView]) -> float:
+    """Return the height of the legend of a scene that is as wide as a page [in]."""
+    lines = sum(1 + fill(describe_in_legend(each), COLUMNS).count('\n') for each in candidates) + -(-SIGNS // 2)
+    return lines * LINE * SIZE_PT / 72.0 + 0.05
+
+
+def draw_legend(axes: Any, title: str | None = None) -> None:
+    """Write everything that is drawn on axes into a legend, in a part of their place.
+
+    The text is as small as the place needs. A second call replaces the legend of the first.
+    """
+    figure, name = axes.figure, f'legend {id(axes)}'
+    for earlier in [each for each in figure.axes if each.get_gid() == name]:
+        earlier.remove()
+    slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
+    width_in, height_in = figure.get_figwidth() * place.width, figure.get_figheight() * place.height
+    is_narrow = width_in < NARROW_IN
+    columns = NARROW_COLUMNS if is_narrow else COLUMNS
+    named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    candidates = sorted((label for label in named if '%  ' in label), key=lambda label: (-_read_share(label), label))
+    signs = [label for label in named if label not in candidates]
+    texts = [fill(label, columns, subsequent_indent=' ' * 10) for label in candidates]
+    sign_columns = 1 if is_narrow else 2
+    lines = sum(1 + text.count('\n') for text in texts) + -(-len(signs) // sign_columns) + (title is not None)
+    size_pt = min(SIZE_PT, 72.0 * width_in / (0.62 * (columns + 5)))
+    wanted_in = min(lines * LINE * size_pt / 72.0 + 0.05, 0.5 * height_in)
+    size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (LINE * max(lines, 1)))
+    below = _take_place(axes, slot, place, height_in, wanted_in)
+    below.set(gid=name)
+    below.axis('off')
+    look = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
+    font, handles = {'family': 'monospace', 'size': size_pt}, [named[label] for label in candidates]
+    below.add_artist(below.legend(handles, texts, title=title, loc='upper left', prop=font, **look))
+    handles, font = [named[label] for label in signs], {'size': size_pt}
+    below.legend(handles, signs, loc='lower left', ncols=sign_columns, columnspacing=2.0, prop=font, **look)
+
+
+def _read_share(label: str) -> float:
+    return float(label.partition('%')[0][1:].strip().replace('-', '-1'))
+
+
+def _take_place(axes: Any, slot: Any, place: Any, height_in: float, wanted_in: float) -> Any:
+    """Return new axes of a height [in] below axes, which become so much smaller."""
+    figure = axes.figure
+    gap_in = 0.0 if figure.get_layout_engine() else LABELS_IN
+    parts = [max(height_in - wanted_in - gap_in, 0.2 * height_in), gap_in, wanted_in]
+    if slot is None:
+        bottom = place.y0 + place.height * (gap_in + wanted_in) / sum(parts)
+        axes.set_position((place.x0, bottom, place.width, place.y1 - bottom))
+        return figure.add_axes((place.x0, place.y0, place.width, place.height * wanted_in / sum(parts)))
+    parts = [each for each in parts if each]
+    rows = slot.subgridspec(len(parts), 1, height_ratios=parts, hspace=0.0)
+    axes.set_subplotspec(rows[0])
+    return figure.add_subplot(rows[-1])
