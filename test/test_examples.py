@@ -48,7 +48,7 @@ def test_there_are_examples_with_titles() -> None:
     assert len(EXAMPLES) >= 10
     gallery = (ROOT / 'doc' / 'examples.md').read_text('utf-8')
     for example in EXAMPLES:
-        docstring = re.match(r'"""\n(.+)\n(=+)\n\n', example.read_text('utf-8'))
+        docstring = re.match(r'(?:#.*\n)*"""\n(.+)\n(=+)\n\n', example.read_text('utf-8'))
         assert docstring and len(docstring[1]) == len(docstring[2]), f'{example.name} has no title'
         assert f'[{docstring[1]}](../examples/{example.name})' in gallery, f'doc/examples.md does not list {example.name}'
 
