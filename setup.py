@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Packaging of foc_ros, for pip and for colcon (ament_python)."""
 
 from glob import glob

@@ -1,4 +1,6 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Measure what doc/accuracy.md reports, on the scenes of the tests, and renew its figures and its blocks of numbers.
 
 python benchmarks/accuracy.py [PART ...], with PART of reference, guarantee, bounds, curves. All of it takes an hour or two.

@@ -1,4 +1,6 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The study of `foc_ros simulate` with the assistance rules of others beside its own; it prints the same cells.
 
 python benchmarks/assistance.py [--operators A,B] [--assistance A,B] [--trials N] [--seed S] [--params YAML] [--json]

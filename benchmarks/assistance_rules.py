@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Assistance rules of others, from their papers: hindsight optimization, blending by confidence, and the potential field.
 
 All have the same estimate of the hand and the same limits of force and slew as the guidance of this package.

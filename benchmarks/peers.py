@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """IPOPT and Fatrop, through CasADi, on the un-linearised problem: least effort subject to the chance constraint itself.
 
 Time counts in steps and length in tenths of a metre. In these units the dynamics are the same for every duration, so that one

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Solve ten random reaching problems with independent solvers and write `test/reference_cases.json`.
 
     pip install numpy quadprog casadi

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Solve ten random reaching problems among boxes, capsules, hulls and circles with IPOPT, and write `test/reference_shapes.json`.
 
     pip install numpy quadprog casadi

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The rows of the benchmark: `ROWS` maps the name of each to a function of whether to be quick, which returns a `Result`.
 
 CasADi is imported only when a row is measured that compares with its solvers.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The benchmark. Each row is a ratio of medians within one run.
 
     python benchmarks/run.py [--json | --markdown] [--report FILE] [--only NAME ...] [--quick]

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The scenes that are timed. They are drawn from seeds; each is a reach of 0.36 m in 1 s."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Settings of the documentation web site, which `make doc` builds with Sphinx. The pages can also be read in the repository."""
 
 import re

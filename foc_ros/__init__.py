@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """foc_ros predicts where an operator's hand is going among obstacles, with its uncertainty.
 
 This module is the public Python API. Lengths are in metres, times in seconds, positions in the task plane. Names are imported

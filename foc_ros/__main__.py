@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The program `foc_ros`, also as `python -m foc_ros COMMAND`.
 
 The node needs ROS and a numeric library or two; the other commands need more. What of it is missing is said in one sentence.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The public Python API for a moving hand: `Predictor`, `Guidance`, `replay`; `foc_ros` exports all of it."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Start the node: `ros2 launch foc_ros foc.launch.py hand_pose:=/MTMR/measured_cp plane:=xz`."""
 
 from launch import LaunchContext, LaunchDescription

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Start the node and RViz: `ros2 launch foc_ros foc_rviz.launch.py hand_pose:=/MTMR/measured_cp`.
 
 The arguments are those of foc.launch.py.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Start one node for each arm: `ros2 launch foc_ros two_arms.launch.py left_hand:=/MTML/measured_cp`.
 
 Both nodes read the same obstacles; each has its own goals, below its namespace, such as `/left/goals`.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Measured numbers as Markdown tables, and the blocks for them between HTML comments in the pages of doc/."""
 
 from __future__ import annotations

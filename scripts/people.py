@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Measure predictions of people: ways and positions; `make people` runs it.
 
 It uses D3IL and HLP, which have to be beside the checkout (`shared/data`), and writes the tables of doc/people.md. Each setting

@@ -1,4 +1,6 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Make the pictures of README and doc/, all of which the program computes.
 
 python scripts/pictures.py [NAME ...] [--to DIRECTORY], with NAME of scene, demo, api, play, concept_noise, concept_surrogate,

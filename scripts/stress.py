@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A live node in its own process under stress. Other programs of the machine lengthen all times: run it alone.
 
     python scripts/stress.py soak [--minutes 10]

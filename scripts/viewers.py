@@ -1,4 +1,6 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Draw what config/foc.rviz shows: python scripts/viewers.py [--to FILE].
 
 RViz is not needed: the messages are those of the node for the packaged recording, and displays, colours and view are those of the

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Pages in a headless Chromium, and the check that a report page shows the numbers of its report."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What all tests share: their marks, a private ROS graph, and failure instead of a skip where ROS is required."""
 
 import os

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """ObservedRecording and recordings made by hand, for the tests of the evaluation."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of a simulated operator, for the tests of `fit`."""
 
 from __future__ import annotations

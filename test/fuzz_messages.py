@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Hypothesis strategies for input messages: mostly plausible, often wrong, sometimes nonsense."""
 
 from __future__ import annotations

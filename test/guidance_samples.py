@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Random predictions and hostile hands for the tests of guidance: no solver, so that thousands of them are cheap."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Scenes for the tests of the homotopy classes: reaches among circles, made at random, turned, mirrored and reordered."""
 
 from __future__ import annotations

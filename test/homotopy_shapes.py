@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Scenes of mixed shapes, and a brute-force search for their homotopy classes that shares nothing with the package."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Input messages for tests, of rclpy and of rosbags."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Messages of packages that need not be installed, made from their definitions: collision objects and detections."""
 
 from __future__ import annotations

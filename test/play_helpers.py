@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """`foc_ros play` as a process, its page in a browser, and a hand that is steered by synthetic events."""
 
 from __future__ import annotations

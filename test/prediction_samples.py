@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Predictions made by hand, for tests of what is done with them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A scene, hand samples and predictions in closed form, so that a test knows the contents of a picture."""
 
 from __future__ import annotations

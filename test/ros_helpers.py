@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A private ROS graph for each test: own context, own domain, own executor; deadlines instead of sleeps.
 
 Use the `ros` fixture of conftest.py (or :func:`graph`) and :meth:`Graph.spin_until`.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The command lines that the documentation shows, and those of them that a test cannot run, each with its reason.
 
 Every line of a block marked `console`, in README, CONTRIBUTING and doc/, runs as it stands, page by page and in order, unless

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """doc/accuracy.md has blocks for the main results of its script, and no block is empty."""
 
 import importlib

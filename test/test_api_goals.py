@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Goals with names and likelihoods, times between the steps, plain values, and what the API takes or refuses in one sentence."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The assistance rules of others: cases with known answers, limits of force and slew, and the study that compares them."""
 
 from __future__ import annotations

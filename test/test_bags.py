@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Bags: no message is lost, no file is overwritten, and every damage is reported."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The program of the benchmark, with a row that compares the package with itself and so needs no peer."""
 
 import json

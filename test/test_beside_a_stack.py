@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The node and a substitute for a teleoperation stack, in two processes: engagement, handover, stale input, recovery."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings among boxes, one scene each: a small folder written here, and the optional data set of reaches."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The time limit of a prediction: what is not settled in time takes part with an estimate, and says so."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Moments of the linearised constraint against samples, and the bound that Cantelli's inequality gives."""
 
 import numpy as np

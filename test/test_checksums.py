@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Checksums: a written bag has all of them, and a bag that differs from its own is never used."""
 
 from __future__ import annotations

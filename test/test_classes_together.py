@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """All classes of a scene solved together: as each alone, the same each time, and as good as independent solvers."""
 
 import json

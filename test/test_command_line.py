@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The program as a process: exit codes, errors in one line, and no unnecessary imports."""
 
 from __future__ import annotations

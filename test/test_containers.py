@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The containers: their files can be parsed, and start the demo by the two commands of the README. No container is built here."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """CSV tables to bags: every number arrives, and every wrong cell is named."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The numeric core imports no ROS, and a recording is replayed without an installed ROS."""
 
 import json

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The parts of the cost and the goal against a step-by-step simulation of the model."""
 
 from dataclasses import replace

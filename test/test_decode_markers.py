@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Decoding of obstacle markers: the table is updated as RViz updates its own."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Collision objects and detections become obstacles, in messages and in bags; their packages need not be installed."""
 
 from __future__ import annotations

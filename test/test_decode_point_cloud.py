@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """PointCloud2 as a table of obstacles: layouts, optional columns, and errors."""
 
 from __future__ import annotations

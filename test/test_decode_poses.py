@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Decoding of hand poses and goals: every number is checked, and errors name field, value and bound."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The demo end to end: the real node in its own process receives the first seconds of the packaged recording over DDS."""
 
 from __future__ import annotations

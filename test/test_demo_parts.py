@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The parts of the demo that need no ROS: recorder, display, the node's process, the output directory."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Demonstrations are recorded with the obstacles that they pass, and recalled if the scene is the same."""
 
 import json

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Factors on predicted standard deviations are learnt from errors: causally, equally for equal input, until a reset."""
 
 from __future__ import annotations

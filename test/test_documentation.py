@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The documentation names only files, parameters, commands and tests that exist, and the start page leads to every page."""
 
 import ast

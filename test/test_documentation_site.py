@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The web site in a browser: it names project and version, fits its window, is readable in the dark, and needs no network."""
 
 from __future__ import annotations

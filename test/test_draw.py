@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Pictures for print: what is drawn is what was computed, and it can be told apart, read and placed anywhere."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The time to go: whole durations, time since onset, slow hands, lower and upper limit."""
 
 from dataclasses import replace

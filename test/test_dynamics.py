@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Plants compared with the matrix exponential, horizons with a simulation step by step."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Effort over the wanted eta: it is continuous and does not fall.
 
 Continuity is tested at the usual setting, N = 50 and c = 0.15, in four random scenes of one circle and in six reference cases.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Encoding of a prediction, checked with independent readers."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Commands in unusual environments: they work, or one sentence says why not."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The Kalman filter of the hand: equations, consistency, movement onset, and all kinds of stamps."""
 
 import itertools

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The command `evaluate`: kinds of data, failures by name, workers, JSON, page, and baselines from outside."""
 
 from __future__ import annotations

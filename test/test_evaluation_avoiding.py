@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The Avoiding task has three rows and 24 homotopy classes, and the classes taken are those of its labels."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Baselines and the Singer model, against closed forms and plain geometry."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Observations hold what the predictor publishes and what really came, against values computed by hand."""
 
 from __future__ import annotations

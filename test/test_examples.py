@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Every example runs and makes a figure, and the Python code on the pages does what the pages say."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of a scene change likelihoods and positions where they agree with the scene and the hand, and nothing elsewhere."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Parts from outside the package, each one function: a strategy, a plant, a likelihood rule and a QP backend."""
 
 from collections.abc import Sequence

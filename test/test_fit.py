@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """`fit` from the command line: it turns recordings into a parameter file that the node accepts."""
 
 from __future__ import annotations

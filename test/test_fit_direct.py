@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters that a fit finds without a prediction, and what a table of settings determines."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters that a fit finds by replays: settings of the predictor in a race, and what widens the covariance."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Seconds of a noisy hand and noisy obstacles at 100 Hz: labels and the most likely class stay the same."""
 
 from itertools import pairwise

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Readiness by the node's clocks: a silent source and an old pose are reported with numbers."""
 
 from __future__ import annotations

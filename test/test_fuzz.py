@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Any messages in any order: no exception, no number that is not finite, and no prediction without a new pose.
 
 FOC_ROS_FUZZ: the number of messages, 2,000 by default; a running node gets a twentieth of them.

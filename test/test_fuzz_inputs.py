@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Damaged recordings and tables: bits, cuts, and records left out or doubled end in words, and nothing is lost unsaid."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Goals that are obstacles: their own object does not block the way to them, and blocks all others."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Whatever is called solved keeps its promise: over 70 random feasible reaches, no obstacle is hit at any step too often.
 
 Every count of noisy movements that stay clear is judged by its Wilson interval, at a level at which all counts of this file

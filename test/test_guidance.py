@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Guidance: every part against a case with a known answer, and the public class."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Safety of guidance as properties: bounds, slew, release, passivity and margins, for hostile hands and predictions."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The radius of the hand: what is computed has larger obstacles, what is shown has those that were given."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Scenes at the edge of what can be predicted: each has a decided answer, finite and never a guess (doc/troubleshoot.md)."""
 
 from __future__ import annotations

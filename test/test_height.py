@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The third axis: the height over the task plane, its variance, and the obstacles that it clears."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Heights in messages: those of obstacles, and those of predictions, in every task plane."""
 
 from dataclasses import replace

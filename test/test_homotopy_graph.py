@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The visibility graph of many obstacles: gaps, obstacles beside the way, the limit of the search, and smooth guesses."""
 
 import numpy as np

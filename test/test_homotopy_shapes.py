@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Homotopy classes among boxes, capsules, hulls and circles: brute force, equal shapes, invariances, walls, hands inside."""
 
 from itertools import pairwise

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The side on which a path passes an obstacle, by the angle that the path sweeps about its centre."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Labels and lists of candidates are steady under noise, and all classes of the Avoiding task are found."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Messages on their way into the pipeline: markers expire by the hand's stamps, and refused messages are counted."""
 
 from __future__ import annotations

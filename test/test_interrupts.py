@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Ctrl-C ends a command at any moment, with exit code 130 and without a traceback."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The answer does not depend on what is no part of the problem: mirror, frame, order, duplicates, units."""
 
 from collections.abc import Iterator

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The launch files: what they declare, and what they start where `launch_ros` is installed."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """replay --learn: a demonstrated reach enters the library once and is recalled in the next replay."""
 
 from __future__ import annotations

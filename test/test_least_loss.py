@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Strategies `lv` and `hc` with a finite shortfall: the point with the least loss, and its limits."""
 
 import math

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Every source file begins with its licence in the form of SPDX, after the line that names its interpreter.
 
 `python test/test_licence_headers.py` adds the lines where they are missing.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Likelihoods: from ratios of costs, over the time until a choice, by the next row of obstacles, and of classes that miss eta."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The simulated reaches of doc/calibrate.md: `evaluate` reads them, and each ends near its own goal."""
 
 from __future__ import annotations

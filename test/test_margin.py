@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Margins by finite differences and brute force: their derivatives, and the least safety factor over all times."""
 
 from dataclasses import replace

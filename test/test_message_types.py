@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Messages made for rclpy and for rosbags have the same bytes, and stamps stay in range."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Movements are learnt while running: only those that end at a goal, causally, equally for equal input, and until a reset."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A prediction that takes long: everything else is answered meanwhile, and nothing that is old or unwanted is published."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Services and topics as the `ros2` tools use them: plain clients, and the node in another process."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Bad input, wrong parameters and internal errors: the node reports them, publishes nothing wrong, and goes on."""
 
 from __future__ import annotations

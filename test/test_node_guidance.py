@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Guidance of the node: its topics, its clutch, its diagnostics, and its rate while a prediction takes long."""
 
 from __future__ import annotations

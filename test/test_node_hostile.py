@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Faults of a robot cell: the outputs of the node and the level of its diagnostics for each of them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The managed node: it predicts only while it is active, and every client can read and change its state."""
 
 from __future__ import annotations

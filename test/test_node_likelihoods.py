@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Likelihoods that other tools plot by name: a topic for each goal, which comes and goes with it; the force without a stamp."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The node in its own process publishes the predictions of a replay when a bag's raw messages are sent over DDS."""
 
 from __future__ import annotations

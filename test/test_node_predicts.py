@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Outputs of the node: their content, their time, and their agreement with the pipeline."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The node as a process: it starts or prints the reason why not, and stops without an error on a signal."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Extreme scenes in a running node: its outputs and the level of its diagnostics."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The notebook runs from its first cell to its last, its stored outputs are those of the present program, and the likelihood of
 the path that the hand takes rises.
 

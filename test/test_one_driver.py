@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """One driver: the library, a replay, the node's intake and the page predict the same, bit for bit, and all of them learn."""
 
 from __future__ import annotations

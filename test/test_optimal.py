@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The least effort at a safety factor, over all times, and the exchange of effort for safety."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The node needs what `package.xml` names and nothing else; whatever needs more says in one sentence what is missing."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A goal that nobody announced: its share grows as the hand moves to none of the goals, and is published."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The outline of an obstacle, against distances and the formula of Steiner for its area."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The output bag, read with the mcap library and its ROS 2 decoder, which share no code with the writer."""
 
 from __future__ import annotations

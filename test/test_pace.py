@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Expected durations follow the operator's movements: causally, equally for equal input, and until a reset."""
 
 from __future__ import annotations

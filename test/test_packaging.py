@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What pip and colcon install: consistent metadata, and every file that the program needs."""
 
 import os

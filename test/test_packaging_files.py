@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What else leads to an installation or checks one: pixi, the workflow, templates and hooks, in agreement with setup.py."""
 
 from __future__ import annotations

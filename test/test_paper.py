@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """`examples/paper`: the trends appear, the files hold the numbers, and an output that cannot be written is rejected."""
 
 from __future__ import annotations

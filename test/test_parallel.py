@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings in parallel: results do not depend on the workers, and a killed worker fails one recording only."""
 
 import os

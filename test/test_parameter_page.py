@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """doc/parameters.md and config/foc.yaml agree with the configuration; `python test/test_parameter_page.py` renews both."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of the config classes in the parameter file and on the node."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The pipeline: when a prediction is due, what is rejected and why, and that no outdated input is used as a new one."""
 
 import re

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """`examples/plan_recovery`: tau and lambda are recovered from movements that were planned with them, or said to be unknown."""
 
 import numpy as np

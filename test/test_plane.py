@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Projection of points onto the task plane, and its inverse."""
 
 from __future__ import annotations

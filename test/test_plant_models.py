@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Plants that `foc.plant` chooses: the damped mass, and plants from outside the package, in solve, predict and replay."""
 
 from itertools import islice

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The page of `foc_ros play` in a browser: steered by synthetic events, loaded again, on a phone; and broken pages."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The parts of `foc_ros play` that need neither a browser nor a session: messages, clock, scene, tasks and the predictor."""
 
 from __future__ import annotations

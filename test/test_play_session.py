@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A session of `foc_ros play`: tasks, recordings, the fit and its comparison, and what is refused."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Predicted motion and covariance: the start, the arrival, process noise, end points, durations and late onsets."""
 
 from __future__ import annotations

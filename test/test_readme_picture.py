@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The pictures of README and concepts exist, their scripts draw them, and the tables of the examples are current."""
 
 from __future__ import annotations

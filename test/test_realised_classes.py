@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Solutions among mixed shapes lie in the homotopy class of their candidate, by the angles swept about the obstacles."""
 
 import numpy as np

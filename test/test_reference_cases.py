@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Scenes solved by independent solvers (quadprog, IPOPT): those of `reference_cases.json`, and more where they are present."""
 
 import numpy as np

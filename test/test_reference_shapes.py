@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Ten scenes of boxes, capsules, hulls and circles, solved by IPOPT: see `benchmarks/reference_shapes.py`."""
 
 import json

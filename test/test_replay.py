@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A recording through the predictor: the same each time, nothing lost, every refusal counted."""
 
 from __future__ import annotations

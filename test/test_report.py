@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The report: a page that needs no other file, and numbers that agree with the predictions."""
 
 from __future__ import annotations

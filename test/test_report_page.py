@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The report page in a browser: it plays, it draws the numbers of predictions.json, and the check finds a broken page."""
 
 from __future__ import annotations

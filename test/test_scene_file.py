@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Scene files: every field is read, and errors name field, value and bound."""
 
 from __future__ import annotations

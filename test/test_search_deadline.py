@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The search for classes under a deadline: it returns what it has, goals take turns, and candidates of before stay."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Input from outside is bounded and never executed; the permissions of a secured graph are those of the node."""
 
 from __future__ import annotations

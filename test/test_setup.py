@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """`make setup`: what it installs and says, and how it names a Python that cannot be used. Nothing is installed here."""
 
 from __future__ import annotations

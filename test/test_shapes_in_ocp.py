@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Boxes, capsules and hulls in the optimal control problem: noisy movements, shapes that are the same, and a moving frame."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The command lines of the documentation work as they stand: from a scene to a report, and a node beside a publisher."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The closed-loop study: operators, measures, and the command."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A hand that is faster than needed is thinned out by its stamps, in node and replay alike; bad poses are still found."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """`solve`: scenes from files, against the reference cases, closed forms and Monte Carlo."""
 
 from __future__ import annotations

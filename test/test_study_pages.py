@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The pages of evaluations and fits: pictures with their intervals, fitted values beside given ones, with escaped text."""
 
 from __future__ import annotations

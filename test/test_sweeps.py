@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Answers over a parameter: without jumps of effort and likelihood, and eta met beside a box however near it is."""
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What commands print fits into a terminal of 80 columns."""
 
 from __future__ import annotations

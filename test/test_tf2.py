@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The real tf2, where it is installed: transforms over DDS that arrive after the messages that need them.
 
 `scripts/tf2_check` compiles tf2 where ROS 2 is not installed, and runs this file.

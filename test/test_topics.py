@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Assignment of topics to inputs, by names and types."""
 
 from __future__ import annotations

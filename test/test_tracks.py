@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Tracks: a class keeps its number, its solution and its share under changing names, and what fails is held."""
 
 from __future__ import annotations

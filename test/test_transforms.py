@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Messages in other frames: refused without tf2, and transformed with it (here with a substitute for tf2)."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """No probability without knowledge: what fails keeps a share, and what is not followed is unknown."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings as recorders, converters and accidents leave them: each is read as a whole, or what is missing is named."""
 
 from __future__ import annotations

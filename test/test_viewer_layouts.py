@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The RViz configuration and the Foxglove layout can be parsed and show topics of the node with their types."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Views of predictions: those of the records and of the node's messages agree, and tracks keep their letters over time."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Which tests are `long` and which are `process`: the two markers by which `make check`, `test` and `test-long` choose.
 
 `LONG` lists the long tests. The mark `process` is derived from the code: a test has it if the test, a fixture of it or a helper

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Random reaches of every kind that the chance constraint knows: noise, eta, moving and uncertain circles, an uncertain start."""
 
 from dataclasses import dataclass, replace

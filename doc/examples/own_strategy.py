@@ -1,4 +1,6 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The program `foc_ros` with a strategy of one's own: the one of `lv` and `hc` that needs less effort; see extend.md."""
 
 import sys

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A small stand-in for a teleoperation stack: a hand that reaches to and fro, a scene, and a consumer of the prediction.
 
 Run it beside the node, `foc_ros node --ros-args -r hand_pose:=MTMR/measured_cp -p guidance.enabled:=true`. With `--seconds 20` it

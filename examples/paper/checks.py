@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The seven checks: the trend of each study of the paper, and whether it appears here; and all numbers as plain values."""
 
 from __future__ import annotations

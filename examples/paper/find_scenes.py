@@ -1,4 +1,6 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Find the two scenes of `studies.py`: the paper gives no coordinates, so they are searched for, with seeds.
 
 python examples/paper/find_scenes.py strategies|classes [--seeds FIRST LAST] [--refine]

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The studies of the paper, redone by the public API of foc_ros: figures, all numbers, and the seven checks as a table.
 
 python examples/paper/paper.py [--output DIR]

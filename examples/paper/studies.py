@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The studies of the paper as foc_ros solves them: scenes, solutions of one homotopy class, and ratios of efforts over eta.
 
 1-2: strategies LV and HC side by side; 3-4: the ratio of their efforts over eta; 5-6: the ratio of the efforts of two homotopy

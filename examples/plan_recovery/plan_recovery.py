@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Tau and lambda of strategy `fixed` from demonstrated movements: those whose plans are nearest to what was measured.
 
 With sensor noise of one deviation, the most likely (tau, lambda) are those of least squares,

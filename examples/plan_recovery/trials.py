@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Trials of the recovery of tau and lambda, as a table: known values, planned movements, a noisy sensor, and what is recovered.
 
 python examples/plan_recovery/trials.py [--trials N]

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Motion capture in CSV tables, as the messages that a tracker and a perception node would have sent."""
 
 from __future__ import annotations

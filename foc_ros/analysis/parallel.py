@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings in parallel by joblib: one function applied to many named items.
 
 Where that happens is joblib's setting: this process unless :func:`open_workers`, or `joblib.parallel_config`, says otherwise.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The recordings of a folder, bags or CSV tables alike, as streams of recorded messages; and tables converted to bags.
 
 Scenes of boxes in space are a table of their own: the boxes, walls and targets among which people reached, one scene for each

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A recording through predictor and guidance in its own time: without ROS, clock or waiting, so that results repeat."""
 
 from __future__ import annotations

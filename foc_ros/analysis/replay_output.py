@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What a replay leaves: predictions and guidance as JSON, an output bag, and a summary of counts and computing times."""
 
 from __future__ import annotations

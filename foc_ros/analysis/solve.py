@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A scene from a file: its solved candidates as plain values, and as a table."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The commands: each signature declares its arguments, each docstring explains them in `--help`.
 
 A command checks its arguments, and reads small files, before it imports what computes: that takes seconds.

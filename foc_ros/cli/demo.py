@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """`demo`: plays the packaged recording over DDS in real time to the real node, which runs in a process of its own.
 
 It shows the predictions, and leaves a bag and a report.

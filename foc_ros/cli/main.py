@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The program `foc_ros`.
 
 Exit codes: 0 done; 2 the input is wrong, and a line on standard error for each error names field, value and bound; 3 no candidate

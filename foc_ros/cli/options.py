@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The program, and the types of its commands' arguments: each reads a text, and refuses what cannot be used.
 
 Nothing that computes is imported here, so that a wrong argument is answered at once.

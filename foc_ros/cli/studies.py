@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The commands that work on many recordings or trials, or on tables of them; see `commands`."""
 
 from __future__ import annotations

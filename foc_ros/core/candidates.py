@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """From candidates to likelihoods: each is solved, its real class is found, duplicates are dropped, the rest is ranked."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Every parameter with its default, bounds, unit and meaning, in one place.
 
 ROS parameters (`foc_ros.ros.parameters`), `config/foc.yaml` and the documentation are derived from these classes. A

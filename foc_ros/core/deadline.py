@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The time by which a prediction has to end. It is checked before every QP, every graph and every path search."""
 
 from __future__ import annotations

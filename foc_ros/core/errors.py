@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The exceptions of the package: for wrong input they name the field, the value and what was expected.
 
 An expected failure (infeasible, unreachable, out of time) is a :class:`foc_ros.core.types.Status`, not an exception.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """How candidates to different goals are compared: by what it takes to be there in the same time.
 
 The effort of a movement falls with the fifth power of its duration, and a farther goal is given more time. By the efforts alone,

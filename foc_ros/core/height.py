@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The third axis: the height over the task plane, predicted by the stochastic control of the plane without obstacles.
 
 The height moves to that of the goal in the time of the candidate, with the plant of the plane's first axis, least effort, and the

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Positions and covariances between the steps of a horizon.
 
 Within a step the position of a plant is the cubic through its positions and velocities at both ends. For the triple integrator,

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The pipeline that node and replay share: messages enter, ordered by stamp; at most one prediction per hand sample leaves.
 
 The pipeline uses the stamps of messages only and reads no clock, so that equal messages give equal predictions, live or replayed.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The prediction: one hand state and one scene enter, one prediction and the classes that it follows leave."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Named parts that can be exchanged: strategies, plants, QP backends and likelihood rules.
 
 A registry knows the names of its parts before it imports them, so that a parameter can be checked without loading the solver.

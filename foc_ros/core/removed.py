@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of earlier versions, and what took their place: for the message that refuses them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The preference for safety: what a class loses where its movement is less safe than wanted.
 
 The weight of a class falls with its cost J as J^-beta, and with each unit by which its safety factor k is below the wanted one as

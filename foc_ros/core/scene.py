@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The scene: goals, and obstacles from several sources, moved on to a stamp; and one reaching scene as the paper poses it."""
 
 from __future__ import annotations

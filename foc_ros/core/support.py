@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Checks of what a user passes to the public API, and the count of what was refused."""
 
 from __future__ import annotations

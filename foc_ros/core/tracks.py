@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The homotopy classes that are followed: one track for each, and one matching of tracks and candidates per prediction.
 
 A class goes on under another name if the name of one of the two is that of the other with obstacles left out: obstacles come into

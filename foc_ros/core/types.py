@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The records that pass between the parts of the package: frozen, with read-only arrays, SI units, in the task plane.
 
 message -> HandSample -> HandState -> Candidates -> Solutions -> Prediction -> message.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """ROS 2 bags, read and written without ROS.
 
 The messages read are counted against the number that the bag states, and its bytes are compared with its checksums, so that none

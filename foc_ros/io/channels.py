@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The channels of stored recordings: a topic with its message type, and the decoding of its messages.
 
 A message type is named `pkg/msg/Type`; older recorders leave `msg` out. What is not in the encoding of ROS 2 is not read, and

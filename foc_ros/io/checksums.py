@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Checksums (CRC-32) of MCAP files: those that the libraries do not write or compare.
 
 The MCAP specification (https://mcap.dev/spec) has a checksum for every chunk, one for the data section, and one for the summary

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The class library as a JSON file of demonstrated homotopy classes; a file is written completely or not at all."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """CSV tables of measured numbers, checked cell by cell: every error names file, row, column, value and bound.
 
 The errors of all rows are raised together, as one error with notes.

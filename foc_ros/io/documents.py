@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """YAML and JSON files as mappings, lists and numbers: no tag is executed, and a key that is given twice is an error."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Candidates and predictions as plain values for JSON, under the same names in all commands."""
 
 from __future__ import annotations

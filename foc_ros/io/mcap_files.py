@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """One MCAP file: its channels, and the messages of those that are needed.
 
 The file is read from begin to end once before its messages are, by the library mcap, which compares the checksums of the chunks.

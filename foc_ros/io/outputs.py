@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Files that a command may write: new files, and files that foc_ros has made before."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A scene file (YAML or JSON) as one reaching problem, checked field by field.
 
 Fields: start, goal or goals [m]; start_velocity [m/s], start_acceleration [m/s^2], start_stddev [m] (default 0); duration_s;

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """One SQLite file of a recording (.db3), in all versions that rosbag2 has written.
 
 A file whose recorder was killed has a log of its last transactions beside it. It is read with them, from a copy: SQLite would

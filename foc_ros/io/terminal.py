@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What a command shows: a progress bar on standard error where that is a terminal, and tables on standard output."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The topic of a recording for every input of the predictor: by choice, by name, or by type if only one topic fits."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What the page offers after a session: its report, a fit to it, and the scores before and after the fit; one at a time.
 
 Fit and scores are commands of foc_ros in processes of their own, of low priority, which can be cancelled.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The messages that the page sends, as declared fields, and their times. None of them names a file, a topic or a parameter."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The pipeline and the guidance of the node, without a node, in two threads of this process."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The recording of a session: its files, and its report.
 
 DIR/2026-01-31_12-00-00/parameters.yaml   what it began with

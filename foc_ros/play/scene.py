@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The scene of the page: obstacles and goals that a user arranges, random ones for the tasks, and the predictions in it."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The web server of the page: its files, a WebSocket, and the last report. It serves one page at a time.
 
 Only files that are named here are served. A request has to name this computer as its host, and a WebSocket has to come from the

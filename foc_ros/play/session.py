@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A session: what the page asks for, the predictor behind it and the tasks, all in one thread."""
 
 from __future__ import annotations

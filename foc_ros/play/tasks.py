@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Tasks: reach the lit goal from the start, without touching an obstacle, in a random sequence; and their scores."""
 
 from __future__ import annotations

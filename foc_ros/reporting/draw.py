@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Pictures for print, by matplotlib: scenes with candidates, the measured hand, likelihoods and speeds.
 
 Every picture shows the same thing in the same way. A path is a solid line that begins at the hand, and is the thicker the more

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Predictions as plain values for pages, small enough for a phone; `page/scene.js` draws them.
 
 Lengths are whole tenths of a millimetre, speeds whole millimetres per second. A list of them holds the first value and then the

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A recording with its prediction as a picture, for the pages about many recordings."""
 
 from __future__ import annotations

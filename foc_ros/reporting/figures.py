@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Whole figures for print: a prediction, a scene, the movements of a recording, a moment of one of them."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A fit as a page: the fitted parameters with their intervals beside the given ones, and their scores."""
 
 from __future__ import annotations

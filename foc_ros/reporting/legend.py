@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The legend of a scene: its candidates with their classes in words, and the signs; below the axes, so that it covers nothing."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Predictions as they come, on a terminal: the scene as lines of text, and a table of candidates."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Predictions as the node has sent them: the inverse of `ros.messages.encode_prediction`."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The report of a recording: a directory with one interactive page, pictures for print, and the numbers."""
 
 from __future__ import annotations

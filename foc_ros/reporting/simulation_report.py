@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The closed-loop study as a page: a figure of the main measures, the table of each operator, and single trials."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Candidates over time: a track has the candidates of one class, and a slot, which gives its letter and colour."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Predictions and the measured hand for display, as plain arrays."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The ROS 2 node: input messages enter; predictions, markers and diagnostics leave.
 
 May import `foc_ros.io` and `foc_ros.core`. No other folder imports rclpy, except the player of `foc_ros.cli.demo`; `messages`,

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Topics of the node: message types and quality of service, the emptying of a subscription's queue, and transforms from tf2."""
 
 from __future__ import annotations

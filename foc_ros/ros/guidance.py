@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Guidance of the node: updates at `guidance.rate_hz` by the steady clock in a thread of their own, and their topics.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the

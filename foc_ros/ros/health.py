@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Health of the node: freshness of the inputs by the clocks, counts, rates and times, and the diagnostics made from them.
 
 Times named `now_s` are of the steady clock [s].

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """From input messages to the pipeline: decoding, counting of refusals, and lifetimes of markers; for node and replay alike."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """An isolated ROS graph on this host, and the node as a process in it."""
 
 from __future__ import annotations

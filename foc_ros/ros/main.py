@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The node's program: one executor, one thread, and an end without an error at any time."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The ROS 2 node: a prediction for every hand pose that is due, and diagnostics once a second.
 
 The pipeline holds the model and the memory and is driven by message stamps, so the node gives the same answers as a replay of

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The parameters of `foc_ros.core.config` on a node: their declaration with ranges, and their changes while it runs.
 
 Parameters that are set together are checked together, and all of them are applied or none.

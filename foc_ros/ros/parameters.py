@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The parameters of `foc_ros.core.config` as a ROS 2 parameter file, which the node and the commands read alike."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Plays a recording over DDS in real time to a node, and passes on what the node publishes."""
 
 from __future__ import annotations

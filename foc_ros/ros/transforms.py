@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Messages on their way into the working frame: one whose transform arrives later than itself is held until then.
 
 A transform is usually published after the measurement that needs it. A message is therefore held until the transform for its

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The thread in which predictions are computed, so that the node answers services and publishes diagnostics meanwhile.
 
 A running computation cannot be stopped from another thread. If its result is no

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The predictors that `evaluate` compares, each with the settings among which cross-validation chooses, and their forecasts.
 
 What a predictor leaves over, such as the unknown share, is spread evenly over the possible answers. Every predictor leaves at

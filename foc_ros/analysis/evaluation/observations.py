@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Observations: what was predicted in a recording, beside what really came, and the questions that are put to a prediction.
 
 A recording is replayed once. How costs become likelihoods can then be tried on the observations without a predictor. Scores and

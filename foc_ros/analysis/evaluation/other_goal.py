@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A goal that nobody announced, tried out: each recording is replayed again with its goal left out of the list.
 
 The share `other` is then right in the second replay and wrong in the first. It is judged by the area under the curve of the

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """All predictors scored on all recordings: the result as plain values for JSON, as sentences, and as tables."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Scores of forecasts and of predicted positions against the truth, with intervals, and what is chosen by held-out scores.
 
 Intervals are bootstrap intervals over recordings (Efron 1979, doi:10.1214/aos/1176344552), because predictions within one are not

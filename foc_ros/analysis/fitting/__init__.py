@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Fitting: recordings of an operator enter; the parameters that explain them best leave.
 
 What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings (Efron 1979,

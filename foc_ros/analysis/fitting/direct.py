@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters that need no prediction: of the estimator, of durations, and the number of candidates.
 
 **Deviations of the Kalman filter** are those under which its innovations are likeliest. A filter with the right deviations leaves

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """All parameters in turn, the given and the fitted ones compared, and the result as plain values and tables.
 
 First come the parameters that need no prediction, then those that need replays, then the rest from one replay.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Parameters that need replays: of the predictor itself, in a race of settings; then those of the likelihood and the covariance.
 
 **The race.** A setting has two scores, means over the recordings. The score of classes is the log-likelihood of the homotopy

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The closed-loop study: simulated operators among obstacles, with and without assistance, and what becomes of them.
 
 Operators know nothing of the predictor's model. May import the core, recordings and the parallel execution of `analysis`.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The simulated operators: the path that they intend, what they see, and the arm with which they move.
 
 The path is of minimum jerk through via points round the obstacles as the operator sees them, or that of a recording of people.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The study: assistance rules in closed loop with operators, in paired trials, and their means with bootstrap intervals.
 
 Each rule is told the scene and the goals, and has the same estimate of the hand and the same limits of force and slew.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Homotopy classes of the paths from the hand to the goals: which classes exist, their names, and an initial guess in each.
 
 Enters: the hand, the goals and the obstacles. Leaves: candidates, the side on which a given path passes an obstacle, and the

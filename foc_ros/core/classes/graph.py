@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The visibility graph: the outlines' vertices, and the straight lines between them that a shortest path may follow.
 
 A shortest path bends at vertices of outlines only, and touches the outline at both ends of each of its lines. Vertices inside

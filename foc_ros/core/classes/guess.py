@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Initial guesses: the positions of a hand that moves along a path in time, smooth and with room to the obstacles."""
 
 from __future__ import annotations

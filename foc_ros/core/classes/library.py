@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Demonstrated paths, which come back as candidates if the scene is the one in which they were recorded.
 
 The search proposes short classes. A demonstrated class may be longer and still be the one that the operator takes (the paper

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Names: which obstacles the names of the classes to a goal contain, and how large the obstacles count.
 
 The candidates of the previous prediction add hysteresis: noise then changes neither the names nor the gaps that are open.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Outlines: convex polygons around rounded polygons, and straight lines that they block.
 
 The outline of a rounded polygon touches it along each of its edges and at some directions between them. Where two shapes leave a

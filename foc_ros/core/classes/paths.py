@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Best-first search over the visibility graph for the shortest path of each homotopy class to one goal.
 
 A state is a node and a signature: how often the path has crossed the ray from the centre of each named obstacle. Two paths

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Rows of obstacles, and the decisions that tell classes apart: which gap each takes in the next row, and where it turns back.
 
 Obstacles whose extents along the direction of movement overlap stand in one row, which the hand passes through one of its gaps;

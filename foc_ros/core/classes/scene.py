@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The scene of a search: the obstacles near the hand and the goals, their graph, and the classes of the paths to each goal."""
 
 from __future__ import annotations

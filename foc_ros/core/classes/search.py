@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The search for homotopy classes: hand, goals and obstacles in; named candidates, each with a timed initial guess, out."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """On which side a path passes an obstacle, and when the paths of several candidates separate, computed from the paths alone.
 
 A path crosses the ray that leaves the centre of an obstacle along -x. The number of these crossings (anticlockwise ones positive)

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """One update of guidance: references, stiffness, agreement, margins, limits and tank, in this order.
 
 The force is the sum of the candidates' forces, weakened by their disagreement, by that of the hand, and by

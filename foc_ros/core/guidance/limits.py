@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Limits of the force: its size and its rate of change, the energy that guidance gives, and the margins of the obstacles.
 
 An energy tank makes a force passive whose parameters change (Franken et al. 2011, doi 10.1109/TRO.2011.2142430). The tank pays

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Paths of guidance: where the hand is on each candidate, how stiff guidance is there, and where help is needed.
 
 The progress along a path follows the hand and never jumps to a distant part. Stiffness comes from the covariance of a candidate:

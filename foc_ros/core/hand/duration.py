@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Duration of the rest of the movement.
 
 The duration of the whole movement is a parameter, or follows Fitts' law from its distance D and the width W of the target in the

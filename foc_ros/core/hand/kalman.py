@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Kalman filter of the hand: stamped positions enter; mean and covariance of position, velocity and acceleration leave.
 
 Per axis the state is x = (position, velocity, acceleration), driven by white jerk of spectral density q^2,

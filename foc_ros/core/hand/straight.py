@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The minimum-jerk movement from the hand straight to a goal, obstacles disregarded: the simplest model of a reach.
 
 The quintic from position, velocity and acceleration to rest after T has a closed form (Mueller, Hehn and D'Andrea 2015,

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Learning: the hand's movements and their predictions enter; what they say about the operator and about the scene leaves.
 
 `learnt` holds all of it: `pace` is how the operator moves and arrives, `dispersion` how large the errors of predictions are, both

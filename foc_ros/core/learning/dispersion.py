@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What is learnt of the errors of predicted positions: factors on the standard deviations, from now to the end of a movement.
 
 The parameters of the covariance are expectations, and devices and people differ by much. The distances between predicted and true

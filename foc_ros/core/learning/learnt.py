@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """All that is learnt while the hand moves, as one record that follows the samples of the hand and the predictions.
 
 Each part learns only where its parameter says `online`: the pace (`duration.adaptation`), the errors (`covariance.adaptation`)

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Movements that are learnt while the hand moves: each one that ends at a goal is a demonstration, with the states of the hand.
 
 A movement begins with its onset. It ends when the hand has been at rest for `AROUND_S`, when it moves on after a rest at a goal,

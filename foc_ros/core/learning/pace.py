@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What is learnt of an operator: how they arrive, and the factor by which they take longer than the duration model expects.
 
 Both arrivals, at rest and passing, with every factor f of `FACTORS` are judged by the positions that they would have led to. At a

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Paths of recordings, pooled with the planned path of a candidate.
 
 The recordings e that pass the next row as a candidate does, displaced so that they begin at the hand, are at a time t from now at

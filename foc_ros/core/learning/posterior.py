@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """A posterior over a grid of values: a prior, what observations add, and the mean. All that is learnt of an operator uses it.
 
 With the prior p and the log-likelihoods l_i of independent observations, the probability of a point g of the grid is

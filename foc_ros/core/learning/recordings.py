@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of a scene as evidence: they change the likelihoods of the candidates, and their paths.
 
 A recording r counts by how near its states come to the position p [m] and the velocity v [m/s] of the hand,

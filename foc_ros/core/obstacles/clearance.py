@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """How far a path stays from obstacles, which obstacles no path comes near, and which the hand passes above or below.
 
 The footprint of an obstacle is a range of progress, the coordinate along the line from the hand to the goal: whatever way leads

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The nearest point of a convex polygon: all that the numeric core knows of the shape of an obstacle.
 
 An obstacle is the set of points within a distance R of a convex polygon with one vertex (circle), two (capsule) or more (box,

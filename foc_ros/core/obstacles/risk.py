@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The chance constraint of an obstacle: moments of its linearised form, and the surrogate that implies it.
 
 C = R^2 - |p - q|^2 <= 0 with R ~ N(mu_R, sigma_R^2) and p - o Gaussian, where q(p) is the point of the polygon with the centre o

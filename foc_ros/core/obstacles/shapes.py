@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of obstacles as a user gives them, checked, and as rows of the table that the core computes with."""
 
 from __future__ import annotations

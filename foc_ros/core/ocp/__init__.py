@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The optimal control problem: a problem and a start enter, a solution with its status leaves.
 
 `problem` holds the data. `margin` says by how much a movement clears the obstacles, `minima` where it is least in time,

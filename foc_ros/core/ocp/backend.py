@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Solvers of quadratic programmes: PIQP through its own interface, any other that qpsolvers knows by its name.
 
 A solver is a function from `DenseQP` to `Answer`. It never raises for a problem that it cannot solve.

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The derivatives of margins with respect to the control, and what they add to the Hessian of the Lagrangian.
 
 Contacts slide along obstacles: by the envelope theorem a margin at its minimum in time has the Hessian g_uu - g_ut g_ut' / g_tt.

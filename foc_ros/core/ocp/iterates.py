@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What the sequential QP knows: where it is, what it knows of the controls there, and the solutions of its QPs."""
 
 from __future__ import annotations

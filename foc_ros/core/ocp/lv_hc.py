@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Strategies `lv` and `hc`: the best point of a curve of tau and lambda.
 
     tau = delta s,  lambda = lambda0 growth^s

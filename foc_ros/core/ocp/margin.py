@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The margin: by how much the mean movement clears an obstacle at a time, beyond what its uncertainty asks for.
 
 With D the signed distance of the mean from the polygon, n the outward normal, P the covariance of the position relative to the

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Where safety factors are least in time: the contacts at which the solver keeps margins, and the factor that a solution reports.
 
 A factor is looked at on the grid of the margins, sampled in brackets around its lowest points there, and measured where found.

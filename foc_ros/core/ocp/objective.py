@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """What the solver minimises: the logarithm of the cost, and what missing safety costs.
 
     loss = ln J(u) + rate (k_wanted - k)+ + floor (-k)+,   J = sum w u^2 + soft goals + fixed part,

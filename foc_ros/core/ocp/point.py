@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """One point of the curves of strategies: problems that are solved together for given k, tau and lambda."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """One reaching problem, from a hand state to a goal among obstacles, with its data over the horizon."""
 
 from __future__ import annotations

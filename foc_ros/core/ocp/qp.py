@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The QPs of one iteration of the solver, for several problems at once, by their duals.
 
 With the gradient c of ln J, a Hessian H = D + B'CB of a diagonal D and a few rows B, rows E of the goal, and contacts with

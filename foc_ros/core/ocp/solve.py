@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The forward optimal control of candidates: a strategy is applied to their problems, and its results evaluated in full."""
 
 from __future__ import annotations

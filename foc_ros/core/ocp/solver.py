@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """One sequential QP for all strategies, and for all candidates of a prediction at once.
 
 For each problem it finds a control u and a safety factor k with the least loss (`objective`)

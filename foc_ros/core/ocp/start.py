@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Where the search for a solution begins: at a guess of the path, or at an earlier solution, shifted in time."""
 
 from __future__ import annotations

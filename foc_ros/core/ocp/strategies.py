@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Strategies: curves of (k, tau, lambda) and the rule that chooses a point on them.
 
 `optimal` minimises the effort at a safety factor k itself, and gives way where k is not worth its effort. `fixed` is one point of

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The predictive covariance: how uncertain a predicted movement is besides the motor noise of its own control.
 
 None of these parts belongs to the chance constraint: the operator knows the own hand and intention better than we do, and plans

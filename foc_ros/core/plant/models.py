@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Plant models: what the predictor has to know of the plant that the parameter `foc.plant` names.
 
 The estimator follows position, velocity and acceleration of the hand, whatever the plant. A plant model takes the part of this

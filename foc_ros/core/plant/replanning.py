@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Errors under replanning: how the operator corrects an error on the way, and what a displaced end changes in the plan.
 
 The operator sees the hand and plans anew from where it is: whatever the true state, the plan ends at the goal. The control

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The response of the position to the control at any time of the horizon, between the steps too.
 
 Within a step the position of a plant is the cubic through its positions and velocities at both ends. For the triple integrator,

@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: 2026 the foc_ros developers
+// SPDX-License-Identifier: Apache-2.0
 // Arranging the scene: obstacles and goals are dragged, added, resized, turned and removed, by pointer or keys.
 const STEP = 0.005;
 const TURN = Math.PI / 12;

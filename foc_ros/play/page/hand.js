@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: 2026 the foc_ros developers
+// SPDX-License-Identifier: Apache-2.0
 // The hand: pointer, keys and gamepad move a target, which the hand follows no faster than a hand can move.
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 // Speed at full deflection of keys or stick [m/s], time constant at which it builds up [s], and the part of a stick that is no deflection.

@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: 2026 the foc_ros developers
+// SPDX-License-Identifier: Apache-2.0
 // The page: one connection to the server, one frame after the other, and the controls.
 import { Arranging } from './arranging.js';
 import { Hand } from './hand.js';

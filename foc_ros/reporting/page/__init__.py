@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """HTML pages from the Jinja templates of this folder. Each page is one file that needs no network.
 
 Text is escaped by the templates. HTML that a function below returns may be joined and passed to `render_page` as a body.

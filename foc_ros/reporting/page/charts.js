@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: 2026 the foc_ros developers
+// SPDX-License-Identifier: Apache-2.0
 // A chart over time, drawn as SVG.
 class Chart {
   // height [px]; label: of the second axis; picked: called with a time [s] that was clicked on.

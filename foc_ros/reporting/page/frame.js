@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: 2026 the foc_ros developers
+// SPDX-License-Identifier: Apache-2.0
 'use strict';
 // Colours of the page by name, which are read again after a switch between dark and light.
 let inks = {};

@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: 2026 the foc_ros developers
+// SPDX-License-Identifier: Apache-2.0
 const byId = (name) => document.getElementById(name);
 const data = readData('report-data');
 const SPEED = data.unit.speed;

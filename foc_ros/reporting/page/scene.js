@@ -1,3 +1,5 @@
+// SPDX-FileCopyrightText: 2026 the foc_ros developers
+// SPDX-License-Identifier: Apache-2.0
 // The drawing of a scene on a canvas, for reports and for `play`. One line style means one thing: a solid line is a path, dotted one
 // that is not known to avoid the obstacles as surely as wanted, dashed a total uncertainty; a pale wide line is a ghost, which is no proper prediction.
 'use strict';

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Decoding of markers (visualization_msgs/MarkerArray), of a planning scene (moveit_msgs/CollisionObject) and of detections.
 
 Each becomes obstacles: rounded polygons in the task plane with their heights. A message is read by the names of its fields, so

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Decoding of a sensor_msgs/PointCloud2 as a table of obstacles: one row each, with x, y, z, radius and optional columns."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Decoding of hand poses and goals. Numbers are checked here, once; the code behind relies on these checks."""
 
 from __future__ import annotations

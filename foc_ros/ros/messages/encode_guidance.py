@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Encoding of guidance: wrench, reference, stiffness, a blended command and markers, in the task plane only."""
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Encoding of the predictor's inputs, as a tracker and a perception node publish them; positions (3,) in metres."""
 
 from __future__ import annotations

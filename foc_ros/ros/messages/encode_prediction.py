@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Encoding of a prediction: a cloud with the whole answer, a table of likelihoods, the most likely path, and markers.
 
 The cloud, the table and the path hold the candidates with a likelihood only: solved and compromised ones. A candidate's index is

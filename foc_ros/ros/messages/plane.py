@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Points in space and in the task plane, which is named by its two axes of the working frame: 'xy', 'xz' or 'yz'.
 
 The height of a point is its coordinate along the third axis. Left and right are those of a drawing with the first axis to the

@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """The order of the candidates in every output, their cost ratios, their names in words, and their curves."""
 
 from __future__ import annotations

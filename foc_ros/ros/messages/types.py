@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 """Creation of messages of two libraries with one call: rclpy's (the node) and rosbags' (bags without ROS).
 
 Neither library checks the values of fields by default, and both serialise the memory as it is: an integer in a float field
