@@ -51,7 +51,8 @@ def allowed(kind: str, action: str) -> set[str]:
 
 
 def test_the_permissions_are_those_that_the_node_needs(ros: ros_helpers.Graph) -> None:
-    """The node needs all of them, and no others."""
+    """The node needs all of them, and no others; the topic of a goal from its first prediction on."""
+    from foc_ros.ros.endpoints import MOST_GOAL_TOPICS
     from foc_ros.ros.node import FocNode
 
     node = ros.add(FocNode(context=ros.context))
@@ -59,7 +60,8 @@ def test_the_permissions_are_those_that_the_node_needs(ros: ros_helpers.Graph) -
     def names(found: list[tuple[str, list[str]]]) -> set[str]:
         return {name.replace('/foc/', '~/') if name.startswith('/foc/') else name.removeprefix('/') for name, _ in found}
 
-    published = names(node.get_publisher_names_and_types_by_node('foc', '/'))
+    goals = {f'~/goal_likelihood/goal{row}' for row in range(MOST_GOAL_TOPICS)}
+    published = names(node.get_publisher_names_and_types_by_node('foc', '/')) | goals
     subscribed = names(node.get_subscriber_names_and_types_by_node('foc', '/'))
     services = names(node.get_service_names_and_types_by_node('foc', '/'))
     absolute = {'rosout', 'parameter_events', 'diagnostics', 'clock'}
