@@ -72,8 +72,8 @@ class Prediction(types.Prediction):
         Returns
         -------
         dict
-            `stamp_ns`, `most_likely`, `unknown`, `goals` with `name`, `position` and `likelihood`, and `candidates` with the keys
-            of ``foc_ros solve --json``.
+            `stamp_ns`, `most_likely`, `unknown`, `other`, `goals` with `name`, `position` and `likelihood`, and `candidates` with
+            the keys of ``foc_ros solve --json``.
         """
         from foc_ros.io.json_output import encode_prediction
 

@@ -27,7 +27,7 @@ JUMPS = {
     'case0-lv': 'k falls for a while along the penalty path, and effort rises by 4 %',
     'case0-hc': 'k falls for a while along the penalty path, and effort rises by 22 %',
 }
-"""Known exceptions among the reference cases; doc/accuracy.md explains them."""
+"""Known exceptions among the reference cases."""
 
 
 def expect_failure(request: pytest.FixtureRequest, known: dict[str, str]) -> None:

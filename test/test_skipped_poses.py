@@ -135,7 +135,7 @@ def estimate(step_ms: int, seed: int) -> tuple[float, float]:
 
 
 def test_a_hand_that_is_thinned_out_is_estimated_nearly_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of 1 mm of noise, 0.5 mm remain of one pose in 4 ms, and 0.3 mm of four; of velocity 21 and 15 mm/s (doc/speed.md)."""
+    """Of 1 mm of noise, 0.5 mm remain of one pose in 4 ms, and 0.3 mm of four; of velocity 21 and 15 mm/s."""
     thinned = np.mean([estimate(4, seed) for seed in range(4)], axis=0)
     monkeypatch.setattr(Intake, 'is_skipped', lambda *_: False)
     whole = np.mean([estimate(1, seed) for seed in range(4)], axis=0)
