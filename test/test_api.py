@@ -228,6 +228,7 @@ def test_predictions_and_solutions_are_drawn():
     pytest.importorskip('matplotlib', reason='matplotlib is not installed')
     from matplotlib import pyplot as plt
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
     given = Figure().subplots()
     prediction = predictor_of_one_cup().update(0.0, (0.0, 0.0))
@@ -236,9 +237,9 @@ def test_predictions_and_solutions_are_drawn():
     for drawn in (foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST), prediction):
         assert drawn.plot().get_xlabel() == 'x [m]'
     solution = foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST)
-    (legend,) = filter(None, (each.get_legend() for each in solution.plot().figure.axes))
-    words = legend.get_texts()[0].get_text()
-    assert solution.label in words and words.endswith('right of cup' if '-' in solution.label else 'left of cup')
+    legends = solution.plot().figure.findobj(Legend)
+    words = [each.get_text() for legend in legends for each in legend.get_texts()]
+    assert any(each.endswith('right of cup' if '-' in solution.label else 'left of cup') for each in words)
     foc_ros.plot_candidates(foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=FAST))
     with pytest.raises(foc_ros.InputError, match='candidates'):
         foc_ros.plot_candidates(prediction.candidates)

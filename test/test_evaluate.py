@@ -175,7 +175,7 @@ def test_a_label_of_another_class_is_reported(tables: Path, capsys: pytest.Captu
 def test_the_report_is_one_page(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(tables, '--report', str(tmp_path / 'report')) == 0
     page = (tmp_path / 'report' / 'evaluation.html').read_text('utf-8')
-    assert page.count('<img') == 4 and 'constant velocity' in page
+    assert page.count('<img') == 5 and 'constant velocity' in page  # one of them is a recording with its prediction
     out = capsys.readouterr().out
     assert out.endswith(f'\nreport: file://{tmp_path}/report/evaluation.html\n')
     assert 'log-likelihood above uniform [nat]' in out and 'foc, held out' in out
