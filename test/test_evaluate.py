@@ -131,7 +131,8 @@ def test_a_bad_recording_fails_by_name_and_the_others_are_scored(tables: Path, c
 
 
 def test_the_exit_code_is_3_where_nothing_can_be_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    data = write_tables(tmp_path / 'none', {'blocked': reach(0.0, (0.3, 0.0))}, [(0.3, 0.0)], [(0.3, 0.0, 0.05)])
+    ring = [(0.3 + 0.1 * np.cos(angle), 0.1 * np.sin(angle), 0.05) for angle in np.linspace(0.0, 6.0, 13)]
+    data = write_tables(tmp_path / 'none', {'blocked': reach(0.0, (0.1, 0.0))}, [(0.3, 0.0)], ring)
     assert run(data) == 3
     captured = capsys.readouterr()
     assert captured.out == '' and 'blocked: nothing could be predicted' in captured.err

@@ -67,7 +67,7 @@ def test_the_example_runs_and_makes_a_figure(example: Path, pyplot: object) -> N
 
 @pytest.mark.parametrize('example', EXAMPLES, ids=lambda example: example.stem)
 def test_the_example_is_short(example: Path) -> None:
-    assert 20 <= len(example.read_text('utf-8').splitlines()) <= 80
+    assert 20 <= len(example.read_text('utf-8').splitlines()) <= 82  # with the licence
 
 
 @pytest.mark.timeout(EXAMPLE_S)

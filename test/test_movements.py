@@ -62,7 +62,7 @@ def test_a_repeated_way_becomes_more_likely() -> None:
     ways = [reach(ABOVE)] * 4
     first, last = [], []
     for learning_ in ('none', 'online'):
-        pipeline = Pipeline(CONFIG.with_values({'experience.learning': learning_}))
+        pipeline = Pipeline(CONFIG.with_values({'experience.learning': learning_, 'likelihood.other_goal': 0.0}))
         predicted = follow(pipeline, *ways, is_predicting=True)
         of_each = len(predicted) // len(ways)
         first.append(likelihood_above(predicted[0]))

@@ -165,7 +165,7 @@ def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, cas
         )
         labels = [dimension.label for dimension in both['likelihoods'].layout.dim]
         assert [dimension.label for dimension in likelihood.layout.dim] == labels
-        assert np.allclose(likelihood.data, both['likelihoods'].data, rtol=1e-9, atol=1e-9)
+        assert np.allclose(likelihood.data, both['likelihoods'].data, rtol=1e-9, atol=1e-9, equal_nan=True)
         live, computed = table(answer), table(both['prediction'])
         assert live.dtype == computed.dtype
         for name in live.dtype.names or ():

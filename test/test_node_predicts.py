@@ -51,8 +51,11 @@ def test_every_due_hand_pose_gets_the_prediction_of_the_pipeline(ros: Graph) -> 
             expected.append(encode_outputs(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES))
     assert len(expected) == 10
     assert any(message['prediction'].width for message in expected)
-    for name in ('prediction', 'likelihoods', 'path', 'markers'):
+    for name in ('prediction', 'path', 'markers'):
         assert bench.wait_for(name, 10) == [sent(message[name]) for message in expected]
+    for received, message in zip(bench.wait_for('likelihoods', 10), expected, strict=True):
+        assert received.layout == sent(message['likelihoods']).layout
+        assert np.array_equal(received.data, message['likelihoods'].data, equal_nan=True)  # of shares without a candidate
 
 
 def test_every_output_carries_the_stamp_and_frame_of_the_hand(ros: Graph) -> None:

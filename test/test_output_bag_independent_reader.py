@@ -78,9 +78,10 @@ def test_rows_of_the_prediction_are_read_by_field_name(decoded: dict[str, list[o
         assert cloud.header.frame_id == 'world'
         table = rows(cloud)
         names = 'x y z t vx vy vz xx xy xz yy yz zz candidate likelihood compromised'
-        assert ' '.join(table.dtype.names) == f'{names} motor_xx motor_xy motor_xz motor_yy motor_yz motor_zz goal way'
+        assert ' '.join(table.dtype.names) == f'{names} motor_xx motor_xy motor_xz motor_yy motor_yz motor_zz goal way status'
         assert len(table) == (steps + 1) * len(prediction.candidates_with_likelihood) and np.isfinite(table['x']).all()
-        labels = likelihoods.layout.dim[0].label.split(';')
+        *labels, rest = likelihoods.layout.dim[0].label.split(';')
+        assert rest == 'other'
         assert labels[0] == prediction.most_likely and sorted(labels) == sorted(
             each.candidate.label for each in prediction.solved_candidates
         )

@@ -152,9 +152,11 @@ def test_the_duration_sensitivity_is_the_difference_between_plans_of_other_durat
 
 def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods() -> None:
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
-    exact = replace_values(Config(), {'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0})
+    announced = replace_values(Config(), {'likelihood.other_goal': 0.0})
+    exact = replace_values(announced, {'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0})
     sure = predict(exact, HAND, *scene, NO_TRACKS)[0]
-    unsure = predict(replace_values(Config(), {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3}), HAND, *scene, NO_TRACKS)[0]
+    wide = replace_values(announced, {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3})
+    unsure = predict(wide, HAND, *scene, NO_TRACKS)[0]
     assert len(sure.solved_candidates) == len(unsure.solved_candidates) >= 3
     for before, after in zip(sure.candidates, unsure.candidates, strict=True):
         assert_array_equal(before.solution.mean, after.solution.mean)

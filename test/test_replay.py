@@ -240,7 +240,7 @@ def test_the_output_bag_holds_inputs_and_predictions(tmp_path: Path, bag: Path, 
     with BagReader(bag) as before, BagReader(tmp_path / 'out') as after:
         inputs = [(item.topic, item.log_ns, bytes(item.raw)) for item in before]
         assert [(item.topic, item.log_ns, bytes(item.raw)) for item in after] == inputs
-        assert after.message_count == len(inputs) + 4 * len(reach(FEW))
+        assert after.message_count == len(inputs) + 5 * len(reach(FEW))
     capsys.readouterr()
     assert without_times(answer_of(capsys, tmp_path / 'out')) == without_times(answer_of(capsys, bag))
 

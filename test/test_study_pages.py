@@ -105,7 +105,7 @@ def test_a_recording_is_pictured_with_its_prediction_and_one_that_cannot_be_read
 
 
 def test_a_page_names_what_made_it_and_no_path() -> None:
-    config = Config().with_values({'foc.eta': 0.8, 'homotopy.library': '/home/someone/mine.json'})
+    config = Config().with_values({'foc.eta': 0.8, 'homotopy.library': '/elsewhere/mine.json'})
     page = render_page('x', '<p>body</p>', (), config)
     footer = page.partition('<footer')[2].partition('</footer>')[0]
     assert f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; ' in footer
