@@ -230,6 +230,30 @@ def test_units_that_cannot_be_right_are_named(
     assert capsys.readouterr().err == table_words
 
 
+@pytest.mark.parametrize(('factor', 'unit', 'far_m'), [(1e3, 'mm', 320), (1e2, 'cm', 31.7)])
+def test_scenes_that_cannot_be_in_metres_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], factor: float, unit: str, far_m: float
+) -> None:
+    folder = write_folder(tmp_path / 'tables')
+    goals, obstacles = folder / 'goals.csv', folder / 'obstacles.csv'
+    goals.write_text(f'x_m,y_m\n{0.32 * factor},0\n{0.5 * factor},{0.1 * factor}\n')
+    obstacles.write_text(f'x_m,y_m,radius_m\n{0.32 * factor},0,{0.01 * factor}\n')
+    words = f'of recording a seem to be in {unit}: the nearest is {far_m} m from the movement of the hand'
+    single = [str(folder / 'recordings.csv'), '--obstacles', str(obstacles), '--goals', str(goals)]
+    for arguments in ([str(folder)], single):
+        assert main(['convert', *arguments, '--output', str(tmp_path / f'bags{len(arguments)}')]) == 0
+        told = [f'foc_ros convert: {arguments[0]}: the {kind} {words}' for kind in ('goals', 'obstacles')]
+        assert capsys.readouterr().err.splitlines() == told
+
+
+def test_a_scene_beyond_the_reach_of_its_recording_is_no_doubt(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = write_folder(tmp_path / 'tables')
+    (folder / 'goals.csv').write_text('x_m,y_m\n8,0\n')
+    (folder / 'obstacles.csv').write_text('x_m,y_m,radius_m\n300,0,1\n4,1,0.1\n')  # one is near
+    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
+    assert not capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ('units', 'words'),
     [

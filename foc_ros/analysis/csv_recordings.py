@@ -35,6 +35,10 @@ SHORTEST_STEP_S, LONGEST_STEP_S, FASTEST = 1e-4, 1.0, 20.0
 """Median times between two poses that a tracker has [s], and a speed that no hand has [m/s]; beyond them, a unit is wrong."""
 USUAL_STEP_S, USUAL_SPEED = 0.01, 0.5
 """Step [s] and speed [m/s] with which units of time and length are compared."""
+FARTHEST_SCENE_M, FARTHEST_EXTENTS = 10.0, 20.0
+"""Distance of the nearest goal or obstacle from a movement [m], and in its own extents; beyond both, a unit is wrong."""
+SHORTEST_EXTENT_M = 0.1
+"""Extent of a movement [m] for which a shorter one counts where a distance is compared with it."""
 FEWEST_STEPS = 2
 """Steps from which the unit of a recording can be told."""
 TIME_UNITS = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
@@ -105,10 +109,35 @@ def warn_of_doubts(file: Path, found: Mapping[str, Sequence[Row]]) -> None:
         doubt, reason = _find_doubt(np.array([[row.parse_number(column) for column in columns] for row in rows]))
         if reason:
             doubts.setdefault(doubt, []).append((name, reason))
-    for (column, words), doubted in doubts.items():
+    _warn_once_for_each(file, doubts)
+
+
+def warn_of_far_scenes(file: Path, recorded: Iterable[tuple[Movement, RecordedScene]]) -> None:
+    """Warn of recordings whose goals or obstacles are all so far from the hand that they cannot be in m; once for each kind.
+
+    Positions that are in another unit themselves give no second warning here: their movement is larger by the same factor.
+    """
+    doubts: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for movement, scene in recorded:
+        low, high = movement.positions.min(axis=0), movement.positions.max(axis=0)
+        extent = max(float(np.linalg.norm(high - low)), SHORTEST_EXTENT_M)
+        for kind, rows in (('goals', scene.goals), ('obstacles', scene.obstacles)):
+            places = np.array([row[:3] for row in (() if rows is None else rows)]).reshape(-1, 3)
+            gaps = np.linalg.norm(places - np.clip(places, low, high), axis=1)
+            gap = float(gaps.min(initial=math.inf))
+            if max(FARTHEST_SCENE_M, FARTHEST_EXTENTS * extent) < gap < math.inf:
+                words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, gap, extent)}'
+                reason = f'the nearest is {gap:.3g} m from the movement of the hand'
+                doubts.setdefault((f'the {kind}', words), []).append((movement.name, reason))
+    _warn_once_for_each(file, doubts)
+
+
+def _warn_once_for_each(file: Path, doubts: Mapping[tuple[str, str], Sequence[tuple[str, str]]]) -> None:
+    """Warn once of each doubt: what is doubted and what is wrong with it, with the names and reasons of recordings."""
+    for (what, words), doubted in doubts.items():
         name, reason = doubted[0]
         others = f' and {len(doubted) - 1} others' if doubted[1:] else ''
-        warn(f'{file}: {column} of recording {name}{others} {words}: {reason}')
+        warn(f'{file}: {what} of recording {name}{others} {words}: {reason}')
 
 
 def _find_doubt(rows: Array) -> tuple[tuple[str, str], str]:

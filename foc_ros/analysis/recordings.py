@@ -29,6 +29,7 @@ from foc_ros.analysis.csv_recordings import (
     read_scenes,
     recorded_messages,
     warn_of_doubts,
+    warn_of_far_scenes,
     write_movement,
 )
 from foc_ros.core.errors import FocError, InputError, RecordingError, collect, collect_all, join_errors
@@ -127,7 +128,9 @@ def read_tables(data: Path) -> dict[str, TableRecording]:
     failures = [each for each in movements.values() if isinstance(each, RecordingError)]
     if scenes is None or len(failures) == len(movements):
         raise join_errors([*errors, *failures])
-    return {name: TableRecording(name, movement, scenes.find(name)) for name, movement in movements.items()}
+    found = {name: TableRecording(name, movement, scenes.find(name)) for name, movement in movements.items()}
+    warn_of_far_scenes(data, [(each.movement, each.scene) for each in found.values() if isinstance(each.movement, Movement)])
+    return found
 
 
 def _parse_movement(name: str, rows: Iterable[Row]) -> Movement | RecordingError:
@@ -246,7 +249,9 @@ def _read(table: Path, obstacles: Path | None, goals: Path | None) -> tuple[dict
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
     reading = [(read_movements, table), (read_scenes, obstacles, goals)]
     movements, scenes = collect_all(lambda read, *files: read(*files), reading)
-    return {each.name: scenes.find(each.name) for each in movements}, movements
+    found = {each.name: scenes.find(each.name) for each in movements}
+    warn_of_far_scenes(table, [(each, found[each.name]) for each in movements])
+    return found, movements
 
 
 def _name_bags(movements: list[Movement]) -> dict[str, Movement]:
