@@ -164,12 +164,12 @@ def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it() -> No
 def test_an_obstacle_that_is_passed_above_or_has_moved_away_makes_no_ghost() -> None:
     made = build_snapshot(prediction(START_NS, NOWHERE))
     through = made.candidates[2]
-    assert made.find_entered(through) == 'post'
-    assert replace(made, cleared=('post',)).find_entered(through) == ''
+    assert made.find_entered(through)[0] == 'post'
+    assert replace(made, cleared=('post',)).find_entered(through)[0] == ''
     away = replace(made.obstacles, velocity=np.array([[0.0, 0.0], [0.0, 0.3]]))
-    assert replace(made, obstacles=away).find_entered(through) == ''
+    assert replace(made, obstacles=away).find_entered(through)[0] == ''
     around_hand = make_obstacles([[0.0, 0.0]], 0.02, ids=('glove',))
-    assert replace(made, obstacles=around_hand).find_entered(through) == ''
+    assert replace(made, obstacles=around_hand).find_entered(through)[0] == ''
 
 
 def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse_widens_the_axes() -> None:

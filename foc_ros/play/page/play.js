@@ -280,15 +280,17 @@ function moveHand(time, sinceMs) {
   send({ type: 'hand', t: time, x: hand.position[0], y: hand.position[1], event });
 }
 
+function sendScene() {
+  if (isSceneChanged) send({ type: 'scene', ...arranging.scene });
+  isSceneChanged = false;
+}
+
 let shownMs = 0;
 function frame(time) {
   requestAnimationFrame(frame);
   if (!settings) return;
   moveHand(time, FRAME_MS);
-  if (isSceneChanged) {
-    send({ type: 'scene', ...arranging.scene });
-    isSceneChanged = false;
-  }
+  sendScene();
   if (time - predictedMs > OLD_MS) view.candidates = [];
   [view.scene, view.selected] = [arranging.scene, arranging.selected];
   draw(time);
@@ -316,6 +318,7 @@ byId('guidance').addEventListener('change', ({ target }) => send({ type: 'guidan
 byId('parameters').addEventListener('change', ({ target }) => send({ type: 'parameters', name: target.value }));
 byId('record').addEventListener('click', ({ target }) => send({ type: 'record', on: target.dataset.on !== 'true' }));
 byId('begin').addEventListener('click', () => {
+  sendScene(); // the server takes none during tasks
   send(task.phase !== 'none' ? { type: 'stop' } : {
     type: 'tasks', trials: Number(byId('trials').value), seed: Number(byId('seed').value), assistance: byId('assistance').value,
     blinded: byId('blinded').checked, shuffled: byId('shuffled').checked,

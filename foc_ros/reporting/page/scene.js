@@ -129,15 +129,16 @@ class Scene {
     if (name) this.text(name, [x, y], ink('--ink'), { size: 11 });
   }
 
-  // Draws a candidate: slot, likelihood, path [m], motor and total: ellipses [x, y, half axes, angle]; ghost: why it is none, or ''.
-  candidate({ slot, likelihood, path, motor, total, compromised, ghost, text }, alpha = 1, place = 0.6) {
+  // Draws a candidate: slot, likelihood, path [m], motor and total: ellipses [x, y, half axes, angle]; ghost: why it is none, or '', and
+  // ghost_at: the share of the path at which that is. place: share of the path for its letter or words; up: of these [pixels].
+  candidate({ slot, likelihood, path, motor, total, compromised, ghost, ghost_at: ghostAt, text }, alpha = 1, place = 0.6, up = 10) {
     const [colour, width] = [colourOf(slot), ghost ? 6 : 1.5 + 4.5 * (likelihood ?? 0)];
-    const middle = path[Math.floor((path.length - 1) * place)];
+    const middle = path[Math.round((path.length - 1) * (ghostAt ?? place))];
     this.paths.push({ points: path, text, width, kind: ghost ? 'ghost' : 'path' });
     if (ghost) {
       this.trace(path);
       this.stroke(ink('--soft'), width, [], 0.25 * alpha);
-      this.text(ghost, middle, ink('--soft'), { size: 11, up: 10, halo: true });
+      this.text(ghost, middle, ink('--soft'), { size: 11, up, halo: true });
       return;
     }
     for (const [x, y, a, b, angle] of motor) {
@@ -161,7 +162,7 @@ class Scene {
 
   // Draws candidates, the most likely last, and their letters at different places; alphaOf: of each.
   candidates(list, alphaOf = () => 1) {
-    list.filter(({ ghost }) => ghost).forEach((each, row) => this.candidate(each, alphaOf(each), 0.5 + 0.15 * (row % 3)));
+    list.filter(({ ghost }) => ghost).forEach((each, row) => this.candidate(each, alphaOf(each), 0.5 + 0.15 * (row % 3), 10 + 13 * (row % 3)));
     [...list].reverse().filter(({ ghost }) => !ghost).forEach((each) => this.candidate(each, alphaOf(each), 0.45 + 0.12 * (list.indexOf(each) % 3)));
   }
 
