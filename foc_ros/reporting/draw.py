@@ -189,16 +189,22 @@ def draw_candidates(axes: Any, snapshot: Snapshot, slots: Mapping[str, int]) -> 
                 _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
             axes.plot(*each.curve.T, zorder=3, label=describe_in_legend(each, letter), **style)
             draw_tag(axes, each.path[int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))], letter, style['color'])
+    entered: set[str] = set()
     for number, (curve, label, reason, place) in enumerate(ghosts):
-        _draw_ghost(axes, curve, label, reason, 0.5 + 0.15 * (number % 3) if place is None else place)
+        words = '' if reason in entered else reason  # those of one obstacle would cover each other
+        _draw_ghost(axes, curve, label, words, 0.5 + 0.15 * (number % 3) if place is None else place)
+        if place is not None:
+            entered.add(reason)
 
 
-def _draw_ghost(axes: Any, curve: Array, label: str, reason: str, place: float) -> None:
-    """Draw a path that is no proper prediction; place: share of it at which the reason stands."""
+def _draw_ghost(axes: Any, curve: Array, label: str, words: str, place: float) -> None:
+    """Draw a path that is no proper prediction; words: beside it, at a share of it; may be empty."""
     axes.plot(*curve.T, color=GHOST_COLOUR, linewidth=4.0, alpha=0.3, solid_capstyle='round', zorder=2, label=label)
+    if not words:
+        return
     look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
     look['bbox'] = {'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0}
-    axes.annotate(reason, curve[round(place * (len(curve) - 1))], annotation_clip=True, **look)
+    axes.annotate(words, curve[round(place * (len(curve) - 1))], annotation_clip=True, **look)
 
 
 def _draw_ellipses(axes: Any, candidate: CandidateView, colour: str, is_total: bool) -> None:

@@ -117,8 +117,8 @@ class _ReportData:
 def encode_candidate(snapshot: Snapshot, candidate: CandidateView, is_most_likely: bool) -> dict[str, Any]:
     """Return one candidate of a snapshot.
 
-    ghost: why it is no proper prediction, or ''; ghost_at: share of the path at which that is, or None; t and v: at some of the
-    steps; motor: ellipses of the motor noise, none of a candidate that is less than LIKELY; total: of the total uncertainty of the
+    ghost: why it is no proper prediction, or ''; ghost_at: share of the path at which that is, or None; t and v: at some of
+    the steps; motor: ellipses of the motor noise, none of a candidate that is less than LIKELY; total: of the uncertainty of the
     most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard deviation, and the angle of
     the greater one [degrees].
     """
