@@ -242,7 +242,7 @@ function showWays() {
   const others = known.filter((each) => each.likelihood < NOTED);
   const rest = others.reduce((sum, each) => sum + each.likelihood, 0);
   if (others.length) rows.push({ slot: null, likelihood: rest, words: `${others.length} more, each below 1 %`, ghost: '' });
-  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
+  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal than those shown']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
   const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost }) => [slot, Math.round(100 * likelihood), words, ghost]));
   if (key === shownWays) return;
   shownWays = key;
