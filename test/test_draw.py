@@ -156,20 +156,28 @@ def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it() -> No
     written = {text.get_text(): text.xy for text in axes.texts if hasattr(text, 'xy')}
     for words, ghost in (('leads through obstacle post', ghosts[1]), ('eta unreachable', ghosts[0])):
         assert np.min(np.linalg.norm(ghost.get_xydata() - written[words], axis=1)) < 1e-9
+    post = made.obstacles.ids.index('post')
+    depth = np.linalg.norm(written['leads through obstacle post'] - made.obstacles.centre[post])
+    assert depth < made.obstacles.radius[post]  # the words stand where the path is in the obstacle
     lost = made.candidates[-1]
     assert f'- % {lost.description}; {lost.reason}' in legend_of(axes) and lost.status.remedy in legend_of(axes)
     assert 'goal1: left of 1, right of post; leads through obstacle post' in legend_of(axes)
 
 
+def test_goals_are_called_by_their_names() -> None:
+    words = {text.get_text() for text in axes_of(prediction(START_NS, NOWHERE).with_goal_names(('bowl', 'plate'))).texts}
+    assert {'bowl', 'plate'} <= words and not words & {'goal0', 'goal1'}
+
+
 def test_an_obstacle_that_is_passed_above_or_has_moved_away_makes_no_ghost() -> None:
     made = build_snapshot(prediction(START_NS, NOWHERE))
     through = made.candidates[2]
-    assert made.find_entered(through) == 'post'
-    assert replace(made, cleared=('post',)).find_entered(through) == ''
+    assert made.find_entered(through)[0] == 'post'
+    assert replace(made, cleared=('post',)).find_entered(through)[0] == ''
     away = replace(made.obstacles, velocity=np.array([[0.0, 0.0], [0.0, 0.3]]))
-    assert replace(made, obstacles=away).find_entered(through) == ''
+    assert replace(made, obstacles=away).find_entered(through)[0] == ''
     around_hand = make_obstacles([[0.0, 0.0]], 0.02, ids=('glove',))
-    assert replace(made, obstacles=around_hand).find_entered(through) == ''
+    assert replace(made, obstacles=around_hand).find_entered(through)[0] == ''
 
 
 def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse_widens_the_axes() -> None:

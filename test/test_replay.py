@@ -282,8 +282,8 @@ def test_a_wrong_remap_is_said(bag: Path, capsys: pytest.CaptureFixture[str], re
 def test_the_summary_names_what_is_compromised_or_not_solved_with_its_remedy() -> None:
     summary = Summary(samples=3, predictions=3, solved=2, compromised=4, estimated=7, seconds=[0.01])
     shown = facts(summary.answer({'candidate_deadline': 5, 'hand_late': 1}, 1.0))
-    assert shown['candidates compromised'] == f'compromised ({Status.COMPROMISED.remedy}) 4'
-    assert shown['candidates estimated'] == 'unlikely or late 7'
+    assert shown['candidates compromised'] == f'4 ({Status.COMPROMISED.remedy})'
+    assert shown['candidates estimated'] == '7 (unlikely or late)'
     assert shown['candidates not solved'] == f'deadline ({Status.DEADLINE.remedy}) 5'
     assert facts(Summary().answer({}, 0.0))['candidates compromised'] == 'none'
 

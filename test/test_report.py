@@ -163,8 +163,8 @@ def test_a_busy_computer_is_told_once_with_what_to_change_and_an_estimate_is_not
     calm = [end_with(each, Status.SOLVED, Status.ESTIMATED, Status.COMPROMISED) for each in made]
     warnings, facts = told([end_with(calm[0], Status.DEADLINE), *calm[1:]])
     assert warnings == [] and describe_late(calm) == ''
-    shown = f'as surely as wanted: {count - 1}, less surely: {count}, as far as estimated: {count + 1}'
-    assert facts['paths with at least 1 %'] == f'{3 * count}; they avoid the obstacles {shown}'
+    shown = f'{count - 1} avoid the obstacles as surely as wanted, {count} less surely; {count + 1} are estimates'
+    assert facts['paths with at least 1 %'] == f'{3 * count}: {shown}'
     busy = [end_with(each, Status.DEADLINE) for each in made[:10]] + calm[10:]
     (words,), _ = told(busy)
     assert words == describe_late(busy) and words.startswith(f'This computer was too busy for 10 of {count} predictions')

@@ -129,13 +129,18 @@ def facts(answer: Mapping[str, Any]) -> dict[str, str]:
         'hand poses': str(answer['samples']),
         'predictions': f'{answer["predictions"]}, {answer["solved"]} with a solved candidate',
         'rejected': _list_counts(answer['refused']),
-        'candidates compromised': _list_failures({Status.COMPROMISED.value: answer['compromised']}),
-        'candidates estimated': _list_counts({'unlikely or late': answer['estimated']} if answer['estimated'] else {}),
+        'candidates compromised': _list_with_note(answer['compromised'], Status.COMPROMISED.remedy),
+        'candidates estimated': _list_with_note(answer['estimated'], 'unlikely or late'),
         'candidates not solved': _list_failures(answer['failures']),
         'obstacles cleared by height': f'{answer["cleared_by_height"]} over all predictions',
         **({'demonstrations learned': str(answer['learned'])} if 'learned' in answer else {}),
         'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
     }
+
+
+def _list_with_note(count: int, note: str) -> str:
+    """Return a count with a note, which is left out where nothing was counted."""
+    return f'{count} ({note})' if count else _list_counts({})
 
 
 def _list_failures(counts: Mapping[str, int]) -> str:

@@ -141,7 +141,7 @@ def replay(
     json: bool = False,
     remap: Remaps = (),
 ) -> int:
-    """Compute predictions from a recording, without ROS and faster than real time.
+    """Compute predictions from a recording, without ROS and without a time limit: the same ones each time.
 
     Parameters
     ----------

@@ -131,5 +131,6 @@ def check_outside(field: str, point: Array, obstacles: Obstacles) -> None:
     """Raise SceneError, which names the field, if a point (2,) [m] lies inside the mean boundary of an obstacle."""
     distances = measure_offsets(point, obstacles)[1][0]
     for row in np.flatnonzero(distances < obstacles.radius)[:1]:
-        found = f'{point.tolist()}, {max(round(distances[row], 9), 0.0):.4g} m from its polygon'
+        core = 'centre' if obstacles.corners[row] == 1 else 'polygon'
+        found = f'{point.tolist()}, {max(round(distances[row], 9), 0.0):.4g} m from its {core}'
         raise SceneError(field, f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m', found)

@@ -233,7 +233,8 @@ class Goal(Record):
     position : array_like of shape (2,) or (3,)
         In the task plane [m]; a third number is the height over it.
     name : str, optional
-        What predictions call the goal; by default ``goal0`` and so on, by its place in the list of goals.
+        What `Prediction.goals`, descriptions and pictures call the goal; by default ``goal0`` and so on, by its place in the list
+        of goals. Labels keep this number.
     object : str, optional
         Name of an obstacle that is this goal, even if it does not hold the position: it does not block the way to this goal.
 

@@ -144,11 +144,13 @@ def compute_bounds(
     return float(low[0] - added), float(high[0] + added), float(low[1] - added), float(high[1] + added)
 
 
-def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, named: bool = True) -> None:
+def draw_scene(
+    axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, named: bool = True, names: Sequence[str] = ()
+) -> None:
     """Draw obstacles and goals.
 
     An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the
-    goals (g, 2) are numbered, as in the labels of candidates.
+    goals (g, 2) have their names, by default the numbers in the labels of candidates.
     """
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
         ring = STDDEVS * float(obstacles.radius_stddev[row])
@@ -163,7 +165,8 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
         look = {'marker': '*', 'markersize': 12, 'color': 'black', 'markerfacecolor': 'white', 'linestyle': ''}
         axes.plot(*goal, zorder=5, label='goal', **look)
         if named:
-            axes.annotate(f'goal{number}', goal, xytext=(6, 6), textcoords='offset points', fontsize=8, zorder=6)
+            name = names[number] if names else f'goal{number}'
+            axes.annotate(name, goal, xytext=(6, 6), textcoords='offset points', fontsize=8, zorder=6)
     axes.set(xlim=bounds[:2], ylim=bounds[2:], xlabel='x [m]', ylabel='y [m]')
     axes.set_aspect('equal')
 
@@ -174,27 +177,34 @@ def draw_candidates(axes: Any, snapshot: Snapshot, slots: Mapping[str, int]) -> 
     Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
     has its total uncertainty, too. Ghosts have their reasons beside them.
     """
-    ghosts = [(lost.path, describe_in_legend(lost), snapshot.describe_ghost(lost)) for lost in snapshot.unsolved]
+    ghosts = [(lost.path, describe_in_legend(lost), *snapshot.describe_ghost(lost)) for lost in snapshot.unsolved]
     for rank, each in reversed(list(enumerate(snapshot.candidates))):
         letter = get_letter(slots.get(each.label))
-        reason = snapshot.describe_ghost(each)
+        reason, place = snapshot.describe_ghost(each)
         if reason:
-            ghosts.append((each.curve, describe_in_legend(each, letter, reason), reason))
+            ghosts.append((each.curve, describe_in_legend(each, letter, reason), reason, place))
         else:
             style = get_candidate_style(slots.get(each.label), each.likelihood, each.is_compromised)
             if rank == 0 or each.likelihood >= LIKELY:
                 _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
             axes.plot(*each.curve.T, zorder=3, label=describe_in_legend(each, letter), **style)
             draw_tag(axes, each.path[int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))], letter, style['color'])
-    for number, (curve, label, reason) in enumerate(ghosts):
-        _draw_ghost(axes, curve, label, reason, number)
+    entered: set[str] = set()
+    for number, (curve, label, reason, place) in enumerate(ghosts):
+        words = '' if reason in entered else reason  # those of one obstacle would cover each other
+        _draw_ghost(axes, curve, label, words, 0.5 + 0.15 * (number % 3) if place is None else place)
+        if place is not None:
+            entered.add(reason)
 
 
-def _draw_ghost(axes: Any, curve: Array, label: str, reason: str, number: int) -> None:
+def _draw_ghost(axes: Any, curve: Array, label: str, words: str, place: float) -> None:
+    """Draw a path that is no proper prediction; words: beside it, at a share of it; may be empty."""
     axes.plot(*curve.T, color=GHOST_COLOUR, linewidth=4.0, alpha=0.3, solid_capstyle='round', zorder=2, label=label)
+    if not words:
+        return
     look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
     look['bbox'] = {'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0}
-    axes.annotate(reason, curve[int((0.5 + 0.15 * (number % 3)) * (len(curve) - 1))], annotation_clip=True, **look)
+    axes.annotate(words, curve[round(place * (len(curve) - 1))], annotation_clip=True, **look)
 
 
 def _draw_ellipses(axes: Any, candidate: CandidateView, colour: str, is_total: bool) -> None:

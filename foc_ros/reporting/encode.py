@@ -117,18 +117,20 @@ class _ReportData:
 def encode_candidate(snapshot: Snapshot, candidate: CandidateView, is_most_likely: bool) -> dict[str, Any]:
     """Return one candidate of a snapshot.
 
-    ghost: why it is no proper prediction, or ''; t and v: at some of the steps; motor: ellipses of the motor noise, none of a
-    candidate that is less than LIKELY; total: of the
-    total uncertainty of the most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard
-    deviation, and the angle of the greater one [degrees].
+    ghost: why it is no proper prediction, or ''; ghost_at: share of the path at which that is, or None; t and v: at some of
+    the steps; motor: ellipses of the motor noise, none of a candidate that is less than LIKELY; total: of the uncertainty of the
+    most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard deviation, and the angle of
+    the greater one [degrees].
     """
+    ghost, ghost_at = snapshot.describe_ghost(candidate)
     points = select_evenly(len(candidate.path), PATH_POINTS)
     marks = select_evenly(len(candidate.path), ELLIPSES_PER_CANDIDATE + 1)[1:]
     is_drawn, is_likely = is_most_likely and candidate.is_widened, is_most_likely or candidate.likelihood >= LIKELY
     return {
         'label': candidate.label,
         'description': candidate.description,
-        'ghost': snapshot.describe_ghost(candidate),
+        'ghost': ghost,
+        'ghost_at': None if ghost_at is None else round(ghost_at, 2),
         'ratio': round_number(candidate.cost_ratio),
         'eta': round_number(candidate.eta),
         'compromised': candidate.is_compromised,
@@ -143,7 +145,7 @@ def encode_candidate(snapshot: Snapshot, candidate: CandidateView, is_most_likel
 def encode_unsolved(snapshot: Snapshot, view: UnsolvedView) -> dict[str, Any]:
     """Return one candidate without a likelihood."""
     texts = {name: getattr(view, name) for name in ('label', 'description', 'reason')}
-    return {**texts, 'ghost': snapshot.describe_ghost(view), **_encode_points(view.path, UNSOLVED_POINTS)}
+    return {**texts, 'ghost': snapshot.describe_ghost(view)[0], **_encode_points(view.path, UNSOLVED_POINTS)}
 
 
 def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> Bounds:

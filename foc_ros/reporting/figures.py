@@ -40,7 +40,7 @@ WIDTH_IN = 6.4
 
 def draw_snapshot(axes: Any, snapshot: Snapshot, bounds: Bounds, slots: Mapping[str, int] | None = None) -> None:
     """Draw a scene with the candidates in it, the hand and a legend; slots: by label, in order of likelihood if not given."""
-    draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
+    draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
     draw_candidates(axes, snapshot, number_labels(snapshot.candidates) if slots is None else slots)
     if snapshot.hand is not None:
         draw_hand_now(axes, snapshot.hand[None])
@@ -118,7 +118,7 @@ def make_snapshot_figure(hand: HandTrajectory, tracks: CandidateTracks, row: int
     heights = [_get_height(bounds, snapshot) + 0.4, 2.1, 1.9]
     with open_figure(WIDTH_IN, sum(heights)) as figure:
         scene, likelihoods, speeds = figure.subplots(3, 1, height_ratios=heights)
-        draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
+        draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
         draw_candidates(scene, snapshot, slots)
         draw_hand(scene, hand, snapshot.stamp_ns, span)
         draw_legend(scene)
@@ -136,7 +136,7 @@ def make_moment_figure(hand: HandTrajectory, snapshot: Snapshot, span: Span) -> 
     bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
     with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
         axes = figure.subplots()
-        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds)
+        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
         draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
         draw_hand(axes, hand, snapshot.stamp_ns, span)
         draw_legend(axes)

@@ -156,8 +156,8 @@ def _collect_facts(snapshots: Sequence[Snapshot]) -> dict[str, str]:
     counts = [sum(view.status is status for view in views) for status in (Status.SOLVED, Status.COMPROMISED)]
     facts = {
         'predictions': str(len(snapshots)),
-        f'paths with at least {100 * NOTED:.0f} %': f'{len(views)}; they avoid the obstacles as surely as wanted: {counts[0]}, '
-        f'less surely: {counts[1]}, as far as estimated: {len(views) - sum(counts)}',
+        f'paths with at least {100 * NOTED:.0f} %': f'{len(views)}: {counts[0]} avoid the obstacles as surely as wanted, '
+        f'{counts[1]} less surely; {len(views) - sum(counts)} are estimates',
     }
     if solve_ms:
         median, late = np.percentile(solve_ms, [50, 99])

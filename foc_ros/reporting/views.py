@@ -108,7 +108,7 @@ class Snapshot(Record):
     candidates: those with a likelihood, most likely first; most_likely: label, None if no candidate has one; unsolved: the other
     candidates; solve_s: wall time [s], None if it is unknown; hand (2,): position of the hand [m], None if it is unknown;
     cleared: names of the obstacles that the hand passes above or below; unknown_share, other_share: of the
-    likelihood, which no candidate has.
+    likelihood, which no candidate has; goal_names: what pictures call the goals, none for `goal0` and so on.
     """
 
     stamp_ns: int
@@ -122,6 +122,7 @@ class Snapshot(Record):
     cleared: Collection[str] = ()
     unknown_share: float = 0.0
     other_share: float = 0.0
+    goal_names: tuple[str, ...] = ()
 
     @property
     def is_late(self) -> bool:
@@ -135,8 +136,10 @@ class Snapshot(Record):
         shares = shares / max(shares.sum(), LIKELY)
         return float(np.exp(-(shares * np.log(shares)).sum())) if len(shares) else 0.0
 
-    def find_entered(self, view: CandidateView) -> str:
-        """Return the name of the first obstacle that a path leads through, empty if it leads through none.
+    def find_entered(self, view: CandidateView) -> tuple[str, float]:
+        """Return the name of the first obstacle that a path leads through, and the share of the path at the deepest point.
+
+        The name is empty if the path leads through no obstacle.
 
         The obstacles have their mean sizes and move on at their velocities. The beginning of a path within an obstacle that the
         hand is in does not count, nor do depths of less than GRAZE_M.
@@ -144,21 +147,28 @@ class Snapshot(Record):
         rows = [row for row, name in enumerate(self.obstacles.ids) if name not in self.cleared]
         curve, blocking = view.curve, self.obstacles.take(rows)
         if not rows or not len(curve):
-            return ''
+            return '', 0.0
         times = np.linspace(view.times[0], view.times[-1], len(curve))
         centres = blocking.centre + times[:, None, None] * blocking.velocity
         depths = blocking.radius - measure_offsets(curve, blocking, centres)[1]
         is_inside = depths > GRAZE_M
         has_left = np.maximum.accumulate(~is_inside, axis=0)
         entered = np.argwhere(is_inside & has_left)
-        return blocking.ids[int(entered[0, 1])] if len(entered) else ''
+        if not len(entered):
+            return '', 0.0
+        first = int(entered[0, 1])
+        deepest = np.argmax(np.where(has_left[:, first], depths[:, first], -np.inf))
+        return blocking.ids[first], float(deepest / (len(curve) - 1))
 
-    def describe_ghost(self, view: CandidateView | UnsolvedView) -> str:
-        """Return why a path is no proper prediction: it could not be solved, or leads through an obstacle; otherwise ''."""
+    def describe_ghost(self, view: CandidateView | UnsolvedView) -> tuple[str, float | None]:
+        """Return why a path is no proper prediction, and at which share of the path that is, None if nowhere in particular.
+
+        It could not be solved, or leads through an obstacle; otherwise the reason is ''.
+        """
         if isinstance(view, UnsolvedView):
-            return view.status.replace('_', ' ')
-        name = self.find_entered(view)
-        return f'leads through obstacle {name}' if name else ''
+            return view.status.replace('_', ' '), None
+        name, share = self.find_entered(view)
+        return (f'leads through obstacle {name}', share) if name else ('', None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,4 +290,5 @@ def build_snapshot(prediction: Prediction) -> Snapshot:
         tuple(name for name, is_cleared in zip(prediction.obstacles.ids, prediction.cleared, strict=False) if is_cleared),
         prediction.unknown,
         prediction.other,
+        prediction.goal_names,
     )

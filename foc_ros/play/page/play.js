@@ -242,7 +242,7 @@ function showWays() {
   const others = known.filter((each) => each.likelihood < NOTED);
   const rest = others.reduce((sum, each) => sum + each.likelihood, 0);
   if (others.length) rows.push({ slot: null, likelihood: rest, words: `${others.length} more, each below 1 %`, ghost: '' });
-  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
+  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal than those shown']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
   const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost }) => [slot, Math.round(100 * likelihood), words, ghost]));
   if (key === shownWays) return;
   shownWays = key;
@@ -280,15 +280,17 @@ function moveHand(time, sinceMs) {
   send({ type: 'hand', t: time, x: hand.position[0], y: hand.position[1], event });
 }
 
+function sendScene() {
+  if (isSceneChanged) send({ type: 'scene', ...arranging.scene });
+  isSceneChanged = false;
+}
+
 let shownMs = 0;
 function frame(time) {
   requestAnimationFrame(frame);
   if (!settings) return;
   moveHand(time, FRAME_MS);
-  if (isSceneChanged) {
-    send({ type: 'scene', ...arranging.scene });
-    isSceneChanged = false;
-  }
+  sendScene();
   if (time - predictedMs > OLD_MS) view.candidates = [];
   [view.scene, view.selected] = [arranging.scene, arranging.selected];
   draw(time);
@@ -316,6 +318,7 @@ byId('guidance').addEventListener('change', ({ target }) => send({ type: 'guidan
 byId('parameters').addEventListener('change', ({ target }) => send({ type: 'parameters', name: target.value }));
 byId('record').addEventListener('click', ({ target }) => send({ type: 'record', on: target.dataset.on !== 'true' }));
 byId('begin').addEventListener('click', () => {
+  sendScene(); // the server takes none during tasks
   send(task.phase !== 'none' ? { type: 'stop' } : {
     type: 'tasks', trials: Number(byId('trials').value), seed: Number(byId('seed').value), assistance: byId('assistance').value,
     blinded: byId('blinded').checked, shuffled: byId('shuffled').checked,

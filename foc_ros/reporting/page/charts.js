@@ -20,7 +20,7 @@ class Chart {
   // Draws lines (points [time, value or null], colour, width, dotted, alpha, marks, letter, name), a hatched share (points), both under the time now [s].
   draw({ span, top, lines, hatched = [], now }) {
     const width = Math.max(this.box.clientWidth, 200);
-    Object.assign(this, { span, top, left: 44, right: width - 8, base: this.height - 22 });
+    Object.assign(this, { span, top, left: 44, right: width - 20, base: this.height - 22 });
     const line = (points) => points.map(([t, v], row) => (v === null ? '' : `${row && points[row - 1][1] !== null ? 'L' : 'M'}${this.x(t).toFixed(2)} ${this.y(v).toFixed(2)}`)).join('');
     const parts = [...this.ticks(), ...this.hatch(hatched)];
     for (const { points, colour, width: thick, dotted, alpha = 1, marks, letter, name = '' } of lines) {

@@ -23,6 +23,7 @@ class Scene {
     this.canvas = canvas;
     this.pen = canvas.getContext('2d');
     this.paths = [];
+    this.entered = new Set(); // what was written of obstacles that paths lead through
   }
 
   // Shows at least what is within limits of x, then of y [m].
@@ -59,6 +60,7 @@ class Scene {
     pen.setTransform(scale, 0, 0, -scale, origin[0], origin[1]);
     pen.lineJoin = 'round';
     this.paths = [];
+    this.entered = new Set();
   }
 
   stroke(colour, width, dash = [], alpha = 1) {
@@ -129,15 +131,18 @@ class Scene {
     if (name) this.text(name, [x, y], ink('--ink'), { size: 11 });
   }
 
-  // Draws a candidate: slot, likelihood, path [m], motor and total: ellipses [x, y, half axes, angle]; ghost: why it is none, or ''.
-  candidate({ slot, likelihood, path, motor, total, compromised, ghost, text }, alpha = 1, place = 0.6) {
+  // Draws a candidate: slot, likelihood, path [m], motor and total: ellipses [x, y, half axes, angle]; ghost: why it is none, or '', and
+  // ghost_at: the share of the path at which that is. place: share of the path for its letter, or words that are of no such place.
+  candidate({ slot, likelihood, path, motor, total, compromised, ghost, ghost_at: ghostAt, text }, alpha = 1, place = 0.6) {
     const [colour, width] = [colourOf(slot), ghost ? 6 : 1.5 + 4.5 * (likelihood ?? 0)];
-    const middle = path[Math.floor((path.length - 1) * place)];
+    const middle = path[Math.round((path.length - 1) * (ghostAt ?? place))];
     this.paths.push({ points: path, text, width, kind: ghost ? 'ghost' : 'path' });
     if (ghost) {
       this.trace(path);
       this.stroke(ink('--soft'), width, [], 0.25 * alpha);
-      this.text(ghost, middle, ink('--soft'), { size: 11, up: 10, halo: true });
+      // Words of one obstacle would cover each other.
+      if (!this.entered.has(ghost)) this.text(ghost, middle, ink('--soft'), { size: 11, up: 14, halo: true });
+      if (typeof ghostAt === 'number') this.entered.add(ghost);
       return;
     }
     for (const [x, y, a, b, angle] of motor) {
