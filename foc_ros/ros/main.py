@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from io import UnsupportedOperation
 from types import FrameType
 from typing import Any
 
@@ -110,11 +111,12 @@ def create_executor(context: Any) -> Any:
     """
     try:
         from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError:
+
+        return EventsExecutor(context=context)
+    except (ImportError, UnsupportedOperation):  # it wants a standard error that is a file, for the traces of crashes
         from rclpy.executors import SingleThreadedExecutor
 
         return SingleThreadedExecutor(context=context)
-    return EventsExecutor(context=context)
 
 
 def _reject(error: Exception) -> int:
