@@ -22,8 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.core.interpolation import hermite, hermite_quintic, pair_steps
 from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
-from foc_ros.core.plant.response import fall_as_minimum_jerk, hermite, hermite_quintic, pair_steps
+from foc_ros.core.plant.response import fall_as_minimum_jerk
 from foc_ros.core.types import Array
 
 from .problem import Problem

@@ -13,10 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from foc_ros.core.interpolation import hermite as hermite
-from foc_ros.core.interpolation import hermite_quintic as hermite_quintic
-from foc_ros.core.interpolation import locate
-from foc_ros.core.interpolation import pair_steps as pair_steps
+from foc_ros.core.interpolation import hermite, locate, pair_steps
 from foc_ros.core.types import Array
 
 
