@@ -138,6 +138,14 @@ def find_point(browser: Any, position: tuple[float, float]) -> tuple[float, floa
     return x, y
 
 
+def await_layout(browser: Any) -> None:
+    """Wait until the scene stays where it is: controls that appear move it."""
+    place = None
+    while (found := find_point(browser, (0.0, 0.0))) != place:
+        place = found
+        time.sleep(0.2)
+
+
 def tab_to(browser: Any, name: str) -> None:
     """Press Tab until a control of the page has the focus."""
     for _ in range(60):

@@ -17,7 +17,7 @@ pytest.importorskip('tornado', reason='tornado is not installed')
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from browser_helpers import check_report, chromium, screenshot
-from play_helpers import Play, find_point, play, press_keys, steer, tab_to, until, visit, wait_for, wait_for_answer
+from play_helpers import Play, await_layout, find_point, play, press_keys, steer, tab_to, until, visit, wait_for, wait_for_answer
 
 from foc_ros.core.config import Config
 from foc_ros.io.bags import BagReader
@@ -393,6 +393,7 @@ def test_a_finger_moves_the_hand_and_drags_obstacles_and_goals_on_a_phone(browse
     drag((0.0, 0.0), (0.02, -0.02), (0.1, -0.04))
     wait_for(browser, 'Math.hypot(play.view.hand.position[0] - 0.1, play.view.hand.position[1] + 0.04) < 2e-3', 'the hand')
     click(browser, 'arrange')
+    await_layout(browser)
     drag((0.14, 0.015), (0.14, 0.1), (0.13, 0.13))
     drag((0.31, 0.0), (0.3, 0.03), (0.25, 0.04))
     for name, row, place in (('obstacles', 0, (0.13, 0.13)), ('goals', 1, (0.25, 0.04))):

@@ -255,7 +255,7 @@ def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: 
         stamp_ns = 10 * SECOND + i * SECOND // 100
         bench.send('obstacles', cloud(TYPES, obstacle_table([(0.2, 0.03 * i, 0.0, 0.03)]), stamp_ns, 'camera'))
         bench.send('hand_pose', pose)
-        ros.spin_until(lambda: bench.node._transforms.roles == ['obstacles', 'hand_pose'], 'messages that are held')
+        ros.spin_until(lambda: set(bench.node._transforms.roles) == {'obstacles', 'hand_pose'}, 'messages that are held')
         tf.set_transform(camera(1.0 + 0.03 * i, stamp_ns), '')
         np.testing.assert_allclose(seen(bench), [[1.0, 0.2]], atol=1e-12)
         np.testing.assert_allclose(bench.node.intake.sample.position, [1.0 + 0.03 * i - 0.01 * i, 0.0], atol=1e-12)
