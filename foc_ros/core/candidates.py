@@ -144,10 +144,7 @@ def _estimate(candidate: PredictedCandidate, similar: tuple[PredictedCandidate, 
     effort = ratio * known.cost / failed.dt
     mean = failed.mean
     if not _is_in_class(candidate.candidate, candidate.sides):
-        states = [candidate.candidate.guess]
-        for _ in range(mean.shape[1] // 2 - 1):
-            states.append(np.gradient(states[-1], failed.dt, axis=0))
-        mean = np.concatenate(states, axis=1)
+        mean = _derive_states(candidate.candidate.guess, failed.dt, mean.shape[1])
         mean[0] = failed.mean[0]
         mean = as_readonly(mean)
     safety = known.solution.eta, known.solution.safety_factor, known.solution.safety_shortfall
@@ -165,29 +162,48 @@ def _estimate(candidate: PredictedCandidate, similar: tuple[PredictedCandidate, 
     return replace(candidate, solution=estimated, sides=dict(candidate.candidate.sides), cost=effort * failed.dt)
 
 
+def _derive_states(path: Array, dt: float, size: int) -> Array:
+    """Return positions on a path (N + 1, 2) [m] at steps of dt [s], and their derivatives: states (N + 1, size)."""
+    states = [path]
+    for _ in range(size // 2 - 1):
+        states.append(np.gradient(states[-1], dt, axis=0))
+    return np.concatenate(states, axis=1)
+
+
 def estimate_unfollowed(
     unfollowed: Sequence[Candidate], answered: Sequence[PredictedCandidate], durations_s: Sequence[float]
 ) -> list[PredictedCandidate]:
-    """Return classes that the search has seen and that are no candidates, with the efforts that similar ones lead to expect.
+    """Return the classes that the search has seen and that are no candidates, each with an estimated effort and safety.
 
-    They are ranked with the candidates, by the same rule, and what they get is the share that is unknown. answered: the
-    candidates, without whose likelihoods nothing is expected; durations_s: time to go to each goal [s].
+    The estimate follows from a candidate of similar effort (`find_similar`). These classes are ranked with the candidates by the
+    same rule, and what they get is the unknown share.
+
+    Parameters
+    ----------
+    unfollowed
+        The classes.
+    answered
+        The candidates. Where none of them has a likelihood, nothing can be estimated.
+    durations_s
+        Time to go to each goal [s].
     """
     known, names = [each for each in answered if each.has_likelihood], {each.label for each in answered}
+    if not known:
+        return []
     estimated = []
-    for candidate in unfollowed if known else ():
-        if candidate.label not in names:
-            similar, ratio = find_similar(candidate.goal, _measure(candidate), known)
-            dt = durations_s[candidate.goal] / (len(candidate.guess) - 1)
-            cost = ratio * similar.cost
-            mean = np.zeros((len(candidate.guess), similar.solution.mean.shape[1]))
-            mean[:, :2] = candidate.guess
-            solution = replace(
-                similar.solution, status=Status.ESTIMATED, message='not followed', dt=dt, mean=mean, effort=cost / dt
-            )
-            estimated.append(
-                PredictedCandidate(candidate, replace(solution, expected=cost / dt), dict(candidate.sides), cost, 0.0)
-            )
+    for candidate in [each for each in unfollowed if each.label not in names]:
+        similar, ratio = find_similar(candidate.goal, _measure(candidate), known)
+        dt, cost = durations_s[candidate.goal] / (len(candidate.guess) - 1), ratio * similar.cost
+        solution = replace(
+            similar.solution,
+            status=Status.ESTIMATED,
+            message='not followed',
+            dt=dt,
+            mean=_derive_states(candidate.guess, dt, similar.solution.mean.shape[1]),
+            effort=cost / dt,
+            expected=cost / dt,
+        )
+        estimated.append(PredictedCandidate(candidate, solution, dict(candidate.sides), cost, 0.0))
     return estimated
 
 

@@ -161,8 +161,7 @@ class _PredictionScene(Record):
     hand: the state that they start from; goals (g, 2) [m]; durations_s: time to go to each; blocking: obstacles that the hand
     does not clear by its height, grown by its radius; near: those that are not culled; in_the_way: those of them that do not hold
     the goal, for each goal; cleared (n,): whether the hand clears each of all obstacles; heights: the prediction of the height;
-    covariances: what all candidates share of theirs; objects: the id of the
-    obstacle that each goal is.
+    covariances: what all candidates share of theirs; objects: the id of the obstacle that each goal is.
     """
 
     hand: HandState

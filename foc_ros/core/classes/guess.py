@@ -23,10 +23,6 @@ ROOM = 0.002
 """Distance from the grown obstacles that a guess keeps where there is room [m]."""
 ROOMS = ROOM, ROOM, 0.0
 """To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
-ROOM = 0.002
-"""Distance from the grown obstacles that a guess keeps where there is room [m]."""
-ROOMS = ROOM, ROOM, 0.0
-"""To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
 CLEAR = 1e-12
 """Depth in a grown obstacle that does not count [m]."""
 

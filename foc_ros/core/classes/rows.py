@@ -29,7 +29,7 @@ Rows = NDArray[np.int64]
 WALL = -1
 """The row of an obstacle that is in none."""
 NO_OBSTACLES = np.zeros(0, dtype=np.intp)
-"""The row of an obstacle that is in none."""
+"""Rows of no obstacles."""
 
 
 def find_direction(start: Array, goals: Array) -> Array:
