@@ -248,9 +248,9 @@ def rank_candidates(
 
 
 def split_unknown(ranked: Sequence[PredictedCandidate], unfollowed: Collection[str]) -> tuple[list[PredictedCandidate], float]:
-    """Return the candidates among ranked classes, with likelihoods that sum to one, and the share of those not followed.
+    """Return the candidates among ranked classes, with likelihoods that sum to one, and the share of the other classes.
 
-    unfollowed: labels of the latter. The share is 1 where no candidate has a likelihood.
+    unfollowed: labels of these other classes. Their share is 1 where no candidate has a likelihood.
     """
     followed = [each for each in ranked if each.label not in unfollowed]
     known = sum(each.likelihood for each in followed)

@@ -23,12 +23,12 @@ x + v T / 2 the goal that takes least effort. As a density of the goal, M^-2 is 
     k(g) = s^2 / (pi (|g - e|^2 + s^2)^2),   s^2 = (v T)^2 / 60 + `foc.endpoint_stddev`^2.
 
 Announced goals are points, of which each is as likely as another; other goals are anywhere within A, the circle about the onset
-that is by `BEYOND` larger than the distance of the farthest goal. The odds of an other goal grow from those of
-`likelihood.other_goal` by the factor
+whose radius is `BEYOND` times the distance of the farthest goal. The odds of another goal are those of `likelihood.other_goal`
+times the factor
 
-    (A mean_i k(g_i))^-c,   c = min(1, 2 distance from the onset / least distance of a goal from there):
+    (A mean_i k(g_i))^-c,   c = min(1, 2 distance from the onset / least distance of a goal from there).
 
-what a hand has done says all from half of the way on, and little as long as it has hardly moved.
+The exponent c lets the motion of the hand count in full from half of the way on, and little before.
 """
 
 from __future__ import annotations
