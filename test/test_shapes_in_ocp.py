@@ -143,5 +143,6 @@ def test_a_box_that_moves_and_the_same_problem_in_its_frame(strategy):
         solved(moving, GUESS, **SETTINGS[strategy]),
         solved(made, GUESS - drift, **SETTINGS[strategy]),
         lambda path: path - drift,
-        1e-3 if strategy in ('lv', 'hc') else 1e-5,
+        # one of them asks for a little more safety where the box comes nearest between two contacts
+        1e-3 if strategy in ('lv', 'hc') else 1e-4,
     )

@@ -45,8 +45,8 @@ class Deadline:
         When that time began, by `time.perf_counter()` [s]; None for now.
     whole
         A deadline that holds as well.
-    patience
-        Steps after which what hardly matters may wait for the next time; None for all that it takes.
+    goes_on
+        Whether what hardly matters may wait for the next time.
     """
 
     def __init__(
@@ -54,10 +54,11 @@ class Deadline:
         seconds: float | None = None,
         began: float | None = None,
         whole: Deadline | None = None,
-        patience: int | None = None,
+        *,
+        goes_on: bool = False,
     ) -> None:
         self.at = None if seconds is None else (time.perf_counter() if began is None else began) + seconds
-        self._whole, self.patience = whole, patience
+        self._whole, self.goes_on = whole, goes_on
         self.step_times: StepTimes = StepTimes() if whole is None else whole.step_times
 
     @property

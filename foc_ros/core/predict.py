@@ -48,8 +48,6 @@ from .types import (
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
 """Shares of the time left after which the search and the solver begin no step. The last step may end later."""
-PATIENCE = 3
-"""Quadratic programmes after which a class that is unlikely goes on in the next prediction."""
 RESERVE_S, POOLING_S = 5e-5, 2e-4
 """Time besides that for each candidate [s]: to rank it, and to pool its path with recordings where there are some."""
 
@@ -218,7 +216,7 @@ def _solve(
         for row in {each.goal for each in candidates}
     }
     earlier = [each.solution if each.solved_ns == each.seen_ns else None for each in matched]
-    until = Deadline(whole=deadline, patience=PATIENCE)
+    until = Deadline(whole=deadline, goes_on=True)
     solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, until)
     numbered = [replace(each, way=track.number) for each, track in zip(solved, matched, strict=True)]
     return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in numbered]

@@ -101,7 +101,7 @@ def solve_at(
     rates = [min(each.shortfall / each.beta, LARGEST_RATE) if each.beta > 0.0 else LARGEST_RATE for each in preferences]
     # without a chance constraint no safety is wanted, and the rate has no effect
     rate = np.array(rates) if is_chance else np.ones(len(problems))
-    solver = Solver(margins, wanted, rate, lam)
+    solver = Solver(margins, wanted, rate, lam, goes_on=deadline.goes_on and is_chance)
     if before is None:
         control, contacts, multipliers, k, angles = _stack_starts(solver, problems, starts)
     else:

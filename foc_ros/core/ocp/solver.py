@@ -21,7 +21,7 @@ from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Array
 
-from .gradients import linearise
+from .gradients import Gradients, linearise
 from .iterates import Evaluation, Iterates, Plan
 from .margin import NO_CONTACTS, Contacts, Indices, Margins
 from .minima import find_minima
@@ -56,9 +56,9 @@ FORETOLD = 0.1
 """Part of the promised gain that may be left, if the step brought what was foretold."""
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
-UNLIKELY, SLOW, REPEATED = 12.0, 0.5, 4.0
-"""A class can wait for the next prediction if its QP promises less than the second number, and if it is less likely than the best
-by more than the first one, as a logarithm, even after as many such gains as the third one says."""
+UNLIKELY, SMALL_PART = 6.0, 0.05
+"""A class can wait for the next prediction if it is less likely than the best by more than the first number, as a logarithm, and
+if its QP promises less than the second one as a part of that."""
 LARGEST_TOLERANCE = 5e-3
 """Largest gain of such a step for classes that are unlikely."""
 STALLED_GAIN = 2e-5
@@ -69,6 +69,8 @@ VIOLATED, VIOLATED_APART = 1e-3, 0.25
 """Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
 MOST_TRIALS, SHORTER = 6, 0.25
 """Steps that are tried: the whole one, the same with rows added where it failed, and a part of the last one each."""
+CURVED = 1.0
+"""Largest gain of a step that is corrected where it fails: farther away it is shortened."""
 SUFFICIENT = 1e-4
 """Share of the promised gain that a step has to bring."""
 GRACE = 0.02
@@ -89,29 +91,31 @@ class Solver:
         Wanted safety factor, and the worth of a unit of it in logarithms of cost, (b,).
     lam : Array
         Weight of the summed variances, (b,).
+    goes_on : bool
+        Whether what hardly matters for likelihoods may wait for the next prediction.
     """
 
-    def __init__(self, margins: Margins, wanted_k: Array, rate: Array, lam: Array) -> None:
+    def __init__(self, margins: Margins, wanted_k: Array, rate: Array, lam: Array, *, goes_on: bool = False) -> None:
         problems = margins.problems
         self.margins, self.wanted_k = margins, wanted_k * (1.0 + CLOSE)
         self.objective = Objective(problems, wanted_k, rate, lam)
         self.gain = np.array([each.horizon.gain for each in problems])
-        self.most, self._small_gain = MOST_ITERATIONS, SMALL_GAIN
+        self.most, self._small_gain, self._goes_on = MOST_ITERATIONS, SMALL_GAIN, goes_on
         self._is_condition = np.array([each.preference.is_hard for each in problems])
         self._backend = QP_BACKENDS.get(problems[0].qp_backend)
 
     def begin(
-        self, control: Array, contacts: Contacts, multipliers: Array, k: Array, angles: Array, is_exact: NDArray[np.bool_]
+        self, control: Array, contacts: Contacts, multipliers: Array, k: Array, angles: Array, is_cold: NDArray[np.bool_]
     ) -> Iterates:
         """Return the iterates at controls (b, 2N) moved to their goals, in the classes of some swept angles (b, m).
 
-        is_exact (b,): whether more than a likelihood asks for is wanted, as where there is no earlier solution to go on from.
+        is_cold (b,): whether there is no earlier solution to go on from: more than a likelihood asks for is wanted there.
         """
         control, rows = self.objective.meet_goal(control), np.arange(len(control))
         at = self.evaluate(rows, control, k)
         k = np.clip(at.factor, 0.0, self.wanted_k)
         gain = np.full(len(rows), np.inf)
-        bound, is_exact = at.loss + GRACE, is_exact | (not self.margins.is_chance)
+        bound, is_exact = at.loss + GRACE, is_cold | (not self._goes_on)
         count, no = np.zeros_like(rows), [np.zeros(len(rows), dtype=np.bool_) for _ in range(3)]
         return Iterates(control, k, at, contacts, multipliers, angles, no[0], no[1], gain, count, bound, is_exact, no[2])
 
@@ -155,17 +159,17 @@ class Solver:
                 break
             deadline.step_times.add()
             self.advance(now)
-            if deadline.patience is not None and self.margins.is_chance:
-                self._postpone(now, deadline.patience)
+            if self._goes_on:
+                self._postpone(now)
 
-    def _postpone(self, now: Iterates, patience: int) -> None:
-        """Leave classes to the next prediction that stay unlikely even if they gain several times what their QPs promise.
+    def _postpone(self, now: Iterates) -> None:
+        """Leave unlikely classes to the next prediction that stay so even if they gain several times what their QPs promise.
 
         Where the wanted eta is a condition, every class is solved to its end: whether it meets eta decides, not what it costs.
         """
-        promised = np.minimum(now.gain, SLOW)
-        is_unlikely = self.objective.compare(now.at.loss - REPEATED * promised) > UNLIKELY
-        now.is_waiting |= ~now.is_done & (now.iterations >= patience) & (promised < SLOW) & is_unlikely & ~self._is_condition
+        behind = self.objective.compare(now.at.loss)
+        is_enough = (behind > UNLIKELY) & (self.objective.beta * now.gain < SMALL_PART * behind)
+        now.is_waiting |= ~now.is_done & is_enough & ~self._is_condition
         now.is_done |= now.is_waiting
 
     def advance(self, now: Iterates) -> None:
@@ -177,18 +181,16 @@ class Solver:
         for trial in range(MOST_TRIALS):
             if not is_open.any():
                 break
-            failed = self._step(now, plan, np.flatnonzero(is_open), share)
+            failed = self._step(now, plan, np.flatnonzero(is_open), share, may_end=share == 1.0)
             is_open[:] = False
             is_open[failed] = True
             # what rounding hides is not worth another trial
             stalled = is_open & (plan.gain < STALLED_GAIN * self._tolerate(now, rows))
             now.is_done[rows[stalled]] = now.is_settled[rows[stalled]] = True
             is_open &= ~stalled
-            if trial:
-                share *= SHORTER
-            elif is_open.any():
-                plan = self._bundle(now, plan, rows[is_open])
-                is_open &= ~self._end(now, plan)
+            if not trial:
+                plan = self._correct(now, plan, is_open)
+            share *= SHORTER
         now.bound[rows] = np.maximum(before, now.at.loss[rows])
         others = ~np.isin(now.contacts.problem, rows)
         now.contacts = now.contacts.take(others).join(plan.contacts)
@@ -197,14 +199,31 @@ class Solver:
         now.is_done[rows[is_open]] = True
         now.is_settled[rows[is_open]] = plan.gain[is_open] < STALLED_GAIN
 
-    def _step(self, now: Iterates, plan: Plan, place: Indices, share: float) -> Indices:
+    def _correct(self, now: Iterates, plan: Plan, is_open: NDArray[np.bool_]) -> Plan:
+        """Take steps in place of whole ones that failed, with margins as they were found there; return the plan with these.
+
+        A whole step along a curved obstacle hits it, because the margins that it was planned with hold to first order only. This
+        is the second-order correction of sequential QPs (Nocedal and Wright, Numerical Optimization, section 18.3).
+        """
+        place = np.flatnonzero(is_open & (plan.gain < CURVED))
+        if not len(place):
+            return plan
+        corrected = self._solve_qps(now, plan.rows[place], plan.further.join(now.trial), plan)
+        corrected.gain[:], corrected.fall[:] = plan.gain[place], plan.fall[place]
+        failed = self._step(now, corrected, np.arange(len(place)), 1.0, may_end=False)
+        is_taken = np.ones(len(place), dtype=np.bool_)
+        is_taken[failed] = False
+        is_open[place[is_taken]] = False
+        return plan.replace(corrected.take(is_taken))
+
+    def _step(self, now: Iterates, plan: Plan, place: Indices, share: float, *, may_end: bool) -> Indices:
         """Take a share of some steps of a plan where that brings enough in their class; return the places of the others."""
         rows = plan.rows[place]
         control = now.control[rows] + share * plan.step[place]
         at = self.evaluate(rows, control, now.k[rows] + share * (plan.k[place] - now.k[rows]))
         bound = now.bound[rows] - SUFFICIENT * share * plan.gain[place] + ROUNDING
         is_good = (at.loss <= bound) & (np.abs(at.angles - now.angles[rows]) < np.pi).all(axis=1)
-        if share == 1.0:
+        if may_end:
             # Newton steps converge quadratically: what is left is less than that by which this one missed what its QP foretold.
             # Rows at the steps alone creep from one to the next.
             missed = np.abs(now.at.loss[rows] - at.loss - plan.fall[place])
@@ -219,7 +238,7 @@ class Solver:
         now.control[good] = control[is_good]
         now.k[good] = np.clip(at.factor[is_good], 0.0, self.wanted_k[good])
         now.at.put(good, at, is_good, rows)
-        now.trial = at.contacts
+        now.trial = at.contacts.take(np.isin(at.contacts.problem, rows[~is_good]))
         return place[~is_good]
 
     def _end(self, now: Iterates, plan: Plan) -> NDArray[np.bool_]:
@@ -235,25 +254,30 @@ class Solver:
         A likelihood changes by a share of itself: a class that is a hundred times less likely may be a hundred times less exact.
         The points of a curve of tau and lambda are no answers yet, and have to be exact.
         """
-        if not self.margins.is_chance:
+        if not self._goes_on:
             return np.ones(len(rows))
         most = LARGEST_TOLERANCE / LAST_GAIN
         return np.exp(np.minimum(self.objective.compare(now.at.loss)[rows], np.log(most)))
 
     def _plan(self, now: Iterates) -> Plan:
-        """Return the solutions of the QPs of all problems that are not done, with rows wherever they would break margins."""
-        plan = self._solve_qps(now, np.flatnonzero(~now.is_done), NO_CONTACTS)
+        """Return the solutions of the QPs of all problems that are not done.
+
+        Far from a solution a path may leap over an obstacle that has no row: there are rows wherever a QP would break margins.
+        """
+        plan = self._solve_qps(now, np.flatnonzero(~now.is_done), now.trial)
         for _ in range(ROUNDS):
-            broken = self._find_broken(now, plan)
+            broken = self._find_broken(now, plan, now.is_exact[plan.rows])
             if not len(broken.time):
                 break
             plan = plan.replace(self._solve_qps(now, np.unique(broken.problem), plan.further.join(broken)))
         return plan
 
-    def _find_broken(self, now: Iterates, plan: Plan) -> Contacts:
-        """Return the places on the grid at which planned steps would break margins, as far as normals tell."""
-        rows = plan.rows
-        moved = self.margins.find_step(plan.step)[:, :, None]
+    def _find_broken(self, now: Iterates, plan: Plan, is_wanted: NDArray[np.bool_]) -> Contacts:
+        """Return the places on the grid at which wanted ones of planned steps would break margins, as far as normals tell."""
+        rows = plan.rows[is_wanted]
+        if not len(rows):
+            return NO_CONTACTS
+        moved = self.margins.find_step(plan.step[is_wanted])[:, :, None]
         margin = now.at.margin[rows] + (now.at.normal[rows] * moved).sum(axis=1)
         before, after = np.full_like(margin, np.inf), np.full_like(margin, np.inf)
         before[..., 1:], after[..., :-1] = margin[..., :-1], margin[..., 1:]
@@ -262,21 +286,18 @@ class Solver:
         found = Contacts(rows[row], obstacle, self.margins.times[place])
         return found.take(~_is_known(found, plan.contacts, VIOLATED_APART))
 
-    def _bundle(self, now: Iterates, plan: Plan, rows: Indices) -> Plan:
-        """Return a plan with rows where the trials of some problems came nearest, as on the other side of a kink."""
-        new = now.trial.take(np.isin(now.trial.problem, rows))
-        new = new.take(~_is_known(new, plan.contacts, SAME))
-        if not len(new.time):
-            return plan
-        return plan.replace(self._solve_qps(now, np.unique(new.problem), plan.further.join(new)))
+    def _solve_qps(self, now: Iterates, rows: Indices, further: Contacts, failed: Plan | None = None) -> Plan:
+        """Return the solutions of the QPs of some problems (r,); further: places that have rows besides the contacts.
 
-    def _solve_qps(self, now: Iterates, rows: Indices, further: Contacts) -> Plan:
-        """Return the solutions of the QPs of some problems (r,); further: places that have rows besides the contacts."""
+        After steps that failed, margins are corrected to second order: by what they are there, beyond what was foretold.
+        """
         margins, objective = self.margins, self.objective
         places, known = self._choose_places(now, rows, further)
         at, control, k_now = np.searchsorted(rows, places.problem), now.control[rows], now.k[rows]
         is_free = (k_now > 0.0) & (k_now < self.wanted_k[rows] * (1.0 - FREE))
         gradients = linearise(margins, places, control[at], k_now[at], known > 0.0, is_free[at])
+        if failed is not None:
+            gradients = self._look_back(gradients, places, at, rows, now, failed)
         quadratic = objective.expand(rows, control, now.at.cost[rows])
         numbered, wanted = number_rows(at, len(rows)), self.wanted_k[rows]
         short = gradients.value - gradients.stddev_rate * (wanted - k_now)[at]
@@ -302,6 +323,17 @@ class Solver:
         largest = np.maximum(multipliers.max(axis=1, initial=0.0), 1.0 / margins.extent[rows])
         multipliers[multipliers < HELD * largest[:, None]] = 0.0
         return Plan(rows, step, k, np.maximum(gain, 0.0), fall, places, multipliers[numbered.problem, numbered.slot], further)
+
+    def _look_back(
+        self, gradients: Gradients, places: Contacts, at: Indices, rows: Indices, now: Iterates, failed: Plan
+    ) -> Gradients:
+        """Return gradients with the margins measured at the steps that failed, less what the gradients foretold of them."""
+        place = np.searchsorted(failed.rows, rows)
+        step, change = failed.step[place], failed.k[place] - now.k[rows]
+        motion, k = self.margins.move(rows, now.control[rows] + step), failed.k[place]
+        there = self.margins.measure(places, at, motion, k[at]).value
+        foretold = (gradients.gradient * step[at]).sum(axis=1) - gradients.stddev_rate * change[at]
+        return gradients._replace(value=there - foretold)
 
     def _choose_places(self, now: Iterates, rows: Indices, further: Contacts) -> tuple[Contacts, Array]:
         """Return the places at which the QPs have rows, and what is known of their multipliers."""

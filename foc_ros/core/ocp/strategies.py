@@ -129,7 +129,7 @@ def _meet_everywhere(point: Point, deadline: Deadline) -> tuple[Array, Indices, 
     found = find_least_factors(solver.margins, now.control, now.at.factors)
     aimed = np.array([each.wanted_k for each in solver.margins.problems])
     for _ in range(CORRECTIONS):
-        short = (found[0] < aimed * (1.0 - REACHED)) & (found[0] > aimed * (1.0 - NEARLY)) & now.is_done
+        short = (found[0] < aimed * (1.0 - REACHED)) & (found[0] > aimed * (1.0 - NEARLY)) & now.is_done & ~now.is_waiting
         if not short.any() or not deadline.allows():
             break
         solver.wanted_k[short] *= 1.0 + 1.2 * (1.0 - found[0][short] / aimed[short])
