@@ -43,7 +43,7 @@ from foc_ros.reporting.draw import (
     make_stddev_ellipse,
     save_figure,
 )
-from foc_ros.reporting.figures import make_scene_figure, make_snapshot_figure, plot_outcomes, plot_prediction
+from foc_ros.reporting.figures import make_scene_figure, make_snapshot_figure, plot_prediction, write_picture
 from foc_ros.reporting.tracks import build_candidate_tracks
 from foc_ros.reporting.views import Snapshot, build_hand_trajectory, build_snapshot
 from foc_ros.ros.intake import Intake
@@ -300,7 +300,7 @@ def test_a_snapshot_figure_shows_past_and_future_of_the_hand() -> None:
 @pytest.mark.parametrize(('suffix', 'start'), [('png', PNG), ('pdf', b'%PDF'), ('svg', b'<?xml')])
 def test_equal_input_gives_equal_pictures_in_every_format(tmp_path: Path, suffix: str, start: bytes) -> None:
     for name in ('one', 'two'):
-        plot_outcomes(tmp_path / f'{name}.{suffix}', *scene(), prediction(START_NS, NOWHERE).candidates, NOWHERE)
+        write_picture(tmp_path / f'{name}.{suffix}', prediction(START_NS, NOWHERE))
     content = (tmp_path / f'one.{suffix}').read_bytes()
     assert content.startswith(start)
     if suffix == 'png':
@@ -312,7 +312,8 @@ def test_equal_input_gives_equal_pictures_in_every_format(tmp_path: Path, suffix
 def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_start(tmp_path: Path) -> None:
     made = prediction(START_NS, NOWHERE)
     lost = [each for each in made.candidates if not each.is_solved]
-    plot_outcomes(tmp_path / 'none.png', make_obstacles(), scene()[1], lost, NOWHERE)
+    nothing = replace(made, candidates=tuple(lost), most_likely=None, obstacles=make_obstacles())
+    write_picture(tmp_path / 'none.png', nothing)
     assert (tmp_path / 'none.png').read_bytes().startswith(PNG)
     snapshot = replace(build_snapshot(replace(made, candidates=tuple(lost))), hand=np.array([-0.1, 0.02]))
     axes = make_scene_figure(snapshot).axes[0]
@@ -325,7 +326,7 @@ def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_s
 )
 def test_a_file_that_cannot_be_written(tmp_path: Path, name: str, expected: str) -> None:
     with pytest.raises(InputError, match=expected):
-        plot_outcomes(tmp_path / name, *scene(), prediction(START_NS, NOWHERE).candidates, NOWHERE)
+        write_picture(tmp_path / name, prediction(START_NS, NOWHERE))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -88,7 +88,7 @@ def test_the_blocked_packages_cannot_be_imported(package: str) -> None:
 def test_a_command_names_the_packages_that_it_needs() -> None:
     result = run("from foc_ros.__main__ import main\nsys.exit(main(['solve', 'scene.yaml']))")
     assert result.returncode == 2
-    names = 'cyclopts joblib mcap rich rosbags'
+    names = 'cyclopts joblib mcap pydantic rich rosbags'
     assert result.stderr == f'foc_ros: this command needs packages that are not installed: pip install {names}\n'
 
 

@@ -12,12 +12,12 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from matplotlib.figure import Figure
-from report_samples import START_NS, prediction, predictions, samples, scene
+from report_samples import START_NS, prediction, predictions, samples
 
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
 from foc_ros.io.outputs import check_replaceable, check_report
-from foc_ros.reporting.figures import plot_outcomes
+from foc_ros.reporting.figures import write_picture
 from foc_ros.reporting.page import write_page
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
@@ -28,7 +28,7 @@ SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "nois
 @pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
 def test_a_picture_is_replaced_by_the_next_one(tmp_path: Path, suffix: str) -> None:
     file = tmp_path / f'scene.{suffix}'
-    plot_outcomes(file, *scene(), prediction(START_NS, np.zeros(2)).candidates, np.zeros(2))
+    write_picture(file, prediction(START_NS, np.zeros(2)))
     check_replaceable('--plot', file)
 
 

@@ -167,7 +167,7 @@ def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> Non
     ('name', 'words'),
     [
         ('tornado', "play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'"),
-        ('pydantic', "play needs pydantic of version 2: pip install 'foc_ros[play]'"),
+        ('pydantic', "scene files and the page need pydantic of version 2: pip install 'pydantic>=2'"),
     ],
 )
 def test_without_a_library_the_message_says_what_to_install(tmp_path: Path, name: str, words: str) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from reach_helpers import reference_cases
 
+import foc_ros
 from foc_ros.cli.main import main
 from foc_ros.core.types import Status
 
@@ -82,6 +83,49 @@ def test_the_table_and_the_picture(tmp_path: Path, capsys: pytest.CaptureFixture
     assert (tmp_path / 'ways.png').read_bytes().startswith(b'\x89PNG')
     out = capsys.readouterr().out
     assert 'goal0: right of 0' in out and 'solved' in out and 'likelihood' in out
+
+
+GOALS: dict[str, Any] = {
+    'start': [0.0, 0.0],
+    'goals': [{'position': [0.2, 0.0], 'name': 'tea'}, {'position': [0.45, 0.01], 'name': 'milk', 'object': 'back'}],
+    'obstacles': [{'x': x, 'y': 0.0, 'radius': 0.03, 'id': name} for x, name in ((0.2, 'front'), (0.4, 'back'))],
+}
+
+
+def test_goals_have_names_and_the_object_of_a_goal_blocks_the_others_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = candidates(tmp_path, capsys, GOALS)
+    assert {each['description'] for each in found} == {'tea: direct', 'milk: left of front', 'milk: right of front'}
+    assert {each['status'] for each in found} == {'solved'}
+    assert solve(tmp_path, GOALS, '--json') == 0
+    goals = json.loads(capsys.readouterr().out)['goals']
+    assert [(each['name'], each['position']) for each in goals] == [('tea', [0.2, 0.0]), ('milk', [0.45, 0.01])]
+    shares = [sum(each['likelihood'] for each in found if each['goal'] == row) for row in (0, 1)]
+    assert [each['likelihood'] for each in goals] == pytest.approx(shares)
+    (guessed,) = candidates(tmp_path, capsys, {**GOALS, 'goals': GOALS['goals'][1:], 'guess': {'amplitude': 0.05}})
+    assert guessed['description'] == 'milk: left of front' and guessed['status'] == 'solved'
+
+
+def test_a_goal_without_a_path_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ring = [{'x': 0.3 + 0.05 * math.cos(turn), 'y': 0.05 * math.sin(turn), 'radius': 0.03} for turn in range(7)]
+    scene = {**SCENE, 'obstacles': ring, 'max_candidates': 4}
+    del scene['goal']
+    assert solve(tmp_path, {**scene, 'goals': [[0.1, 0.1], {'position': [0.3, 0.0], 'name': 'core'}]}) == 0
+    out = capsys.readouterr().out
+    assert 'core: no path to it was found' in out and 'classes solved together in' in out
+
+
+def test_no_candidate_is_late_where_there_is_no_time_limit() -> None:
+    """In this scene the QPs of one class end before its loss does."""
+    boxes = ((0.176, -0.022, 0.063, 0.012, -0.11), (0.108, 0.045, 0.028, 0.015, 0.93), (0.205, 0.005, 0.053, 0.012, -0.63))
+    circles = foc_ros.Circle((0.145, -0.06), 0.019, 0.0034), foc_ros.Circle((0.208, 0.017), 0.044, 0.0044)
+    shapes = [foc_ros.Box(each[:2], each[2:4], each[4]) for each in boxes]
+    shapes = [shapes[0], *circles, *shapes[1:]]
+    found = foc_ros.solve_classes([0.0, 0.0, 0.21, 0.08, 0.0, 0.0], (0.3, 0.0), shapes, eta=0.99, duration_s=0.44)
+    assert Status.DEADLINE not in {each.status for each in found}
+    (unsettled,) = [each for each in found if each.status is Status.ESTIMATED]
+    assert f'not settled after {unsettled.solution.qp_solves} QPs' in unsettled.reason and unsettled.likelihood > 0.0
 
 
 def test_the_terminal_gives_reason_and_remedy_of_what_is_not_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

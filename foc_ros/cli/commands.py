@@ -105,25 +105,23 @@ def solve(scene: Existing, /, *, json: bool = False, monte_carlo: Samples | None
         check_picture('--plot', plot)
     problem = load_scene(scene)
     if plot is not None:
-        from foc_ros.reporting.figures import plot_outcomes  # a missing library is reported before the work
-    from foc_ros.analysis.solve import make_table, solve_to_values
+        from foc_ros.reporting.figures import write_picture  # a missing library is reported before the work
+    from foc_ros.analysis.solve import describe_rest, make_table, solve_to_values
     from foc_ros.io.terminal import show_table, show_text
 
-    candidates, encoded = solve_to_values(problem, monte_carlo)
+    prediction, values = solve_to_values(problem, monte_carlo)
     if plot is not None:
-        plot_outcomes(plot, problem.obstacles, problem.goals, candidates, problem.hand.mean[:2])
+        write_picture(plot, prediction)
     if json:
-        print(json_format.dumps({'candidates': encoded}, allow_nan=False))
+        print(json_format.dumps(values, allow_nan=False))
     else:
-        show_table(*make_table(encoded))
-    reasons = [f'{each.description}: {each.reason}' for each in candidates if not each.is_solved]
-    if any(each.has_likelihood for each in candidates):
-        for reason in reasons if not json else ():
-            show_text(reason)
+        show_table(*make_table(values['candidates']))
+    if prediction.most_likely is not None:
+        for line in [] if json else describe_rest(prediction):
+            show_text(line)
         return 0
-    lost = (
-        f'no candidate could be solved: {"; ".join(reasons)}' if reasons else 'no path was found between the start and any goal'
-    )
+    reasons = '; '.join(f'{each.description}: {each.reason}' for each in prediction)
+    lost = f'no candidate could be solved: {reasons}' if reasons else 'no path was found between the start and any goal'
     warn_all('solve', [lost])
     return 3
 

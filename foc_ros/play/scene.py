@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import Array, Obstacles
+from foc_ros.io.fields import Fields
 from foc_ros.reporting.encode import encode_candidate, encode_unsolved
 from foc_ros.reporting.views import SLOTS, Snapshot, parse_label
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
@@ -41,12 +42,6 @@ X = Annotated[float, Field(ge=BOUNDS[0], le=BOUNDS[1])]
 Y = Annotated[float, Field(ge=BOUNDS[2], le=BOUNDS[3])]
 Size = Annotated[float, Field(ge=0.002, le=0.3)]
 """Radius or full length of an obstacle [m]."""
-
-
-class Fields(BaseModel):
-    """Values of a message of the page: exactly the declared fields, of exactly their types, and finite."""
-
-    model_config = ConfigDict(extra='forbid', frozen=True, strict=True, allow_inf_nan=False)
 
 
 class Place(Fields):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
+from foc_ros.core.types import NANOSECONDS, Array, Obstacles, Prediction
 
 from .draw import (
     STYLE,
@@ -30,7 +30,7 @@ from .draw import (
 )
 from .legend import draw_legend, measure_legend
 from .tracks import CandidateTracks
-from .views import HandTrajectory, Snapshot, build_candidate_views, build_snapshot, build_unsolved_views
+from .views import HandTrajectory, Snapshot, build_snapshot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,15 +75,12 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     return axes
 
 
-def plot_outcomes(
-    file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[PredictedCandidate], start: Array
-) -> None:
-    """Write a picture of candidates in their scene, in the format of the file's suffix.
+def write_picture(file: Path | str, prediction: Prediction) -> None:
+    """Write a picture of a prediction, in the format of the file's suffix.
 
-    goals (g, 2), start (2,) [m]. Raises InputError if the suffix is not that of a picture format or the file cannot be written.
+    Raises InputError if the suffix is not that of a picture format or the file cannot be written.
     """
-    views = build_candidate_views(outcomes, len(goals)), None, build_unsolved_views(outcomes, len(goals))
-    save_figure(make_scene_figure(Snapshot(0, obstacles, goals, *views, hand=start)), file)
+    save_figure(make_scene_figure(build_snapshot(prediction)), file)
 
 
 def make_scene_figure(snapshot: Snapshot) -> Figure:
