@@ -36,7 +36,8 @@ def demo(*, output: Path = Path('demo_output')) -> int:
     check_folder('--output', output)
     if find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: run `make setup`, or source a ROS 2 installation, or install the extra `ros`')
-    print('A recorded hand moves among a box, three posts and a wall; the node predicts where it goes. Loading ...', flush=True)
+    words = 'A recorded hand moves among a box (obstacle 1), three posts (2, 3, 4) and a wall (5)'
+    print(f'{words}; the node predicts where it goes. Loading ...', flush=True)
     from .demo import perform  # not before: its import takes seconds
 
     return perform(output)
