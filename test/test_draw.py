@@ -36,15 +36,12 @@ from foc_ros.reporting.draw import (
     CLASS_COLOURS,
     ELLIPSES_PER_CANDIDATE,
     GHOST_COLOUR,
-    compute_bounds,
     draw_candidates,
-    draw_likelihoods,
     get_candidate_style,
     make_stddev_ellipse,
     save_figure,
 )
-from foc_ros.reporting.figures import make_scene_figure, make_snapshot_figure, plot_prediction, write_picture
-from foc_ros.reporting.tracks import build_candidate_tracks
+from foc_ros.reporting.figures import make_moment_figure, make_scene_figure, plot_prediction, write_picture
 from foc_ros.reporting.views import Snapshot, build_hand_trajectory, build_snapshot
 from foc_ros.ros.intake import Intake
 
@@ -205,18 +202,22 @@ def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse
     assert (paths >= [left, bottom]).all() and (paths <= [right, top]).all() and right - left < 0.35
 
 
-def test_everything_drawn_is_in_the_legend_once() -> None:
+def test_everything_drawn_is_in_the_legend_once_and_the_hand_has_past_and_future() -> None:
     hand = build_hand_trajectory(samples())
     (span,) = hand.find_movements(0.05)
     during = [build_snapshot(widen(each)) for each in predictions(samples()) if span[0] <= each.stamp_ns <= span[1]]
-    figure = make_snapshot_figure(hand, build_candidate_tracks(during), 5, span, compute_bounds(*scene(), during[5].candidates))
-    axes, text = figure.axes[0], legend_of(figure.axes[0])
+    axes = make_moment_figure(hand, during[5], span).axes[0]
+    text = legend_of(axes)
     assert all(not line.get_label().startswith('_') for line in axes.lines), 'no line without a name'
     assert all(not patch.get_label().startswith('_') for patch in axes.patches)
     for artist in (*axes.lines, *axes.patches):
         assert text.count(' '.join(artist.get_label().split())) >= 1
     assert max(Counter(entries_of(axes)).values()) == 1
     assert [each[2:6].strip() for each in entries_of(axes)[:4]] == sorted_shares(during[5])
+    before, later = ([line for line in axes.lines if line.get_label().startswith(f'hand {name}')] for name in ('b', 'l'))
+    now = hand.positions[hand.stamps_ns == during[5].stamp_ns][0]
+    np.testing.assert_array_equal(before[0].get_xydata()[-1], now)
+    np.testing.assert_array_equal(later[0].get_xydata()[0], now)
 
 
 def sorted_shares(snapshot: Snapshot) -> list[str]:
@@ -265,38 +266,6 @@ def test_boxes_are_drawn_with_their_outlines_and_fit_into_the_picture() -> None:
     np.testing.assert_allclose(measure_offsets(ring, obstacles)[1][:, 0], 0.01)
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     assert left < ring[:, 0].min() and ring[:, 0].max() < right and bottom < ring[:, 1].min() and ring[:, 1].max() < top
-
-
-def test_the_unknown_share_is_hatched() -> None:
-    made = predictions(samples())
-    lost = [replace(each, candidates=each.candidates[-1:], most_likely=None, unknown=1.0) for each in made[20:]]
-    axes = Figure().subplots()
-    draw_likelihoods(axes, build_candidate_tracks([build_snapshot(each) for each in (*made[:20], *lost)]), START_NS)
-    (hatched,) = axes.collections
-    assert hatched.get_hatch()
-    corners = hatched.get_paths()[0].vertices
-    for stamp_ns, lowest in ((made[10].stamp_ns, 0.75), (made[30].stamp_ns, 0.0)):
-        near = np.abs(corners[:, 0] - (stamp_ns - START_NS) * 1e-9) < 0.03
-        assert corners[near, 1].min() == lowest
-
-
-def test_a_snapshot_figure_shows_past_and_future_of_the_hand() -> None:
-    made = samples()
-    hand = build_hand_trajectory(made)
-    (span,) = hand.find_movements(0.05)
-    during = [build_snapshot(each) for each in predictions(made) if span[0] <= each.stamp_ns <= span[1]]
-    row = len(during) // 3
-    bounds = compute_bounds(*scene(), during[row].candidates)
-    figure = make_snapshot_figure(hand, build_candidate_tracks(during), row, span, bounds)
-    before, later = (
-        [line for line in figure.axes[0].lines if line.get_label().startswith(f'hand {name}')] for name in ('b', 'l')
-    )
-    now = hand.positions[hand.stamps_ns == during[row].stamp_ns][0]
-    np.testing.assert_array_equal(before[0].get_xydata()[-1], now)
-    np.testing.assert_array_equal(later[0].get_xydata()[0], now)
-    likelihoods = [line.get_ydata() for line in figure.axes[1].lines if len(line.get_ydata()) == len(during)]
-    expected = sorted(each.likelihood for each in during[row].candidates)
-    np.testing.assert_array_equal(sorted(values[row] for values in likelihoods), expected)
 
 
 @pytest.mark.parametrize(('suffix', 'start'), [('png', PNG), ('pdf', b'%PDF'), ('svg', b'<?xml')])

@@ -51,7 +51,7 @@ def test_a_report_is_replaced_by_the_next_one(tmp_path: Path) -> None:
     write_page(tmp_path, 'index.html', 'made by foc_ros')
 
 
-@pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png', 'moment_03.png'])
+@pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png'])
 def test_a_report_overwrites_no_other_file(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text('mine', 'utf-8')
     with pytest.raises(InputError, match='--report: expected a new file, or one that foc_ros has made'):

@@ -55,13 +55,12 @@ def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Pa
     return write_report(directory, title, build_hand_trajectory(made), snapshots, {'recording': 'some <bag> & more'})
 
 
-def test_the_report_is_a_page_without_other_files_and_pictures_beside_it(tmp_path: Path) -> None:
+def test_the_report_is_a_page_without_other_files_and_a_picture_beside_it(tmp_path: Path) -> None:
     """Text is escaped, facts are shown, and nothing is loaded from anywhere; the input is left alone."""
     before = OBSTACLES.centre.copy()
     files = report(tmp_path / 'new' / 'report', title='<img src=x onerror=alert(1)>')
     np.testing.assert_array_equal(OBSTACLES.centre, before)
-    pictures = 'overview.png', *(f'moment_{number:02d}.png' for number in (1, 2, 3, 4))
-    assert {file.name for file in files} == {'index.html', 'predictions.json', *pictures}
+    assert {file.name for file in files} == {'index.html', 'predictions.json', 'overview.png'}
     assert set((tmp_path / 'new' / 'report').iterdir()) == set(files)
     page = Page(files[0])
     for tag, attributes in page.tags:
@@ -190,12 +189,6 @@ def page_data_of(directory: Path) -> dict[str, Any]:
     return json.loads(text.partition('id="report-data">')[2].partition('</script>')[0])
 
 
-@pytest.mark.parametrize(('reaches', 'pictures'), [(1, 4), (3, 3), (10, 8)])
-def test_every_movement_is_shown_up_to_a_number(tmp_path: Path, reaches: int, pictures: int) -> None:
-    report(tmp_path, reaches)
-    assert len(list(tmp_path.glob('moment_*.png'))) == pictures
-
-
 def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path: Path) -> None:
     """Without predictions, without a solved candidate, with a hand that never moves, and with a number that is not finite."""
     hand, made = build_hand_trajectory(samples()), prediction(START_NS, np.zeros(2))
@@ -209,7 +202,7 @@ def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path: Pa
     view = build_snapshot(prediction(int(still.stamps_ns[20]), np.zeros(2)))
     unknown = replace(view, candidates=(replace(view.candidates[0], eta=float('nan')), *view.candidates[1:]))
     files = write_report(tmp_path / 'still', 'x', still, [unknown], {})
-    assert (tmp_path / 'still' / 'moment_01.png') in files
+    assert (tmp_path / 'still' / 'overview.png') in files
     text = files[1].read_text(encoding='utf-8')
     assert 'NaN' not in text and json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
 

@@ -33,7 +33,6 @@ LONG = (
     'test_fit.py::test_strategy_fixed_keeps_its_tau_and_lambda_and_says_so',
     'test_fit.py::test_without_obstacles_goals_*',
     'test_report.py::test_a_long_recording_is_thinned_out*',
-    'test_report.py::test_every_movement_is_shown_up_to_a_number',
     'test_paper.py::test_*trend*',
     'test_paper.py::test_files_hold_the_computed_numbers',
     'test_play_session.py::test_a_fit_and_its_comparison',

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, Prediction
+from foc_ros.core.types import Array, Obstacles, Prediction
 
 from .draw import (
     STYLE,
@@ -20,16 +20,13 @@ from .draw import (
     draw_candidates,
     draw_hand,
     draw_hand_now,
-    draw_likelihoods,
     draw_movement,
     draw_scene,
-    draw_speeds,
     number_labels,
     open_figure,
     save_figure,
 )
 from .legend import draw_legend, measure_legend
-from .tracks import CandidateTracks
 from .views import HandTrajectory, Snapshot, build_snapshot
 
 if TYPE_CHECKING:
@@ -101,30 +98,6 @@ def make_recording_figure(
         axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
         for number, span in enumerate(spans):
             draw_movement(axes, hand.positions[hand.between(*span)], number)
-    return figure
-
-
-def make_snapshot_figure(hand: HandTrajectory, tracks: CandidateTracks, row: int, span: Span, bounds: Bounds) -> Figure:
-    """Return a figure of one snapshot during a movement: the scene above, likelihoods and speeds of the whole movement below.
-
-    row: of the snapshot in the tracks; span: start and end [ns] of the movement.
-    """
-    snapshot, slots = tracks.snapshots[row], tracks.slots_at(row)
-    origin_ns = int(hand.stamps_ns[0])
-    now_s, begin_s, end_s = ((stamp - origin_ns) / NANOSECONDS for stamp in (snapshot.stamp_ns, *span))
-    heights = [_get_height(bounds, snapshot) + 0.4, 2.1, 1.9]
-    with open_figure(WIDTH_IN, sum(heights)) as figure:
-        scene, likelihoods, speeds = figure.subplots(3, 1, height_ratios=heights)
-        draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
-        draw_candidates(scene, snapshot, slots)
-        draw_hand(scene, hand, snapshot.stamp_ns, span)
-        draw_legend(scene)
-        draw_likelihoods(likelihoods, tracks.between(*span), origin_ns)
-        draw_speeds(speeds, hand, snapshot, slots, span, origin_ns)
-        for axes in (likelihoods, speeds):
-            axes.axvline(now_s, color='0.4', linewidth=1.0)
-            axes.set_xlim(begin_s, end_s)
-        scene.set_title(f'at {now_s:.2f} s')
     return figure
 
 
