@@ -52,9 +52,8 @@ PNG = b'\x89PNG\r\n\x1a\n'
 NOWHERE = np.zeros(2)
 
 
-@pytest.mark.parametrize('seed', range(5))
-def test_an_ellipse_is_the_level_set_of_the_covariance(seed: int) -> None:
-    root = np.random.default_rng(seed).normal(size=(2, 2))
+def test_an_ellipse_is_the_level_set_of_the_covariance() -> None:
+    root = np.random.default_rng(0).normal(size=(2, 2))
     covariance, centre = root @ root.T, np.array([0.3, -0.1])
     ellipse = make_stddev_ellipse(centre, covariance, 2.0)
     edge = ellipse.get_patch_transform().transform(np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])) - centre

@@ -18,7 +18,6 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import HandSample, Status
 from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
 from foc_ros.reporting.report import describe_late, write_report
@@ -170,18 +169,6 @@ def test_a_busy_computer_is_told_once_with_what_to_change_and_an_estimate_is_not
     assert 'rate_hz' in words and 'homotopy.max_candidates' in words and 'budget_s' in words
     (words,), _ = told([end_with(each, Status.COMPROMISED) for each in made[:5]] + calm[5:])
     assert words.startswith(f'In 5 of {count} predictions the most likely path avoids the obstacles less surely than wanted')
-
-
-def test_the_vertices_of_a_box_are_behind_the_numbers_of_a_circle(tmp_path: Path) -> None:
-    made = samples()
-    boxes = collect_obstacles(
-        [Circle((0.15, 0.0), 0.03, 0.003, name='1'), Box((0.22, 0.1), (0.1, 0.02), radius_stddev=0.001, name='post')]
-    )
-    snapshots = [build_snapshot(replace(each, obstacles=boxes)) for each in predictions(made)]
-    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
-    (scene,) = page_data_of(tmp_path)['scenes']
-    corners = [500, 100, -500, 100, -500, -100, 500, -100]
-    assert scene == [['1', 1500, 0, 300, 30], ['post', 2200, 1000, 0, 10, *corners]]
 
 
 def page_data_of(directory: Path) -> dict[str, Any]:
