@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag, ValidationError
 
+from foc_ros.core.classes.guess import timed
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, join_errors
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, Shape, collect_obstacles
@@ -209,24 +210,20 @@ def parse_scene(document: object) -> ReachingScene:
 def guess_path(start: Array, goal: Array, steps: int, amplitude: float = 0.0, via: Array | None = None) -> Array:
     """Return positions at steps 0..N, (N + 1, 2) [m], from start (2,) to goal (2,), with the timing of a minimum-jerk movement.
 
-    They are the share s = 10 r^3 - 15 r^4 + 6 r^5, r = k/N, along the straight line, plus amplitude sin(pi r) [m] to its left; or
-    along the line through the points `via` (m, 2). If `via` has N + 1 points, it is returned as it is.
+    They are on the line through the points `via` (m, 2), or on the straight line plus amplitude sin(pi k/N) [m] to its left. If
+    `via` has N + 1 points, it is returned as it is.
     """
     if via is not None and len(via) == steps + 1:
         return via
-    ratio = np.arange(steps + 1) / steps
-    progress = 10 * ratio**3 - 15 * ratio**4 + 6 * ratio**5
+    path = timed(np.vstack([start, *([] if via is None else via), goal]), np.zeros(2), 1.0, steps)
     if via is not None:
-        points = np.vstack([start, via, goal])
-        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        return np.column_stack([np.interp(progress * length[-1], length, axis) for axis in points.T])
+        return path
     direction = goal - start
     distance = float(np.hypot(*direction))
     if not distance:
         raise SceneError('guess', 'a goal away from the start', f'both at {start.tolist()}')
-    left = np.array([-direction[1], direction[0]]) / distance
-    path: Array = start + progress[:, None] * direction + amplitude * np.sin(np.pi * ratio)[:, None] * left
-    return path
+    aside = amplitude / distance * np.array([-direction[1], direction[0]])
+    return path + np.outer(np.sin(np.pi * np.arange(steps + 1) / steps), aside)
 
 
 def _read_fields(given: Mapping[str, Any]) -> SceneFields:
