@@ -45,16 +45,12 @@ def test_a_snapshot_holds_the_numbers_of_its_prediction_and_names_classes_in_wor
     assert describe_class(()) == 'direct'
 
 
-def test_the_unknown_share_is_that_of_the_prediction() -> None:
-    assert build_snapshot(replace(prediction(START_NS, NOWHERE), unknown=0.25)).unknown_share == 0.25
-
-
-def test_the_motor_noise_is_kept_beside_the_total_uncertainty() -> None:
-    made = prediction(START_NS, NOWHERE)
+def test_the_motor_noise_and_the_unknown_share_are_kept() -> None:
+    made = replace(prediction(START_NS, NOWHERE), unknown=0.25)
     assert not build_snapshot(made).candidates[0].is_widened
-    view = build_snapshot(widen(made)).candidates[0]
-    assert view.is_widened
-    np.testing.assert_array_equal(view.covariance, 3.0 * view.motor_covariance)
+    snapshot = build_snapshot(widen(made))
+    assert snapshot.candidates[0].is_widened and snapshot.unknown_share == 0.25
+    np.testing.assert_array_equal(snapshot.candidates[0].covariance, 3.0 * snapshot.candidates[0].motor_covariance)
 
 
 def test_a_trajectory_leaves_late_samples_out() -> None:
@@ -168,12 +164,6 @@ def test_simultaneous_tracks_have_different_letters_and_different_colours_while_
     slots = assign_slots(snapshots, tracks, 6, 3)
     assert [slots[track] for track in tracks[2].values()] == [0, 2]
     assert len({slots[track] % 3 for track in list(tracks[3].values())[:3]}) == 3
-
-
-def test_a_letter_is_reused_as_late_as_possible() -> None:
-    alone = [snapshot(number, f'goal{number}:+1') for number in (0, 51, 102, 153)]
-    tracks = build_candidate_tracks(alone).tracks
-    assert list(assign_slots(alone, tracks, 3, 3).values()) == [0, 1, 2, 0]
 
 
 def test_tracks_are_numbered_from_0_whatever_the_classes_are_called() -> None:

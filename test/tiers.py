@@ -40,8 +40,9 @@ LONG = (
     'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
     # many more damaged files
     'test_fuzz_inputs.py::test_many_*',
-    # the commands of the documentation
+    # the commands of the documentation, and its web site
     'test_shown_commands.py::test_commands_work_as_shown',
+    'test_documentation_site.py::*',
     # a node under load, and a process that is stopped or killed
     'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
     'test_demo.py::test_the_live_predictions_are_those_of_the_recording',

@@ -21,8 +21,8 @@ LABELS_IN = 0.5
 """Height of the labels below axes [in]."""
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
-SIGNS = 7
-"""Signs of a scene at most, but for those of a hand that moves."""
+SIGNS = 6
+"""Signs of a scene at most, but for those of a hand that moves and for dotted lines."""
 DOTTED = 'dotted: not known to avoid as surely as wanted'
 """What the line of a compromised or estimated candidate means."""
 _PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
@@ -41,7 +41,8 @@ def describe_in_legend(view: CandidateView | UnsolvedView, letter: str = ' ', re
 
 def measure_legend(candidates: Sequence[CandidateView | UnsolvedView]) -> float:
     """Return the height of the legend of a scene that is as wide as a page [in]."""
-    lines = sum(1 + fill(describe_in_legend(each), COLUMNS).count('\n') for each in candidates) + -(-SIGNS // 2)
+    signs = SIGNS + any(isinstance(each, CandidateView) and each.is_compromised for each in candidates)
+    lines = sum(1 + fill(describe_in_legend(each), COLUMNS).count('\n') for each in candidates) + -(-signs // 2)
     return lines * LINE * SIZE_PT / 72.0 + 0.05
 
 
