@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import FocError, InputError
-from foc_ros.core.obstacles.geometry import find_limits, trace_obstacle
+from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obstacle
 from foc_ros.core.types import Array, Obstacles
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 
@@ -151,6 +151,7 @@ def draw_scene(
     An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the
     goals (g, 2) have their names, by default the numbers in the labels of candidates.
     """
+    holds_goal = find_holders(goals, obstacles).any(axis=0)
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
         ring = STDDEVS * float(obstacles.radius_stddev[row])
         look = {'facecolor': '0.65', 'edgecolor': '0.35', 'linewidth': 0.8, 'zorder': 1.0, 'label': 'obstacle'}
@@ -159,7 +160,9 @@ def draw_scene(
             look = {'facecolor': '0.88', 'edgecolor': '0.7', 'linewidth': 0.6, 'zorder': 0.9, 'label': RADIUS_STDDEV}
             axes.add_patch(make_obstacle_patch(obstacles, row, ring, **look))
         if len(obstacles) <= NAMED_OBSTACLES:
-            axes.text(*centre, name, ha='center', va='center', fontsize=8, clip_on=True)
+            below = 12 if holds_goal[row] else 0  # where the sign of the goal does not cover it
+            look = {'xytext': (0, -below), 'textcoords': 'offset points', 'ha': 'center', 'va': 'center'}
+            axes.annotate(name, centre, fontsize=8, annotation_clip=True, **look)
     for number, goal in enumerate(goals):
         look = {'marker': '*', 'markersize': 12, 'color': 'black', 'markerfacecolor': 'white', 'linestyle': ''}
         axes.plot(*goal, zorder=5, label='goal', **look)
