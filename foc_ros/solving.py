@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from foc_ros.api import Prediction
 from foc_ros.core import types
+from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, SceneError
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
@@ -118,8 +119,6 @@ def solve(
     target = table.positions[0]
     scene = _build_scene(start, table, obstacles, config)
     if guess is not None:
-        from foc_ros.io.scene_file import guess_path
-
         points = check_array('guess', guess, (None, 2))
         scene = replace(scene, guess=guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
     candidates = _solve(scene)

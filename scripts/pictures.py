@@ -30,6 +30,7 @@ from page import IMAGES, ROOT
 
 import foc_ros
 from foc_ros.analysis.replay import Replay
+from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacles.shapes import collect_obstacles
@@ -37,7 +38,7 @@ from foc_ros.core.plant.covariance import stack_noise
 from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import BagReader
-from foc_ros.io.scene_file import guess_path, load_scene
+from foc_ros.io.scene_file import load_scene
 from foc_ros.reporting import draw
 from foc_ros.reporting.draw import compute_bounds, draw_scene, get_class_style, open_figure, save_figure
 from foc_ros.reporting.figures import draw_snapshot, make_moment_figure

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError, SceneError, list_messages
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, collect_obstacles
-from foc_ros.io.scene_file import guess_path, load_scene, parse_scene
+from foc_ros.io.scene_file import load_scene, parse_scene
 
 SCENE: dict[str, Any] = {
     'start': [0.0, 0.1],

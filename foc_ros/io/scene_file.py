@@ -16,13 +16,13 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag, ValidationError
 
-from foc_ros.core.classes.guess import timed
+from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, join_errors
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.scene import ReachingScene
 from foc_ros.core.support import FARTHEST, GoalTable, collect_goals
-from foc_ros.core.types import Array, Goal, HandState, Obstacles
+from foc_ros.core.types import Goal, HandState, Obstacles
 
 from .documents import read_document
 from .fields import Fields, describe_errors
@@ -205,25 +205,6 @@ def parse_scene(document: object) -> ReachingScene:
     bulge = fields.guess.amplitude if isinstance(fields.guess, BulgeFields) else 0.0
     via = None if isinstance(fields.guess, BulgeFields) else np.array(fields.guess).reshape(-1, 2)
     return replace(scene, guess=guess_path(scene.hand.mean[:2], scene.goals[0], config.foc.steps, bulge, via))
-
-
-def guess_path(start: Array, goal: Array, steps: int, amplitude: float = 0.0, via: Array | None = None) -> Array:
-    """Return positions at steps 0..N, (N + 1, 2) [m], from start (2,) to goal (2,), with the timing of a minimum-jerk movement.
-
-    They are on the line through the points `via` (m, 2), or on the straight line plus amplitude sin(pi k/N) [m] to its left. If
-    `via` has N + 1 points, it is returned as it is.
-    """
-    if via is not None and len(via) == steps + 1:
-        return via
-    path = timed(np.vstack([start, *([] if via is None else via), goal]), np.zeros(2), 1.0, steps)
-    if via is not None:
-        return path
-    direction = goal - start
-    distance = float(np.hypot(*direction))
-    if not distance:
-        raise SceneError('guess', 'a goal away from the start', f'both at {start.tolist()}')
-    aside = amplitude / distance * np.array([-direction[1], direction[0]])
-    return path + np.outer(np.sin(np.pi * np.arange(steps + 1) / steps), aside)
 
 
 def _read_fields(given: Mapping[str, Any]) -> SceneFields:
