@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,10 +36,10 @@ if TYPE_CHECKING:
 WIDTH_IN = 6.4
 
 
-def draw_snapshot(axes: Any, snapshot: Snapshot, bounds: Bounds, slots: Mapping[str, int] | None = None) -> None:
-    """Draw a scene with the candidates in it, the hand and a legend; slots: by label, in order of likelihood if not given."""
+def draw_snapshot(axes: Any, snapshot: Snapshot, bounds: Bounds) -> None:
+    """Draw a scene with the candidates in it, lettered in order of likelihood, the hand and a legend of all that is drawn."""
     draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
-    draw_candidates(axes, snapshot, number_labels(snapshot.candidates) if slots is None else slots)
+    draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
     if snapshot.hand is not None:
         draw_hand_now(axes, snapshot.hand[None])
     draw_legend(axes, None if snapshot.candidates else 'no candidate could be solved')
@@ -106,10 +107,8 @@ def make_moment_figure(hand: HandTrajectory, snapshot: Snapshot, span: Span) -> 
     bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
     with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
         axes = figure.subplots()
-        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
-        draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
         draw_hand(axes, hand, snapshot.stamp_ns, span)
-        draw_legend(axes)
+        draw_snapshot(axes, replace(snapshot, hand=None), bounds)
     return figure
 
 
