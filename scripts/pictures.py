@@ -30,21 +30,21 @@ from page import IMAGES, ROOT
 
 import foc_ros
 from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.solve import solve_to_values
 from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.plant.covariance import stack_noise
-from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import BagReader
 from foc_ros.io.scene_file import load_scene
 from foc_ros.reporting import draw
 from foc_ros.reporting.draw import compute_bounds, draw_scene, get_class_style, open_figure, save_figure
-from foc_ros.reporting.figures import draw_snapshot, make_moment_figure
+from foc_ros.reporting.figures import make_moment_figure, make_scene_figure
 from foc_ros.reporting.report import ReportCollector
 from foc_ros.reporting.tracks import CandidateTracks, build_candidate_tracks
-from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_candidate_views, build_hand_trajectory
+from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
 from foc_ros.ros.parameters import dump_parameter_file
 
 sys.path.append(str(ROOT / 'test'))
@@ -295,12 +295,7 @@ def strategies() -> Figure:
 
 def classes() -> Figure:
     """Return the solved candidates of the scene of the examples."""
-    scene = load_scene(SCENE)
-    candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
-    with open_figure(7.4, 5.6) as figure:
-        snapshot = Snapshot(0, scene.obstacles, scene.goals, candidates, None, hand=scene.hand.mean[:2])
-        draw_snapshot(figure.subplots(), snapshot, compute_bounds(scene.obstacles, scene.goals, candidates))
-    return figure
+    return make_scene_figure(build_snapshot(solve_to_values(load_scene(SCENE), None)[0]))
 
 
 def likelihood() -> Figure:

@@ -149,7 +149,7 @@ def replay(
     output
         New bag for inputs and predictions.
     report
-        Folder for a page with pictures.
+        Folder for a page, its numbers and a picture of all movements.
     params
         The node's parameter file (default: every parameter has its default).
     guidance
