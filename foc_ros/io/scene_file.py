@@ -160,7 +160,7 @@ class SceneFields(Fields):
         """Return the goals; raises SceneError."""
         if (self.goal is None) == (self.goals is None):
             raise SceneError('goal', 'either goal or goals', 'neither' if self.goal is None else 'both')
-        given = [self.goal] if self.goals is None else self.goals
+        given = self.goals or ([] if self.goal is None else [self.goal])
         rows = [Goal(each.position, each.name, each.object) if isinstance(each, GoalFields) else each for each in given]
         return collect_goals('goals', rows)
 
@@ -173,7 +173,13 @@ class SceneFields(Fields):
         return collect_obstacles([each for each in shapes if each is not None])
 
 
-KINDS = {'(circle)': CircleFields, '(box)': BoxFields, '(hull)': HullFields, '(goal)': GoalFields, '(guess)': BulgeFields}
+KINDS: dict[str, type[Fields]] = {
+    '(circle)': CircleFields,
+    '(box)': BoxFields,
+    '(hull)': HullFields,
+    '(goal)': GoalFields,
+    '(guess)': BulgeFields,
+}
 NAMES = {'': [*SceneFields.model_fields, *PARAMETERS]} | {tag: [*kind.model_fields] for tag, kind in KINDS.items()}
 """Names of the fields of a scene, and of the mappings in it by their tags."""
 

@@ -151,7 +151,7 @@ def draw_scene(
     An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the
     goals (g, 2) have their names, by default the numbers in the labels of candidates.
     """
-    holds_goal = find_holders(goals, obstacles).any(axis=0)
+    holds_goal = np.any(find_holders(goals, obstacles), axis=0).tolist()
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
         ring = STDDEVS * float(obstacles.radius_stddev[row])
         look = {'facecolor': '0.65', 'edgecolor': '0.35', 'linewidth': 0.8, 'zorder': 1.0, 'label': 'obstacle'}
