@@ -114,6 +114,9 @@ def test_a_goal_without_a_path_is_named(tmp_path: Path, capsys: pytest.CaptureFi
     assert solve(tmp_path, {**scene, 'goals': [[0.1, 0.1], {'position': [0.3, 0.0], 'name': 'core'}]}) == 0
     out = capsys.readouterr().out
     assert 'core: no path to it was found' in out and 'classes solved together in' in out
+    assert solve(tmp_path, {**scene, 'goal': [0.3, 0.0]}, '--plot', str(tmp_path / 'none.png')) == 3
+    assert capsys.readouterr() == ('', 'foc_ros solve: no path was found between the start and any goal\n')
+    assert (tmp_path / 'none.png').exists()
 
 
 def test_no_candidate_is_late_where_there_is_no_time_limit() -> None:

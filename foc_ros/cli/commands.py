@@ -115,7 +115,7 @@ def solve(scene: Existing, /, *, json: bool = False, monte_carlo: Samples | None
         write_picture(plot, prediction)
     if json:
         print(json_format.dumps(values, allow_nan=False))
-    else:
+    elif prediction.candidates:
         show_table(*make_table(values['candidates']))
     if prediction.most_likely is not None:
         for line in [] if json else describe_rest(prediction):
