@@ -128,7 +128,7 @@ def test_a_scene_holds_every_obstacle_goal_and_candidate() -> None:
 
 def test_every_path_begins_at_the_hand_also_that_of_an_answer_from_before() -> None:
     """Every other prediction of the packaged recording has no time, so that answers from before are shown."""
-    intake, drawn, kept = Intake(Pipeline(Config())), 0, 0
+    intake, drawn, kept = Intake(Pipeline(Config().with_values({'rate_hz': 25.0, 'foc.steps': 20}))), 0, 0
     with BagReader(RECORDING) as reader:
         for item in islice(reader, 190):
             intake.take(item.role, item.message)

@@ -31,8 +31,8 @@ def find_widest(printed: str) -> int:
     [
         ['solve', 'scene.yaml', '--monte-carlo', '100'],
         ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'), '--params', 'slow.yaml'],
-        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1'],
-        ['evaluate', 'data', '--workers', '1'],
+        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1', '--params', 'quick.yaml'],
+        ['evaluate', 'data', '--workers', '1', '--params', 'quick.yaml'],
     ],
     ids=lambda arguments: arguments[0],
 )
@@ -42,6 +42,7 @@ def test_the_output_of_a_command_fits(
     monkeypatch.chdir(tmp_path)
     Path('scene.yaml').write_text(SCENE)
     Path('slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}')
+    Path('quick.yaml').write_text('/**: {ros__parameters: {rate_hz: 5.0, foc.steps: 10}}')
     if 'data' in arguments:
         write_tables(Path('data'), count=2)
     assert main(arguments) == 0
