@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,8 @@ import numpy as np
 import pytest
 from reach_helpers import reference_cases
 
-import foc_ros
 from foc_ros.cli.main import main
+from foc_ros.core.ocp import strategies
 from foc_ros.core.types import Status
 
 SCENE: dict[str, Any] = {
@@ -119,16 +120,14 @@ def test_a_goal_without_a_path_is_named(tmp_path: Path, capsys: pytest.CaptureFi
     assert (tmp_path / 'none.png').exists()
 
 
-def test_no_candidate_is_late_where_there_is_no_time_limit() -> None:
-    """In this scene the QPs of one class end before its loss does."""
-    boxes = ((0.176, -0.022, 0.063, 0.012, -0.11), (0.108, 0.045, 0.028, 0.015, 0.93), (0.205, 0.005, 0.053, 0.012, -0.63))
-    circles = foc_ros.Circle((0.145, -0.06), 0.019, 0.0034), foc_ros.Circle((0.208, 0.017), 0.044, 0.0044)
-    shapes = [foc_ros.Box(each[:2], each[2:4], each[4]) for each in boxes]
-    shapes = [shapes[0], *circles, *shapes[1:]]
-    found = foc_ros.solve_classes([0.0, 0.0, 0.21, 0.08, 0.0, 0.0], (0.3, 0.0), shapes, eta=0.99, duration_s=0.44)
-    assert Status.DEADLINE not in {each.status for each in found}
-    (unsettled,) = [each for each in found if each.status is Status.ESTIMATED]
-    assert f'not settled after {unsettled.solution.qp_solves} QPs' in unsettled.reason and unsettled.likelihood > 0.0
+@pytest.mark.parametrize('strategy', [{'strategy': 'optimal'}, {'strategy': 'fixed', 'tau': 5e-4, 'lambda': 1e3}])
+def test_a_class_that_is_not_settled_says_so_and_is_late_only_where_there_is_a_time_limit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, strategy: dict[str, Any]
+) -> None:
+    monkeypatch.setattr(strategies, 'solve_at', partial(strategies.solve_at, most=1))
+    for each in candidates(tmp_path, capsys, {**SCENE, **strategy}):
+        assert each['status'] == 'estimated' and each['likelihood'] > 0.0
+        assert each['message'].startswith('not settled after 1 QPs')
 
 
 def test_the_terminal_gives_reason_and_remedy_of_what_is_not_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
