@@ -62,7 +62,7 @@ def describe_rest(prediction: Prediction) -> list[str]:
     """Return lines below the table: the time of all classes, why some are not solved, and goals without a class."""
     reached = {each.candidate.goal for each in prediction}
     return [
-        f'{len(prediction)} classes solved together in {1e3 * prediction.solve_s:.1f} ms',
+        f'{len(prediction)} class{"es" * (len(prediction) > 1)} solved in {1e3 * prediction.solve_s:.1f} ms',
         *(f'{each.description}: {each.reason}' for each in prediction if not each.is_solved),
         *(f'{goal.name}: no path to it was found' for row, goal in enumerate(prediction.goals) if row not in reached),
     ]
