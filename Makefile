@@ -12,7 +12,7 @@
 # make people      predictions of people, where their recordings are beside the checkout: doc/people.md; OPTIONS=--every 4
 # make colcon      build, start, lint and test with colcon, as in a ROS workspace
 # make dist        build the source distribution and the wheel in build/dist, and try the wheel in an empty environment
-# make stress      a live node: ten minutes among faulty publishers, 200 stops, scenes that are hard to predict in;
+# make stress      a live node: ten minutes among faulty publishers, and scenes that are hard to predict in;
 #                  'OPTIONS=soak --minutes 1' for a part (scripts/stress.py --help)
 # make clean       remove everything that these targets have made
 
@@ -118,7 +118,7 @@ $(VENV)/.dist: $(STAMP)
 	@touch $@
 
 stress: $(STAMP)
-	$(if $(OPTIONS),$(BIN)/python scripts/stress.py $(OPTIONS),for part in soak stops hostile; do $(BIN)/python scripts/stress.py $$part || exit; done)
+	$(if $(OPTIONS),$(BIN)/python scripts/stress.py $(OPTIONS),for part in soak hostile; do $(BIN)/python scripts/stress.py $$part || exit; done)
 
 # a warning of Sphinx, such as a link to a page that does not exist, is a failure
 doc: $(VENV)/.doc

@@ -64,6 +64,7 @@ setup(
         'mcap>=1.1',
         'numpy>=1.23',
         'piqp>=0.6',
+        'pydantic>=2',
         'qpsolvers>=4.3',
         'PyYAML>=6.0',
         'rich>=13.0',
@@ -75,7 +76,7 @@ setup(
         'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
         'report': REPORT,
         # the page on which one tries it with one's own hand
-        'play': [*REPORT, 'pydantic>=2', 'tornado>=6.2'],
+        'play': [*REPORT, 'tornado>=6.2'],
         # recordings on the workers of a Dask cluster
         'cluster': ['distributed>=2024.1'],
         # the documentation as a web site; django-static-mathjax is MathJax as a wheel, without Django

@@ -5,7 +5,7 @@ Replay of a bag
 ===============
 
 `foc_ros.replay` reads a ROS 2 bag and yields the predictions that the node would have made, without ROS. This example replays the
-packaged recording of a simulated operator at 25 predictions a second.
+packaged recording of a simulated operator at 10 predictions a second.
 """
 
 from importlib.resources import files
@@ -16,7 +16,7 @@ import numpy as np
 import foc_ros
 
 recording = files('foc_ros') / 'recordings' / 'reaching.mcap'
-predictions = list(foc_ros.replay(str(recording), foc_ros.Config().with_values({'rate_hz': 25.0})))
+predictions = list(foc_ros.replay(str(recording), foc_ros.Config().with_values({'rate_hz': 10.0})))
 print(f'{len(predictions)} predictions in {predictions[-1].t - predictions[0].t:.1f} s of the recording')
 
 # %%

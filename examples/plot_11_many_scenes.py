@@ -4,7 +4,7 @@
 A batch of many scenes
 ======================
 
-Studies need many scenes. This example solves twenty random scenes with two strategies and compares their efforts. Expected
+Studies need many scenes. This example solves eight random scenes with two strategies and compares their efforts. Expected
 failures are a status and not an exception, so that a batch never stops at a difficult scene.
 """
 
@@ -26,7 +26,7 @@ def make_scene(seed: int) -> list[foc_ros.Circle]:
     return [foc_ros.Circle(centre, generator.uniform(0.012, 0.025), 0.002) for centre in centres]
 
 
-scenes = [make_scene(seed) for seed in range(20)]
+scenes = [make_scene(seed) for seed in range(8)]
 results = {
     strategy: [foc_ros.solve((0.0, 0.0), (0.32, 0.0), scene, eta=0.9, strategy=strategy, config=config) for scene in scenes]
     for strategy in ('lv', 'optimal')

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 
-COMMANDS_NEED = ('cyclopts', 'joblib', 'mcap', 'rich', 'rosbags')
+COMMANDS_NEED = ('cyclopts', 'joblib', 'mcap', 'pydantic', 'rich', 'rosbags')
 """Packages of the commands that the node does without."""
 
 

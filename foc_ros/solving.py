@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 
 from foc_ros.api import Prediction
 from foc_ros.core import types
+from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, SceneError
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.predict import build_scene_problems, solve_scene
-from foc_ros.core.scene import ReachingScene, check_outside
+from foc_ros.core.scene import ReachingScene
 from foc_ros.core.support import GoalTable, check_array, check_config, check_number, check_vector, collect_goals, find_shape
 from foc_ros.core.types import Candidate, Goal, HandState, Obstacles, PredictedCandidate, make_obstacles
 
@@ -77,7 +78,8 @@ def solve(
     start : array_like of shape (2,) or (6,)
         Position of a hand at rest [m], or its state x, y, vx, vy, ax, ay [m, m/s, m/s^2].
     goal : array_like of shape (2,), or Goal
-        Position at which the hand comes to rest [m].
+        Position at which the hand comes to rest [m]. An obstacle that holds it, or that a `Goal` names as its object, does not
+        block the path to it.
     obstacles : iterable of Circle, Box, Capsule and Hull, or one of them, or Obstacles
         The obstacles.
     eta : float, optional
@@ -117,8 +119,6 @@ def solve(
     target = table.positions[0]
     scene = _build_scene(start, table, obstacles, config)
     if guess is not None:
-        from foc_ros.io.scene_file import guess_path
-
         points = check_array('guess', guess, (None, 2))
         scene = replace(scene, guess=guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
     candidates = _solve(scene)
@@ -163,7 +163,7 @@ def solve_classes(
     """
     table = _collect_goals(goal)
     scene = _build_scene(start, table, obstacles, _fix_parameters(config, eta, strategy, duration_s))
-    return tuple(each.with_goal_name(table.names[each.candidate.goal]) if table.names else each for each in _solve(scene))
+    return _solve(scene)
 
 
 def _collect_goals(goal: ArrayLike | Goal | Iterable[Goal | ArrayLike]) -> GoalTable:
@@ -182,9 +182,10 @@ def _build_scene(
         raise SceneError('start', expected, f'{start!r} of shape {size}')
     state, obstacles = np.zeros(6), collect_obstacles(shapes)
     state[: size[0]] = check_vector('start', start, size[0])
-    for name, point in (('start', state[:2]), *(('goal', goal) for goal in table.positions)):
-        check_outside(name, point, obstacles.grow(config.scene.hand_radius))
-    return ReachingScene(HandState(0, state, np.zeros((6, 6))), table.positions, obstacles, None, None, config)
+    hand = HandState(0, state, np.zeros((6, 6)))
+    scene = ReachingScene(hand, table.positions, obstacles, None, None, config, table.names, table.objects)
+    scene.check()
+    return scene
 
 
 def _fix_parameters(config: Config | None, eta: float | None, strategy: str | None, duration_s: float) -> Config:

@@ -30,20 +30,21 @@ from page import IMAGES, ROOT
 
 import foc_ros
 from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.solve import solve_to_values
+from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.plant.covariance import stack_noise
-from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import BagReader
-from foc_ros.io.scene_file import guess_path, load_scene
+from foc_ros.io.scene_file import load_scene
 from foc_ros.reporting import draw
 from foc_ros.reporting.draw import compute_bounds, draw_scene, get_class_style, open_figure, save_figure
-from foc_ros.reporting.figures import draw_snapshot, make_moment_figure
+from foc_ros.reporting.figures import make_moment_figure, make_scene_figure
 from foc_ros.reporting.report import ReportCollector
-from foc_ros.reporting.tracks import build_candidate_tracks
-from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_candidate_views, build_hand_trajectory
+from foc_ros.reporting.tracks import CandidateTracks, build_candidate_tracks
+from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
 from foc_ros.ros.parameters import dump_parameter_file
 
 sys.path.append(str(ROOT / 'test'))
@@ -110,14 +111,26 @@ def pictures(
                 draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
                 draw.draw_candidates(scene, snapshot, tracks.slots_at(row))
                 draw.draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
-                draw.draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)
+                draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)
                 limits = (0.0, (end_ns - start_ns) / NANOSECONDS)
-                shares.set(xlim=limits, xlabel='time [s]', title='likelihood of each candidate', ylabel='')
-                shares.tick_params(labelbottom=True)
-                if shares.get_legend():
-                    shares.get_legend().remove()
+                shares.set(xlim=limits, ylim=(-0.03, 1.03), xlabel='time [s]', title='likelihood of each candidate')
                 figure.legend(*zip(*make_signs(), strict=True), loc='outside lower center', ncols=5, frameon=False, fontsize=9)
             yield figure, STEP_MS if row != rows[-1] else LAST_MS
+
+
+def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None:
+    """Draw the likelihoods of the tracks that have a slot over time [s]; the share that no candidate has is hatched."""
+    times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
+    drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
+    for rank, (track, (first, values)) in enumerate(drawn.items()):
+        colour = draw.CLASS_COLOURS[tracks.slots[track] % len(draw.CLASS_COLOURS)]
+        axes.plot(times[first : first + len(values)], values, color=colour, linewidth=1.8, marker='.', markersize=2.5)
+        known = np.flatnonzero(np.isfinite(values))
+        row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
+        draw.draw_tag(axes, (times[first + row], values[row]), draw.get_letter(tracks.slots[track]), colour)
+    unknown = np.array([each.unknown_share + each.other_share for each in tracks.snapshots])
+    look = {'facecolor': 'none', 'edgecolor': '0.6', 'hatch': '////', 'linewidth': 0.0, 'step': 'mid'}
+    axes.fill_between(times, 1.0 - unknown, 1.0, **look)
 
 
 def select_likely(snapshot: Snapshot) -> tuple[CandidateView, ...]:
@@ -282,12 +295,7 @@ def strategies() -> Figure:
 
 def classes() -> Figure:
     """Return the solved candidates of the scene of the examples."""
-    scene = load_scene(SCENE)
-    candidates = build_candidate_views(solve_scene(scene, build_scene_problems(scene)))
-    with open_figure(7.4, 5.6) as figure:
-        snapshot = Snapshot(0, scene.obstacles, scene.goals, candidates, None, hand=scene.hand.mean[:2])
-        draw_snapshot(figure.subplots(), snapshot, compute_bounds(scene.obstacles, scene.goals, candidates))
-    return figure
+    return make_scene_figure(build_snapshot(solve_to_values(load_scene(SCENE), None)[0]))
 
 
 def likelihood() -> Figure:

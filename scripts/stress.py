@@ -3,7 +3,6 @@
 """A live node in its own process under stress. Other programs of the machine lengthen all times: run it alone.
 
     python scripts/stress.py soak [--minutes 10]
-    python scripts/stress.py stops [--count 100]
     python scripts/stress.py hostile [--seconds 6] [--only SCENE] [--strategy NAME]
     python scripts/stress.py rates [--seconds 10]
 
@@ -11,9 +10,6 @@ soak: inputs at 100 Hz and random faults. The exit code is 0 if the memory does 
 remains open, no valid pose is lost, the 99th percentile of the cycle time does not grow, and the node has no internal error
 and stops without one. A valid pose is lost if the node never receives it or refuses it; due poses before the newest one are
 counted as dropped cycles and are not lost.
-
-stops: by SIGTERM and SIGINT, at random times up to SPREAD_S after the node installed its handlers. The exit code is 0 if all
-nodes ended with exit code 0 and without a traceback.
 
 hostile: scenes that are hard to predict in. The exit code is 0 if, for each scene and strategy, the longest gap between two
 diagnostics is below GAP_S and the longest answer of `~/engage` below ANSWER_S; no prediction is published later than
@@ -29,7 +25,6 @@ from __future__ import annotations
 
 import os
 import random
-import signal
 import statistics
 import subprocess
 import sys
@@ -63,8 +58,8 @@ BURST, BURST_NS, LATE_NS = 20, 100_000, 50_000_000
 """Number of poses sent at once, as after a stall of the network; least difference of their stamps; how late a late one is."""
 WARM_UP, GROWTH, SLOWER = 0.2, 1.05, 1.5
 """Share of the time that is not judged; largest accepted growth of the memory, and of the 99th percentile."""
-SPREAD_S, LIMIT_S, START_S = 2.0, 30.0, 120.0
-"""Largest time before a stop, and times within which a node has to end and to start."""
+LIMIT_S, START_S = 30.0, 120.0
+"""Times within which a node has to end and to start [s]."""
 STRATEGIES = ('lv', 'hc', 'optimal')
 GAP_S, ANSWER_S, PUNCTUAL = 1.3, 0.05, 0.999
 ASK_EVERY = 10
@@ -268,15 +263,15 @@ class Ended:
 
 
 @contextmanager
-def run_node(parameters: Mapping[str, object], number: signal.Signals = signal.SIGTERM) -> Iterator[tuple[int, Ended]]:
-    """Start a node with parameters, and stop it by a signal; yield its process id, and how it will have ended."""
+def run_node(parameters: Mapping[str, object]) -> Iterator[tuple[int, Ended]]:
+    """Start a node with parameters, and stop it; yield its process id, and how it will have ended."""
     options = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
     command, ended = [sys.executable, '-m', 'foc_ros.ros.main', '--ros-args', *options], Ended()
     with tempfile.TemporaryFile('w+') as log, subprocess.Popen(command, stdout=log, stderr=log, text=True) as process:
         try:
             yield process.pid, ended
         finally:
-            process.send_signal(number)
+            process.terminate()
             try:
                 ended.code = process.wait(LIMIT_S)
             except subprocess.TimeoutExpired:
@@ -285,14 +280,10 @@ def run_node(parameters: Mapping[str, object], number: signal.Signals = signal.S
             ended.errors = log.read()
 
 
-def read_status(pid: int) -> dict[str, str]:
-    """Return what Linux says of a process, by name."""
-    return dict(line.split(':', 1) for line in Path(f'/proc/{pid}/status').read_text('ascii').splitlines())
-
-
 def measure_process(pid: int) -> dict[str, float]:
     """Return resident memory [MB], threads and open files of a process."""
-    status, files = read_status(pid), len(list(Path(f'/proc/{pid}/fd').iterdir()))
+    status = dict(line.split(':', 1) for line in Path(f'/proc/{pid}/status').read_text('ascii').splitlines())
+    files = len(list(Path(f'/proc/{pid}/fd').iterdir()))
     return {'memory': int(status['VmRSS'].split()[0]) / 1024.0, 'threads': float(status['Threads']), 'files': float(files)}
 
 
@@ -347,18 +338,6 @@ def judge(table: list[dict[str, float]], player: Player) -> dict[str, bool]:
         ),
         f'internal error: {player.health["last internal error"]}': player.health['last internal error'] == 'none',
     }
-
-
-def stop_one_node(player: Player, number: signal.Signals, after_s: float) -> str | None:
-    """Start a node and stop it; return what went wrong, None if nothing did."""
-    with run_node({'foc.steps': 20, 'homotopy.max_candidates': 2}, number) as (pid, ended):
-        began = time.monotonic()
-        while not int(read_status(pid)['SigCgt'], 16) >> (signal.SIGTERM - 1) & 1 and time.monotonic() - began < LIMIT_S:
-            time.sleep(0.005)
-        player.play(after_s)
-    return (
-        None if ended.is_clean else f'{number.name} after {after_s:.2f} s: exit code {ended.code}, {ended.errors.strip()[-400:]}'
-    )
 
 
 def scatter(count: int, radius: float, low: tuple[float, float], high: tuple[float, float]) -> Rows:
@@ -479,21 +458,6 @@ def soak(*, minutes: float = 10.0) -> int:
     for requirement, is_met in found.items():
         print(f'{"holds" if is_met else "FAILS"}: {requirement}')
     return 0 if all(found.values()) else 1
-
-
-@app.command
-def stops(*, count: int = 100) -> int:
-    """Stop so many nodes by each signal and print how they ended."""
-    generator, failures = random.Random(0), 0
-    with isolated_graph(), Player() as player:
-        for turn in range(2 * count):
-            number = (signal.SIGTERM, signal.SIGINT)[turn % 2]
-            error = stop_one_node(player, number, generator.uniform(0.0, SPREAD_S))
-            failures += error is not None
-            if error is not None or (turn + 1) % 20 == 0:
-                print(f'{turn + 1} of {2 * count}: {error or "no error"}', flush=True)
-    print(f'{2 * count - failures} of {2 * count} stops with exit code 0 and no traceback')
-    return min(failures, 1)
 
 
 @app.command

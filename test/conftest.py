@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all tests share: their marks, a private ROS graph, and failure instead of a skip where ROS is required."""
 
+import math
 import os
 import signal
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from message_helpers import message_types
 from ros_helpers import Graph, graph, prepare_environment
 from tiers import add_marks
 
+from foc_ros.io import terminal
 from foc_ros.ros.messages.types import MessageTypes
 
 prepare_environment()
@@ -22,6 +24,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # Every run uses the same examples, without a time limit, because a test must not fail on a busy machine.
 settings.register_profile('seeded', derandomize=True, deadline=None)
 settings.load_profile('seeded')
+
+# The same for the lines of progress that a command prints after some seconds without a terminal.
+terminal.QUIET_S = math.inf
 
 REQUIRE_ROS = os.environ.get('FOC_ROS_REQUIRE_ROS') == '1'
 # Tests that may be skipped even then: they need data that is not part of the sources, a browser that is not required, or

@@ -176,7 +176,6 @@ def test_obstacles_are_circles_with_different_names(obstacles):
         ({'start': [0.0, 0.0, 0.0, 0.0]}, 'start'),
         ({'start': (0.0, float('nan'))}, 'start'),
         ({'start': (0.15, 0.0)}, 'start'),
-        ({'goal': (0.15, 0.02)}, 'goal'),
         ({'goal': (0.3,)}, 'goal'),
         ({'strategy': 'fastest'}, 'foc.strategy'),
         ({'eta': 1.0}, 'foc.eta'),

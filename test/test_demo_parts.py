@@ -51,57 +51,42 @@ def send_hand(recorder: Recorder, number: int, now: float) -> None:
     )
 
 
-def messages(number: int) -> tuple[object, object, Prediction]:
-    made = prediction(START_NS + number * STEP_NS, np.zeros(2), 0.3 + 0.01 * number)
-    return encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES), made
+def make(number: int) -> Prediction:
+    return prediction(START_NS + number * STEP_NS, np.zeros(2), 0.3 + 0.01 * number)
 
 
-def filled(count: int = 5) -> Recorder:
+def filled(count: int = 5, lost: tuple[str, int] = ('', 0)) -> Recorder:
+    """Return a recorder of some predictions; lost: name and number of a message that never comes."""
     recorder = Recorder(Config())
     send_scene(recorder)
     for number in range(count):
         send_hand(recorder, number, now=0.02 * number)
-        cloud, table, _ = messages(number)
-        recorder.add_received('prediction', cloud, 0.02 * number + 0.005)
-        recorder.add_received('likelihoods', table, 0.02 * number + 0.006)
+        messages = {
+            'prediction': encode_prediction_cloud(make(number), 'xy', TYPES),
+            'likelihoods': encode_likelihoods(make(number), TYPES),
+        }
+        for name in sorted(messages, reverse=number % 2 == 0):  # they arrive in any order
+            if (name, number) != lost:
+                recorder.add_received(name, messages[name], 0.02 * number + 0.005)
     return recorder
 
 
 def test_recorder_keeps_every_prediction_with_its_scene() -> None:
     recorder = filled()
-    assert [sample.stamp_ns for sample in recorder.samples] == [START_NS + n * STEP_NS for n in range(5)]
-    assert [snapshot.stamp_ns for snapshot in recorder.snapshots] == [START_NS + n * STEP_NS for n in range(5)]
-    snapshot = recorder.snapshots[3]
-    expected = build_snapshot(messages(3)[2])
-    assert [(each.label, each.likelihood) for each in snapshot.candidates] == [
-        (each.label, each.likelihood) for each in expected.candidates
-    ]
+    stamps = [START_NS + n * STEP_NS for n in range(5)]
+    assert [each.stamp_ns for each in recorder.samples] == [each.stamp_ns for each in recorder.snapshots] == stamps
+    snapshot, expected = recorder.snapshots[3], build_snapshot(make(3))
+    shares = [[(each.label, each.likelihood) for each in view.candidates] for view in (snapshot, expected)]
+    assert shares[0] == shares[1]
     assert snapshot.obstacles.ids == ('1',)
     np.testing.assert_allclose(snapshot.goals, [[0.3, 0.0], [0.3, 0.12]])
     np.testing.assert_allclose(recorder.delays, 0.005)
+    assert (recorder.rates(0.09), recorder.rates(3.0)) == ((5, 5), (0, 0)), 'messages of the last second'
 
 
 @pytest.mark.parametrize('lost', ['prediction', 'likelihoods'])
 def test_recorder_pairs_messages_after_a_loss(lost: str) -> None:
-    recorder = Recorder(Config())
-    send_scene(recorder)
-    for number in range(6):
-        send_hand(recorder, number, now=0.02 * number)
-        cloud, table, _ = messages(number)
-        # The two topics arrive in any order.
-        for name, message in (('likelihoods', table), ('prediction', cloud)):
-            if not (number == 2 and name == lost):
-                recorder.add_received(name, message, 0.02 * number)
-    assert [(snapshot.stamp_ns - START_NS) // STEP_NS for snapshot in recorder.snapshots] == [0, 1, 3, 4, 5]
-
-
-def test_recorder_counts_messages_of_the_last_second() -> None:
-    recorder = Recorder(Config())
-    send_scene(recorder)
-    for number in range(100):
-        send_hand(recorder, number, now=0.025 * number)
-    assert recorder.rates(0.025 * 99) == (40, 0)
-    assert recorder.rates(0.025 * 99 + 2.0) == (0, 0)
+    assert [(each.stamp_ns - START_NS) // STEP_NS for each in filled(6, (lost, 2)).snapshots] == [0, 1, 3, 4, 5]
 
 
 def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
@@ -203,14 +188,8 @@ def test_the_scene_is_drawn_with_hand_goals_obstacles_and_candidates() -> None:
     # x grows to the right: the hand is left of the obstacle, and that left of the goals
     columns = {mark: [line.find(mark) for line in lines if mark in line] for mark in (HAND, OBSTACLE, GOAL)}
     assert max(columns[HAND]) < min(columns[OBSTACLE]) < min(columns[GOAL])
-
-
-def test_the_drawing_does_not_shrink() -> None:
-    recorder = filled()
-    snapshot, hand = recorder.snapshots[0], recorder.samples[0].position
-    before = (-1.0, 1.0, -1.0, 1.0)
-    assert extend_bounds(snapshot, hand, before) == before
-    assert extend_bounds(snapshot, np.array([3.0, 0.0]), before)[1] > 3.0
+    before = (-1.0, 1.0, -1.0, 1.0)  # the drawing does not shrink
+    assert extend_bounds(snapshot, hand, before) == before and extend_bounds(snapshot, np.array([3.0, 0.0]), before)[1] > 3.0
 
 
 def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:

@@ -52,7 +52,8 @@ def test_processes_that_learn_into_one_library_at_once_lose_nothing(tmp_path: Pa
     for number in range(3):  # three movements, which differ in their speed
         bag = write_bag(tmp_path / str(number), messages(seconds=1.02, rate_hz=50.0 + 10 * number))
         started.append(start('replay', str(bag), '--params', parameters, '--learn', str(library)))
-    assert [process.communicate()[1] for process in started] == [''] * 3
+    errors = ''.join(process.communicate()[1] for process in started)
+    assert all(line.startswith('replay: ') for line in errors.splitlines()), errors  # progress on a busy machine
     assert [process.returncode for process in started] == [0] * 3
     assert len(load_library(str(library))) == 3
     assert [each.name for each in tmp_path.iterdir() if each.name.startswith('library')] == ['library.json']
@@ -61,7 +62,8 @@ def test_processes_that_learn_into_one_library_at_once_lose_nothing(tmp_path: Pa
 def test_of_two_processes_with_one_output_one_writes_it(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'bag', messages(seconds=0.1))
     both = [start('replay', str(bag), '--output', str(tmp_path / 'out')) for _ in range(2)]
-    errors = sorted(process.communicate()[1] for process in both)
+    told = [process.communicate()[1].splitlines(keepends=True) for process in both]
+    errors = sorted(''.join(line for line in lines if not line.startswith('replay: ')) for lines in told)
     assert sorted(process.returncode for process in both) == [0, 2]
     assert errors == ['', f'foc_ros replay: {tmp_path / "out"}: exists already and is not overwritten; choose another name\n']
     with BagReader(tmp_path / 'out') as reader:

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Every source file begins with its licence in the form of SPDX, after the line that names its interpreter.
-
-`python test/test_licence_headers.py` adds the lines where they are missing.
-"""
+"""Every source file begins with its licence in the form of SPDX, after the line that names its interpreter."""
 
 from __future__ import annotations
 
@@ -28,31 +25,10 @@ def list_sources() -> list[Path]:
     return [file for file in files if file.suffix or file.read_bytes()[:2] == b'#!']
 
 
-def split(file: Path) -> tuple[list[str], list[str]]:
-    """Return the line that names the interpreter, if there is one, and the other lines of a file."""
-    lines = file.read_text('utf-8').splitlines(keepends=True)
-    start = 1 if lines and lines[0].startswith('#!') else 0
-    return lines[:start], lines[start:]
-
-
-def make_header(file: Path) -> list[str]:
-    return [f'{COMMENTS[file.suffix]} {line}\n' for line in HEADER]
-
-
 def test_every_source_begins_with_its_licence() -> None:
     sources = list_sources()
     assert {'setup.py', 'run', 'player.js', 'colcon_check', '__main__.py'} <= {file.name for file in sources}
     for file in sources:
-        assert split(file)[1][:2] == make_header(file), f'{file.relative_to(ROOT)} does not begin with {HEADER}'
-
-
-def add_headers() -> None:
-    """Add the lines to the sources that do not have them."""
-    for file in list_sources():
-        first, rest = split(file)
-        if rest[:2] != make_header(file):
-            file.write_text(''.join([*first, *make_header(file), *rest]), 'utf-8')
-
-
-if __name__ == '__main__':
-    add_headers()
+        lines = [line for line in file.read_text('utf-8').splitlines()[:3] if not line.startswith('#!')]
+        header = [f'{COMMENTS[file.suffix]} {line}' for line in HEADER]
+        assert lines[:2] == header, f'{file.relative_to(ROOT)} does not begin with {HEADER}'

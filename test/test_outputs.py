@@ -12,12 +12,12 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from matplotlib.figure import Figure
-from report_samples import START_NS, prediction, predictions, samples, scene
+from report_samples import START_NS, prediction, predictions, samples
 
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
 from foc_ros.io.outputs import check_replaceable, check_report
-from foc_ros.reporting.figures import plot_outcomes
+from foc_ros.reporting.figures import write_picture
 from foc_ros.reporting.page import write_page
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
@@ -28,7 +28,7 @@ SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "nois
 @pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
 def test_a_picture_is_replaced_by_the_next_one(tmp_path: Path, suffix: str) -> None:
     file = tmp_path / f'scene.{suffix}'
-    plot_outcomes(file, *scene(), prediction(START_NS, np.zeros(2)).candidates, np.zeros(2))
+    write_picture(file, prediction(START_NS, np.zeros(2)))
     check_replaceable('--plot', file)
 
 
@@ -51,7 +51,7 @@ def test_a_report_is_replaced_by_the_next_one(tmp_path: Path) -> None:
     write_page(tmp_path, 'index.html', 'made by foc_ros')
 
 
-@pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png', 'moment_03.png'])
+@pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png'])
 def test_a_report_overwrites_no_other_file(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text('mine', 'utf-8')
     with pytest.raises(InputError, match='--report: expected a new file, or one that foc_ros has made'):

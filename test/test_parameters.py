@@ -64,12 +64,13 @@ def test_every_configuration_is_read_as_it_was_written(tmp_path_factory: pytest.
     assert load(tmp_path_factory.getbasetemp(), dump_parameter_file(config)) == config
 
 
-@pytest.mark.parametrize('key', ['/**', 'foc', '/foc'])
+@pytest.mark.parametrize('key', ['/**', 'foc', '/foc', '/: {foc'])
 @pytest.mark.parametrize(
     'body', ['foc: {eta: 0.8, steps: 20}', '{foc.eta: 0.8, foc.steps: 20}', '{foc: {eta: 0.8}, foc.steps: 20}']
 )
 def test_names_are_nested_or_dotted(tmp_path: Path, key: str, body: str) -> None:
-    config = load(tmp_path, f'{key}: {{ros__parameters: {{{body.strip("{}") if body[0] == "{" else body}}}}}')
+    text = f'{key}: {{ros__parameters: {{{body.strip("{}") if body[0] == "{" else body}}}}}'
+    config = load(tmp_path, text + '}' * key.count('{'))
     assert (config.foc.eta, config.foc.steps) == (0.8, 20)
     assert dataclasses.replace(config, foc=Config().foc) == Config()
 
@@ -133,25 +134,26 @@ def test_a_wrong_file_is_refused_with_its_reason(tmp_path: Path, text: str, word
         load(tmp_path, text)
 
 
+ALIASES = ['a0: &a0 {x: 1}', *[f'a{i}: &a{i} {{b: *a{i - 1}, c: *a{i - 1}}}' for i in range(1, 60)]]
+"""Nested ones stand for any amount of data; a parser of ROS refuses them, too."""
+
+
 @pytest.mark.parametrize(
-    'text', ['/**: {ros__parameters: {rate_hz: 5', '!!python/object/apply:os.system ["true"]', '/**: {a: 1, a: 2}', '\x00']
+    ('text', 'words'),
+    [
+        ('/**: {ros__parameters: {rate_hz: 5', 'not a YAML file'),
+        ('!!python/object/apply:os.system ["true"]', 'not a YAML file'),
+        ('/**: {a: 1, a: 2}', 'not a YAML file'),
+        ('\x00', 'not a YAML file'),
+        ('other:\n  ' + '\n  '.join(ALIASES), r'.*tags \(!name\) and aliases \(\*name\) are not supported'),
+        (None, 'cannot be read'),
+    ],
 )
-def test_a_file_that_is_not_plain_yaml_is_refused(tmp_path: Path, text: str) -> None:
-    with pytest.raises(RecordingError, match=r'params\.yaml: not a YAML file'):
-        load(tmp_path, text)
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(FocError, match=r'absent\.yaml: cannot be read'):
-        load_parameter_file(tmp_path / 'absent.yaml')
-
-
-def test_yaml_aliases_are_refused(tmp_path: Path) -> None:
-    """Nested ones stand for any amount of data; a parser of ROS refuses them, too."""
-    levels = ['a0: &a0 {x: 1}', *[f'a{i}: &a{i} {{b: *a{i - 1}, c: *a{i - 1}}}' for i in range(1, 60)]]
-    text = 'other:\n' + '\n'.join(f'  {line}' for line in levels) + '\n/**: {ros__parameters: {rate_hz: 5}}'
-    with pytest.raises(RecordingError, match=r'params\.yaml: .*tags \(!name\) and aliases \(\*name\) are not supported'):
-        load(tmp_path, text)
+def test_a_file_that_is_missing_or_not_plain_yaml_is_refused(tmp_path: Path, text: str | None, words: str) -> None:
+    if text is not None:
+        (tmp_path / 'params.yaml').write_text(text, 'utf-8')
+    with pytest.raises(RecordingError, match=rf'params\.yaml: {words}'):
+        load_parameter_file(tmp_path / 'params.yaml')
 
 
 def node_with(ros: Graph, **overrides: object) -> Any:
@@ -226,10 +228,6 @@ def test_node_and_commands_refuse_the_same_files(tmp_path: Path, text: str, word
 def test_a_node_needs_no_parameters_in_a_file(tmp_path: Path) -> None:
     (tmp_path / 'params.yaml').write_text('# nothing yet\n')
     check_parameter_files(['--ros-args', '--params-file', str(tmp_path / 'params.yaml')])
-
-
-def test_a_section_may_be_below_the_root(tmp_path: Path) -> None:
-    assert load(tmp_path, '/: {foc: {ros__parameters: {rate_hz: 5.0}}}').rate_hz == 5.0
 
 
 def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:

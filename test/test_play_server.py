@@ -121,7 +121,7 @@ def test_bad_messages_are_refused_and_harm_nothing(tmp_path: Path) -> None:
         assert (await read(socket, 'scene'))['goals']
         for text, error in (
             ('', 'message: expected JSON'),
-            (json.dumps(HAND | {'x': 1e300}), 'hand.x: expected less than or equal to 0.38, got 1e+300'),
+            (json.dumps(HAND | {'x': 1e300}), 'hand.x: expected a number <= 0.38, got 1e+300'),
             (json.dumps({'type': 'job', 'name': 'fit'}), 'job: expected a session that was recorded, got fit'),
         ):
             await socket.write_message(text)
@@ -167,7 +167,7 @@ def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> Non
     ('name', 'words'),
     [
         ('tornado', "play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'"),
-        ('pydantic', "play needs pydantic of version 2: pip install 'foc_ros[play]'"),
+        ('pydantic', "scene files and the page need pydantic of version 2: pip install 'pydantic>=2'"),
     ],
 )
 def test_without_a_library_the_message_says_what_to_install(tmp_path: Path, name: str, words: str) -> None:

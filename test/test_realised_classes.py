@@ -12,7 +12,7 @@ from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.scene import ReachingScene
 from foc_ros.core.types import HandState, Status
 
-SCENES = {'optimal': 40, 'lv': 4}
+SCENES = {'optimal': 20, 'lv': 2}
 """Numbers of scenes: `lv` takes a hundred times as long."""
 DURATION_S = 0.9
 

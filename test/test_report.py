@@ -18,7 +18,6 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import HandSample, Status
 from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
 from foc_ros.reporting.report import describe_late, write_report
@@ -55,13 +54,12 @@ def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Pa
     return write_report(directory, title, build_hand_trajectory(made), snapshots, {'recording': 'some <bag> & more'})
 
 
-def test_the_report_is_a_page_without_other_files_and_pictures_beside_it(tmp_path: Path) -> None:
+def test_the_report_is_a_page_without_other_files_and_a_picture_beside_it(tmp_path: Path) -> None:
     """Text is escaped, facts are shown, and nothing is loaded from anywhere; the input is left alone."""
     before = OBSTACLES.centre.copy()
     files = report(tmp_path / 'new' / 'report', title='<img src=x onerror=alert(1)>')
     np.testing.assert_array_equal(OBSTACLES.centre, before)
-    pictures = 'overview.png', *(f'moment_{number:02d}.png' for number in (1, 2, 3, 4))
-    assert {file.name for file in files} == {'index.html', 'predictions.json', *pictures}
+    assert {file.name for file in files} == {'index.html', 'predictions.json', 'overview.png'}
     assert set((tmp_path / 'new' / 'report').iterdir()) == set(files)
     page = Page(files[0])
     for tag, attributes in page.tags:
@@ -173,27 +171,9 @@ def test_a_busy_computer_is_told_once_with_what_to_change_and_an_estimate_is_not
     assert words.startswith(f'In 5 of {count} predictions the most likely path avoids the obstacles less surely than wanted')
 
 
-def test_the_vertices_of_a_box_are_behind_the_numbers_of_a_circle(tmp_path: Path) -> None:
-    made = samples()
-    boxes = collect_obstacles(
-        [Circle((0.15, 0.0), 0.03, 0.003, name='1'), Box((0.22, 0.1), (0.1, 0.02), radius_stddev=0.001, name='post')]
-    )
-    snapshots = [build_snapshot(replace(each, obstacles=boxes)) for each in predictions(made)]
-    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
-    (scene,) = page_data_of(tmp_path)['scenes']
-    corners = [500, 100, -500, 100, -500, -100, 500, -100]
-    assert scene == [['1', 1500, 0, 300, 30], ['post', 2200, 1000, 0, 10, *corners]]
-
-
 def page_data_of(directory: Path) -> dict[str, Any]:
     text = (directory / 'index.html').read_text(encoding='utf-8')
     return json.loads(text.partition('id="report-data">')[2].partition('</script>')[0])
-
-
-@pytest.mark.parametrize(('reaches', 'pictures'), [(1, 4), (3, 3), (10, 8)])
-def test_every_movement_is_shown_up_to_a_number(tmp_path: Path, reaches: int, pictures: int) -> None:
-    report(tmp_path, reaches)
-    assert len(list(tmp_path.glob('moment_*.png'))) == pictures
 
 
 def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path: Path) -> None:
@@ -209,7 +189,7 @@ def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path: Pa
     view = build_snapshot(prediction(int(still.stamps_ns[20]), np.zeros(2)))
     unknown = replace(view, candidates=(replace(view.candidates[0], eta=float('nan')), *view.candidates[1:]))
     files = write_report(tmp_path / 'still', 'x', still, [unknown], {})
-    assert (tmp_path / 'still' / 'moment_01.png') in files
+    assert (tmp_path / 'still' / 'overview.png') in files
     text = files[1].read_text(encoding='utf-8')
     assert 'NaN' not in text and json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pytest
 from reach_helpers import reference_cases
 
 from foc_ros.cli.main import main
+from foc_ros.core.ocp import strategies
 from foc_ros.core.types import Status
 
 SCENE: dict[str, Any] = {
@@ -82,6 +84,50 @@ def test_the_table_and_the_picture(tmp_path: Path, capsys: pytest.CaptureFixture
     assert (tmp_path / 'ways.png').read_bytes().startswith(b'\x89PNG')
     out = capsys.readouterr().out
     assert 'goal0: right of 0' in out and 'solved' in out and 'likelihood' in out
+
+
+GOALS: dict[str, Any] = {
+    'start': [0.0, 0.0],
+    'goals': [{'position': [0.2, 0.0], 'name': 'tea'}, {'position': [0.45, 0.01], 'name': 'milk', 'object': 'back'}],
+    'obstacles': [{'x': x, 'y': 0.0, 'radius': 0.03, 'id': name} for x, name in ((0.2, 'front'), (0.4, 'back'))],
+}
+
+
+def test_goals_have_names_and_the_object_of_a_goal_blocks_the_others_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = candidates(tmp_path, capsys, GOALS)
+    assert {each['description'] for each in found} == {'tea: direct', 'milk: left of front', 'milk: right of front'}
+    assert {each['status'] for each in found} == {'solved'}
+    assert solve(tmp_path, GOALS, '--json') == 0
+    goals = json.loads(capsys.readouterr().out)['goals']
+    assert [(each['name'], each['position']) for each in goals] == [('tea', [0.2, 0.0]), ('milk', [0.45, 0.01])]
+    shares = [sum(each['likelihood'] for each in found if each['goal'] == row) for row in (0, 1)]
+    assert [each['likelihood'] for each in goals] == pytest.approx(shares)
+    (guessed,) = candidates(tmp_path, capsys, {**GOALS, 'goals': GOALS['goals'][1:], 'guess': {'amplitude': 0.05}})
+    assert guessed['description'] == 'milk: left of front' and guessed['status'] == 'solved'
+
+
+def test_a_goal_without_a_path_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ring = [{'x': 0.3 + 0.05 * math.cos(turn), 'y': 0.05 * math.sin(turn), 'radius': 0.03} for turn in range(7)]
+    scene = {**SCENE, 'obstacles': ring, 'max_candidates': 4}
+    del scene['goal']
+    assert solve(tmp_path, {**scene, 'goals': [[0.1, 0.1], {'position': [0.3, 0.0], 'name': 'core'}]}) == 0
+    out = capsys.readouterr().out
+    assert 'core: no path to it was found' in out and ' solved in ' in out
+    assert solve(tmp_path, {**scene, 'goal': [0.3, 0.0]}, '--plot', str(tmp_path / 'none.png')) == 3
+    assert capsys.readouterr() == ('', 'foc_ros solve: no path was found between the start and any goal\n')
+    assert (tmp_path / 'none.png').exists()
+
+
+@pytest.mark.parametrize('strategy', [{'strategy': 'optimal'}, {'strategy': 'fixed', 'tau': 5e-4, 'lambda': 1e3}])
+def test_a_class_that_is_not_settled_says_so_and_is_late_only_where_there_is_a_time_limit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, strategy: dict[str, Any]
+) -> None:
+    monkeypatch.setattr(strategies, 'solve_at', partial(strategies.solve_at, most=1))
+    for each in candidates(tmp_path, capsys, {**SCENE, **strategy}):
+        assert each['status'] == 'estimated' and each['likelihood'] > 0.0
+        assert each['message'].startswith('not settled after 1 QPs')
 
 
 def test_the_terminal_gives_reason_and_remedy_of_what_is_not_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,7 +10,8 @@ import pytest
 from fit_recordings import write_tables
 
 from foc_ros.cli.main import main
-from foc_ros.io.terminal import COLUMNS, show_counter, show_table
+from foc_ros.io import terminal
+from foc_ros.io.terminal import COLUMNS, show_table
 
 ROOT = Path(__file__).parents[1]
 NAMES = ('front_left_post', 'front_right_post_of_the_shelf', 'a_name_that_is_longer_than_a_column_40')
@@ -30,8 +31,8 @@ def find_widest(printed: str) -> int:
     [
         ['solve', 'scene.yaml', '--monte-carlo', '100'],
         ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'), '--params', 'slow.yaml'],
-        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1'],
-        ['evaluate', 'data', '--workers', '1'],
+        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1', '--params', 'quick.yaml'],
+        ['evaluate', 'data', '--workers', '1', '--params', 'quick.yaml'],
     ],
     ids=lambda arguments: arguments[0],
 )
@@ -41,6 +42,7 @@ def test_the_output_of_a_command_fits(
     monkeypatch.chdir(tmp_path)
     Path('scene.yaml').write_text(SCENE)
     Path('slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}')
+    Path('quick.yaml').write_text('/**: {ros__parameters: {rate_hz: 5.0, foc.steps: 10}}')
     if 'data' in arguments:
         write_tables(Path('data'), count=2)
     assert main(arguments) == 0
@@ -57,8 +59,10 @@ def test_a_wide_table_is_divided_and_loses_nothing(capsys: pytest.CaptureFixture
     assert printed.count('rule 2') == 4
 
 
-def test_a_counter_is_printed_at_times_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with show_counter('compiling', 50) as counter:
-        for done in range(51):
-            counter.show(done)
-    assert capsys.readouterr().err.splitlines() == [f'compiling: {done} of 50' for done in (0, 20, 40)]
+def test_progress_is_printed_at_times_where_there_is_no_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for quiet_s, lines in ((60.0, []), (0.0, ['replay: 1 of 2', 'replay: 2 of 2'])):
+        monkeypatch.setattr(terminal, 'QUIET_S', quiet_s)
+        assert list(terminal.show_progress('ab', 'replay', 2)) == ['a', 'b']
+        assert capsys.readouterr().err.splitlines() == lines

@@ -14,7 +14,7 @@ from foc_ros.core.errors import MessageError
 from foc_ros.core.types import LEFT, RIGHT, HandSample, Prediction, Status, describe_class, make_obstacles
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.received import is_same_prediction, read_snapshot
-from foc_ros.reporting.tracks import assign_slots, build_candidate_tracks
+from foc_ros.reporting.tracks import Slots, build_candidate_tracks
 from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot, parse_label
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -45,16 +45,12 @@ def test_a_snapshot_holds_the_numbers_of_its_prediction_and_names_classes_in_wor
     assert describe_class(()) == 'direct'
 
 
-def test_the_unknown_share_is_that_of_the_prediction() -> None:
-    assert build_snapshot(replace(prediction(START_NS, NOWHERE), unknown=0.25)).unknown_share == 0.25
-
-
-def test_the_motor_noise_is_kept_beside_the_total_uncertainty() -> None:
-    made = prediction(START_NS, NOWHERE)
+def test_the_motor_noise_and_the_unknown_share_are_kept() -> None:
+    made = replace(prediction(START_NS, NOWHERE), unknown=0.25)
     assert not build_snapshot(made).candidates[0].is_widened
-    view = build_snapshot(widen(made)).candidates[0]
-    assert view.is_widened
-    np.testing.assert_array_equal(view.covariance, 3.0 * view.motor_covariance)
+    snapshot = build_snapshot(widen(made))
+    assert snapshot.candidates[0].is_widened and snapshot.unknown_share == 0.25
+    np.testing.assert_array_equal(snapshot.candidates[0].covariance, 3.0 * snapshot.candidates[0].motor_covariance)
 
 
 def test_a_trajectory_leaves_late_samples_out() -> None:
@@ -151,29 +147,16 @@ def test_a_label_is_split_into_goal_and_sides(label: str, goal: str, sides: dict
     assert parse_label(label, IDS) == (goal, sides)
 
 
-def test_simultaneous_tracks_have_different_letters_and_different_colours_while_there_are_any() -> None:
-    """With fewer slots than tracks, the least likely of the tracks that begin together have none."""
-    labels = ('goal0:+1', 'goal0:-1', 'goal1:+1', 'goal1:-1', 'goal1:-12')
-    snapshots = [snapshot(number, *labels[number % 3 : number % 3 + 3]) for number in range(12)]
-    tracks = build_candidate_tracks(snapshots).tracks
-    for count in (2, 3, 5):
-        slots = assign_slots(snapshots, tracks, count, count)
-        assert set(slots.values()) == set(range(count))
-        for numbers in tracks:
-            used = [slots[track] for track in numbers.values() if track in slots]
-            assert len(used) == len(set(used))
-    assert list(assign_slots(snapshots, tracks, 5, 5).values())[:3] == [0, 1, 2]
-    snapshots = [snapshot(0, *labels[:2]), snapshot(1, labels[0]), snapshot(2, labels[0], labels[2]), snapshot(3, *labels[:4])]
-    tracks = build_candidate_tracks(snapshots).tracks
-    slots = assign_slots(snapshots, tracks, 6, 3)
-    assert [slots[track] for track in tracks[2].values()] == [0, 2]
-    assert len({slots[track] % 3 for track in list(tracks[3].values())[:3]}) == 3
-
-
-def test_a_letter_is_reused_as_late_as_possible() -> None:
-    alone = [snapshot(number, f'goal{number}:+1') for number in (0, 51, 102, 153)]
-    tracks = build_candidate_tracks(alone).tracks
-    assert list(assign_slots(alone, tracks, 3, 3).values()) == [0, 1, 2, 0]
+def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_absence() -> None:
+    slots = Slots()
+    assert slots.assign(range(6)) == list(range(6)), 'in order of likelihood'
+    assert slots.assign([7, 3]) == [6, 3], 'a letter that has been free for longest'
+    assert slots.assign([3, 0, 8]) == [3, 0, 7]
+    assert slots.assign([8, 0, 9]) == [7, 0, 8], 'and of another colour'
+    many = slots.assign(range(20, 33))
+    assert sorted(many[:12]) == list(range(12)) and many[12] is None
+    assert len({slot % 6 for slot in many[:6]}) == 6
+    assert slots.assign([3])[0] in range(12)
 
 
 def test_tracks_are_numbered_from_0_whatever_the_classes_are_called() -> None:

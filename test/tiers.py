@@ -33,7 +33,6 @@ LONG = (
     'test_fit.py::test_strategy_fixed_keeps_its_tau_and_lambda_and_says_so',
     'test_fit.py::test_without_obstacles_goals_*',
     'test_report.py::test_a_long_recording_is_thinned_out*',
-    'test_report.py::test_every_movement_is_shown_up_to_a_number',
     'test_paper.py::test_*trend*',
     'test_paper.py::test_files_hold_the_computed_numbers',
     'test_play_session.py::test_a_fit_and_its_comparison',
@@ -41,8 +40,9 @@ LONG = (
     'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
     # many more damaged files
     'test_fuzz_inputs.py::test_many_*',
-    # the commands of the documentation
+    # the commands of the documentation, and its web site
     'test_shown_commands.py::test_commands_work_as_shown',
+    'test_documentation_site.py::*',
     # a node under load, and a process that is stopped or killed
     'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
     'test_demo.py::test_the_live_predictions_are_those_of_the_recording',

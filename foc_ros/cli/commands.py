@@ -36,7 +36,8 @@ def demo(*, output: Path = Path('demo_output')) -> int:
     check_folder('--output', output)
     if find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: run `make setup`, or source a ROS 2 installation, or install the extra `ros`')
-    print('A recorded hand moves among a box, three posts and a wall; the node predicts where it goes. Loading ...', flush=True)
+    words = 'A recorded hand moves among a box (obstacle 1), three posts (2, 3, 4) and a wall (5)'
+    print(f'{words}; the node predicts where it goes. Loading ...', flush=True)
     from .demo import perform  # not before: its import takes seconds
 
     return perform(output)
@@ -105,25 +106,23 @@ def solve(scene: Existing, /, *, json: bool = False, monte_carlo: Samples | None
         check_picture('--plot', plot)
     problem = load_scene(scene)
     if plot is not None:
-        from foc_ros.reporting.figures import plot_outcomes  # a missing library is reported before the work
-    from foc_ros.analysis.solve import make_table, solve_to_values
+        from foc_ros.reporting.figures import write_picture  # a missing library is reported before the work
+    from foc_ros.analysis.solve import describe_rest, make_table, solve_to_values
     from foc_ros.io.terminal import show_table, show_text
 
-    candidates, encoded = solve_to_values(problem, monte_carlo)
+    prediction, values = solve_to_values(problem, monte_carlo)
     if plot is not None:
-        plot_outcomes(plot, problem.obstacles, problem.goals, candidates, problem.hand.mean[:2])
+        write_picture(plot, prediction)
     if json:
-        print(json_format.dumps({'candidates': encoded}, allow_nan=False))
-    else:
-        show_table(*make_table(encoded))
-    reasons = [f'{each.description}: {each.reason}' for each in candidates if not each.is_solved]
-    if any(each.has_likelihood for each in candidates):
-        for reason in reasons if not json else ():
-            show_text(reason)
+        print(json_format.dumps(values, allow_nan=False))
+    elif prediction.candidates:
+        show_table(*make_table(values['candidates']))
+    if prediction.most_likely is not None:
+        for line in [] if json else describe_rest(prediction):
+            show_text(line)
         return 0
-    lost = (
-        f'no candidate could be solved: {"; ".join(reasons)}' if reasons else 'no path was found between the start and any goal'
-    )
+    reasons = '; '.join(f'{each.description}: {each.reason}' for each in prediction)
+    lost = f'no candidate could be solved: {reasons}' if reasons else 'no path was found between the start and any goal'
     warn_all('solve', [lost])
     return 3
 
@@ -150,7 +149,7 @@ def replay(
     output
         New bag for inputs and predictions.
     report
-        Folder for a page with pictures.
+        Folder for a page, its numbers and a picture of all movements.
     params
         The node's parameter file (default: every parameter has its default).
     guidance

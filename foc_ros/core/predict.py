@@ -324,7 +324,7 @@ def _widen_covariance(
 def build_scene_problems(scene: ReachingScene) -> list[Problem]:
     """Return the problem of every goal. An uncertain start is as uncertain to the operator, so it counts in the constraint."""
     config = scene.config
-    in_the_way = take_in_the_way(scene.avoided, scene.goals)
+    in_the_way = take_in_the_way(scene.avoided, scene.goals, scene.goal_objects)
     problems = [
         build_problem(config, scene.hand, around, goal, scene.duration_s)
         for around, goal in zip(in_the_way, scene.goals, strict=True)
@@ -346,12 +346,14 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
     """
     config, avoided = scene.config, scene.avoided
     if scene.guess is not None:
-        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, avoided),)
+        in_the_way = take_in_the_way(avoided, scene.goals, scene.goal_objects)[0]
+        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, in_the_way),)
     else:
-        durations = [scene.duration_s] * len(scene.goals)
-        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, durations, config.foc.steps).candidates
+        timing, turn = GuessTiming([scene.duration_s] * len(scene.goals), config.foc.steps), Turn(objects=scene.goal_objects)
+        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, *timing, (), turn).candidates
     solved = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc)
-    return rank_candidates(solved, config.likelihood, avoided, scene.hand, scene.goals)
+    ranked = rank_candidates(solved, config.likelihood, avoided, scene.hand, scene.goals)
+    return [each.with_goal_name(scene.goal_names[each.candidate.goal]) for each in ranked] if scene.goal_names else ranked
 
 
 def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:

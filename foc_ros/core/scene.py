@@ -106,7 +106,8 @@ class ReachingScene(Record):
 
     hand: where it starts; goals (g, 2) [m]; obstacles; noise (2,): c per step, None for the parameters' noise scaled to the step;
     guess (N + 1, 2) [m]: path in the only class to be solved, None to search the classes; config: parameters, of which
-    `duration.fixed_s` is the duration.
+    `duration.fixed_s` is the duration; goal_names, goal_objects (g,): what answers call the goals, and the id of the
+    obstacle that each is, or none.
     """
 
     hand: HandState
@@ -115,6 +116,8 @@ class ReachingScene(Record):
     noise: Array | None
     guess: Array | None
     config: Config
+    goal_names: tuple[str, ...] = ()
+    goal_objects: tuple[str | None, ...] = ()
 
     @property
     def avoided(self) -> Obstacles:
@@ -126,11 +129,15 @@ class ReachingScene(Record):
         """Duration of the movement [s]."""
         return self.config.duration.fixed_s
 
-
-def check_outside(field: str, point: Array, obstacles: Obstacles) -> None:
-    """Raise SceneError, which names the field, if a point (2,) [m] lies inside the mean boundary of an obstacle."""
-    distances = measure_offsets(point, obstacles)[1][0]
-    for row in np.flatnonzero(distances < obstacles.radius)[:1]:
-        core = 'centre' if obstacles.corners[row] == 1 else 'polygon'
-        found = f'{point.tolist()}, {max(round(distances[row], 9), 0.0):.4g} m from its {core}'
-        raise SceneError(field, f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m', found)
+    def check(self) -> None:
+        """Raise SceneError if the start lies inside the mean boundary of an obstacle, or the object of a goal is no obstacle."""
+        start, obstacles = self.hand.mean[:2], self.avoided
+        distances = measure_offsets(start, obstacles)[1][0]
+        for row in np.flatnonzero(distances < obstacles.radius)[:1]:
+            core = 'centre' if obstacles.corners[row] == 1 else 'polygon'
+            found = f'{start.tolist()}, {max(round(distances[row], 9), 0.0):.4g} m from its {core}'
+            words = f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m'
+            raise SceneError('start', words, found)
+        for row, name in enumerate(self.goal_objects):
+            if name is not None and name not in obstacles.ids:
+                raise SceneError(f'goals[{row}].object', 'the id of an obstacle', repr(name))

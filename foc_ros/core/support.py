@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from numbers import Number
@@ -31,7 +32,7 @@ def check_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
     except (TypeError, ValueError) as error:
         raise SceneError(field, expected, repr(value)) from error
     if array.ndim != len(shape) or any(size not in (None, found) for size, found in zip(shape, array.shape, strict=True)):
-        raise SceneError(field, expected, f'{value!r} of shape {array.shape}')
+        raise SceneError(field, expected, f'{reprlib.repr(value)} of shape {array.shape}')
     if not (np.abs(array) <= FARTHEST).all():
         raise SceneError(field, f'numbers in [{-FARTHEST:g}, {FARTHEST:g}]', repr(value))
     return array

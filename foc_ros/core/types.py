@@ -312,10 +312,10 @@ class Status(Enum):
 
     SOLVED: the solution meets the wanted eta. COMPROMISED: it meets a smaller eta only, which makes it less likely.
     ETA_UNREACHABLE: the same, where less than the wanted eta is not allowed. INFEASIBLE: no path of the class meets the goal and
-    the constraints. ITERATION_LIMIT: the result does not meet what it promises. DEADLINE: time or iterations ran out before it
-    was settled: effort and safety are estimated from its last iterate. ESTIMATED: the same where the class is so unlikely that it
-    goes on in the next prediction; or the solver failed where the search has found a path: path, effort and safety are estimated
-    from its length. LEFT_CLASS: the solution lies in another homotopy class.
+    the constraints. ITERATION_LIMIT: the result does not meet what it promises. DEADLINE: time ran out before it was settled:
+    effort and safety are estimated from its last iterate. ESTIMATED: the same where it was not settled after the most QPs, or is
+    so unlikely that it goes on in the next prediction; or the solver failed where the search has found a path: path, effort and
+    safety are estimated from its length. LEFT_CLASS: the solution lies in another homotopy class.
     """
 
     SOLVED = 'solved'

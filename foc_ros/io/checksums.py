@@ -4,7 +4,7 @@
 
 The MCAP specification (https://mcap.dev/spec) has a checksum for every chunk, one for the data section, and one for the summary
 section with the footer. A stored value of 0 means that there is no checksum. The library rosbags writes none, and the library
-mcap compares that of the summary never, and that of the data section only after it has used all of it.
+mcap never compares that of the summary.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ _HEAD = struct.Struct('<BQ')
 """Code and length of a record."""
 _CRC = struct.Struct('<I')
 _FOOTER, _CHUNK, _DATA_END = 0x02, 0x06, 0x0F
-_DATA_END_SIZE = _HEAD.size + _CRC.size
 _CHUNK_CRC, _CHUNK_CONTENT = _HEAD.size + 24, _HEAD.size + 40
 """Offsets of the checksum and of the messages in a chunk that is not compressed."""
 _BLOCK = 1 << 20
@@ -46,17 +45,13 @@ def add_checksums(file: Path) -> None:
             start = end
 
 
-def check_sections(stream: BinaryIO) -> None:
-    """Raise RecordingError if a section of a file with a footer differs from its checksum; the library reads the chunks' own."""
+def check_summary(stream: BinaryIO) -> None:
+    """Raise RecordingError if the summary section of a file with a footer differs from its checksum."""
     footer = stream.seek(0, 2) - FOOTER.size
-    _, _, start, _, summary_crc, _ = FOOTER.unpack(_read(stream, footer, FOOTER.size))
-    summary = start if _DATA_END_SIZE < start <= footer else footer
-    data = summary - _DATA_END_SIZE
-    if summary_crc and summary_crc != _compute_crc(stream, summary, footer + FOOTER.size - len(MAGIC) - _CRC.size):
+    _, _, start, _, stated, _ = FOOTER.unpack(_read(stream, footer, FOOTER.size))
+    start = start if len(MAGIC) < start <= footer else footer
+    if stated and stated != _compute_crc(stream, start, footer + FOOTER.size - len(MAGIC) - _CRC.size):
         raise RecordingError('damaged: the summary section differs from its checksum')
-    head, data_crc = struct.unpack('<9sI', _read(stream, data, _DATA_END_SIZE))
-    if head == _HEAD.pack(_DATA_END, _CRC.size) and data_crc and data_crc != _compute_crc(stream, 0, data):
-        raise RecordingError('damaged: the data section differs from its checksum')
 
 
 def _compute_crc(stream: BinaryIO, start: int, end: int) -> int:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import reprlib
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -16,14 +17,13 @@ import numpy as np
 
 from foc_ros.core.classes.library import MOST_STATES, POINTS, Demonstration, is_same_recording
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.core.types import LEFT, RIGHT, Array
+from foc_ros.core.support import check_array
+from foc_ros.core.types import LEFT, RIGHT
 
 from .documents import MAX_BYTES, read_document
 
 SIDES = {'left': LEFT, 'right': RIGHT}
 MOST_WAYS, MOST_OBSTACLES = 500, 4096
-FARTHEST = 1e6
-"""Largest coordinate [m], and largest velocity [m/s]."""
 
 
 def load_library(name: str) -> tuple[Demonstration, ...]:
@@ -102,47 +102,23 @@ def _dump_demonstration(way: Demonstration) -> dict[str, Any]:
 
 def _read_demonstration(field: str, way: object) -> Demonstration:
     if not isinstance(way, Mapping) or set(way) - {'states'} != {'frame_id', 'passed', 'path'}:
-        raise InputError(field, 'exactly frame_id, passed, path and, for a recording, states', _shorten(way))
-    frame_id, passed, path = way['frame_id'], way['passed'], way['path']
-    if not isinstance(frame_id, str):
-        raise InputError(f'{field}.frame_id', 'a text', _shorten(frame_id))
+        raise InputError(field, 'exactly frame_id, passed, path and, for a recording, states', reprlib.repr(way))
+    if not isinstance(way['frame_id'], str):
+        raise InputError(f'{field}.frame_id', 'a text', repr(way['frame_id']))
+    passed = way['passed']
     if not isinstance(passed, list) or len(passed) > MOST_OBSTACLES:
-        raise InputError(f'{field}.passed', f'a list of at most {MOST_OBSTACLES} obstacles', _shorten(passed))
-    if not isinstance(path, list) or len(path) != POINTS:
-        raise InputError(f'{field}.path', f'{POINTS} points', _shorten(path))
-    rows = [_read_passed(f'{field}.passed[{k}]', row) for k, row in enumerate(passed)]
-    ids = tuple(identity for identity, _, _ in rows)
+        raise InputError(f'{field}.passed', f'a list of at most {MOST_OBSTACLES} obstacles', reprlib.repr(passed))
+    for row, each in enumerate(passed):
+        if not isinstance(each, Mapping) or set(each) != {'id', 'x', 'y', 'side'} or not isinstance(each['id'], str):
+            raise InputError(f'{field}.passed[{row}]', 'id (a text), x, y and side', reprlib.repr(each))
+        if each['side'] not in ('left', 'right'):
+            raise InputError(f'{field}.passed[{row}].side', 'left or right', reprlib.repr(each['side']))
+    ids = tuple(each['id'] for each in passed)
     if len(set(ids)) != len(ids):
-        raise InputError(f'{field}.passed', 'each obstacle once', _shorten(ids))
-    points = np.array([_read_numbers(f'{field}.path[{k}]', point, 2) for k, point in enumerate(path)])
-    centre: Array = np.array([point for _, point, _ in rows], dtype=float).reshape(-1, 2)
-    states = _read_states(f'{field}.states', way['states']) if 'states' in way else None
-    return Demonstration(frame_id, ids, tuple(side for _, _, side in rows), centre, points, states)
-
-
-def _read_states(field: str, states: object) -> Array:
-    if not isinstance(states, list) or not 2 <= len(states) <= MOST_STATES:
-        raise InputError(field, f'2 to {MOST_STATES} states', _shorten(states))
-    return np.array([_read_numbers(f'{field}[{k}]', state, 4) for k, state in enumerate(states)])
-
-
-def _read_passed(field: str, row: object) -> tuple[str, tuple[float, ...], int]:
-    if not isinstance(row, Mapping) or set(row) != {'id', 'x', 'y', 'side'} or not isinstance(row['id'], str):
-        raise InputError(field, 'id (a text), x, y and side', _shorten(row))
-    if row['side'] not in ('left', 'right'):
-        raise InputError(f'{field}.side', 'left or right', _shorten(row['side']))
-    return row['id'], _read_numbers(field, [row['x'], row['y']], 2), SIDES[row['side']]
-
-
-def _read_numbers(field: str, values: object, count: int) -> tuple[float, ...]:
-    if isinstance(values, list) and len(values) == count and all(_is_number(value, FARTHEST) for value in values):
-        return tuple(float(value) for value in values)
-    raise InputError(field, f'{count} numbers within {FARTHEST:g}', _shorten(values))
-
-
-def _is_number(value: object, largest: float) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and -largest <= value <= largest
-
-
-def _shorten(value: object) -> str:
-    return repr(value)[:100]
+        raise InputError(f'{field}.passed', 'each obstacle once', reprlib.repr(ids))
+    centre = check_array(f'{field}.passed', [(each['x'], each['y']) for each in passed] or np.zeros((0, 2)), (None, 2))
+    states = check_array(f'{field}.states', way['states'], (None, 4)) if 'states' in way else None
+    if states is not None and not 2 <= len(states) <= MOST_STATES:
+        raise InputError(f'{field}.states', f'2 to {MOST_STATES} states', len(states))
+    path = check_array(f'{field}.path', way['path'], (POINTS, 2))
+    return Demonstration(way['frame_id'], ids, tuple(SIDES[each['side']] for each in passed), centre, path, states)

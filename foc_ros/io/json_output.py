@@ -21,11 +21,14 @@ def encode_prediction(prediction: Prediction) -> dict[str, Any]:
         'most_likely': prediction.most_likely,
         'unknown': prediction.unknown,
         'other': prediction.other,
-        'goals': [
-            {'name': each.name, 'position': each.position.tolist(), 'likelihood': each.likelihood} for each in prediction.goals
-        ],
+        'goals': encode_goals(prediction),
         'candidates': [encode_candidate(each) for each in candidates],
     }
+
+
+def encode_goals(prediction: Prediction) -> list[dict[str, Any]]:
+    """Return name, position [m] and likelihood of each goal; the likelihood is null where nothing is known of it."""
+    return [{'name': each.name, 'position': each.position.tolist(), 'likelihood': each.likelihood} for each in prediction.goals]
 
 
 def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:

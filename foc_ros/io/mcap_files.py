@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One MCAP file: its channels, and the messages of those that are needed.
 
-The file is read from begin to end once before its messages are, by the library mcap, which compares the checksums of the chunks.
-So no optional record is needed: neither the summary nor any index. A file without its footer, whose
+The file is read from begin to end once before its messages are, by the library mcap, which compares the checksums of the chunks
+and of the data section. So no optional record is needed: neither the summary nor any index. A file without its footer, whose
 recorder was killed, is read up to its last whole chunk.
 """
 
@@ -23,7 +23,7 @@ from mcap.stream_reader import StreamReader
 from foc_ros.core.errors import RecordingError
 
 from .channels import Channel
-from .checksums import FOOTER, MAGIC, check_sections
+from .checksums import FOOTER, MAGIC, check_summary
 
 
 class McapFile:
@@ -42,7 +42,7 @@ class McapFile:
             is_cut = not _has_footer(self._stream)
             self.loss = 'the recorder was killed; read up to the last whole chunk' if is_cut else ''
             if not is_cut:
-                check_sections(self._stream)
+                check_summary(self._stream)
             self._scan()
         except BaseException:
             self.close()

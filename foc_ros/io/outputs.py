@@ -13,7 +13,7 @@ MARK = 'made by foc_ros'
 """Text that every picture and page contains that a command writes."""
 EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE = 'evaluation.html', 'fit.html', 'simulation.html'
 REPORT_FILES, OVERVIEW = ('index.html', 'predictions.json'), 'overview.png'
-"""Files of the report of a recording, beside the pictures `moment_NN.png`."""
+"""Files of the report of a recording."""
 PICTURE_SUFFIXES = ('.png', '.pdf', '.svg')
 
 
@@ -51,8 +51,7 @@ def check_page(option: str, directory: Path, page: str) -> None:
 def check_report(option: str, directory: Path) -> None:
     """Raise InputError, which names the option, if a report would overwrite a file that is no part of an earlier report."""
     check_folder(option, directory)
-    pictures = directory / OVERVIEW, *directory.glob('moment_[0-9][0-9].png')
-    check_replaceable(option, *(directory / name for name in REPORT_FILES), *pictures)
+    check_replaceable(option, *(directory / name for name in (*REPORT_FILES, OVERVIEW)))
 
 
 def check_replaceable(option: str, *files: Path) -> None:

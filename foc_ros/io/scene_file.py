@@ -1,38 +1,34 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A scene file (YAML or JSON) as one reaching problem, checked field by field.
+"""A scene file (YAML or JSON) as one reaching problem: the fields that are declared here, and those that are parameters.
 
-Fields: start, goal or goals [m]; start_velocity [m/s], start_acceleration [m/s^2], start_stddev [m] (default 0); duration_s;
-steps; noise [c_x, c_y] per step; eta, bound, risk, shortfall; strategy, with tau and lambda if it is `fixed`; hand_radius; plant,
-plant_mass, plant_damping; obstacles: x, y, radius, radius_stddev, id, of boxes size and yaw, of hulls points instead of x, y;
-guess; max_candidates.
 A missing field has the default of its parameter.
 """
 
 from __future__ import annotations
 
-import math
-import re
 import reprlib
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag, ValidationError
 
+from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, collect_all, join_errors, suggest
-from foc_ros.core.obstacles.shapes import Box, Hull
-from foc_ros.core.scene import ReachingScene, check_outside
-from foc_ros.core.types import Array, HandState, Obstacles, make_obstacles
+from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, join_errors
+from foc_ros.core.obstacles.shapes import Box, Circle, Hull, Shape, collect_obstacles
+from foc_ros.core.scene import ReachingScene
+from foc_ros.core.support import FARTHEST, GoalTable, collect_goals
+from foc_ros.core.types import Goal, HandState, Obstacles
 
 from .documents import read_document
+from .fields import Fields, describe_errors
 
-FARTHEST = 1e4
-"""Bound of every length, velocity and acceleration of a scene, in SI units."""
 MOST_OBSTACLES, MOST_GOALS, MOST_POINTS = 20_000, 256, 10_000
 """Bounds on the rows of a scene, those of the node's messages, and on the points of a guess."""
-_ID = re.compile(r'-?\d{1,40}|[A-Za-z_][\w.]{0,39}')
 
 PARAMETERS = {
     'duration_s': 'duration.fixed_s',
@@ -52,12 +48,140 @@ PARAMETERS = {
 }
 """Fields that are parameters, with their bounds."""
 
-STATE_FIELDS = ('start', 'start_velocity', 'start_acceleration', 'start_stddev')
-FIELDS = (*STATE_FIELDS, 'goal', 'goals', 'noise', 'obstacles', 'guess', *PARAMETERS)
-OBSTACLE_NUMBERS = {'x': -FARTHEST, 'y': -FARTHEST, 'radius': 0.0, 'radius_stddev': 0.0, 'yaw': -FARTHEST}
-"""Fields of an obstacle that are numbers, with their lower bounds."""
-OBSTACLE_FIELDS = (*OBSTACLE_NUMBERS, 'id', 'size', 'points')
-_NUMERAL = re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+')
+Number = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+Length = Annotated[float, Field(ge=0.0, le=FARTHEST)]
+Point = Annotated[tuple[Number, Number], Strict(False)]
+Points = Annotated[list[Point], Field(max_length=MOST_POINTS)]
+Identity = Annotated[
+    str,
+    BeforeValidator(lambda given: str(given) if type(given) is int and abs(given) < 10**40 else given),
+    Field(pattern=r'^(-?\d{1,40}|[A-Za-z_][\w.]{0,39})$'),
+]
+"""Name of an obstacle: a whole number, or letters, digits, _ and ., of at most 40 characters."""
+
+
+class CircleFields(Fields):
+    """An obstacle [m]; id: by default its position in the list."""
+
+    x: Number
+    y: Number
+    radius: Length
+    radius_stddev: Length = 0.0
+    id: Identity = ''
+
+    def build(self) -> Shape:
+        """Return the obstacle."""
+        return Circle((self.x, self.y), self.radius, self.radius_stddev, name=self.id)
+
+
+class BoxFields(CircleFields):
+    """An obstacle of full lengths [m] at an angle [rad], rounded by its radius; a capsule where one length is 0."""
+
+    radius: Length = 0.0
+    size: Annotated[tuple[Length, Length], Strict(False)]
+    yaw: Number = 0.0
+
+    def build(self) -> Shape:
+        """Return the obstacle."""
+        return Box((self.x, self.y), self.size, self.yaw, self.radius, self.radius_stddev, name=self.id)
+
+
+class HullFields(Fields):
+    """An obstacle that is the convex hull of points [m], rounded by its radius."""
+
+    points: Points
+    radius: Length = 0.0
+    radius_stddev: Length = 0.0
+    id: Identity = ''
+
+    def build(self) -> Shape:
+        """Return the obstacle."""
+        return Hull(self.points, self.radius, self.radius_stddev, name=self.id)
+
+
+class GoalFields(Fields):
+    """A goal [m]; name: what answers call it; object: id of the obstacle that it is, which does not block the paths to it."""
+
+    position: Point
+    name: Annotated[str, Field(min_length=1, max_length=80)] | None = None
+    object: Identity | None = None
+
+
+class BulgeFields(Fields):
+    """A guess that passes to the left of the straight line, by the amplitude [m] half way."""
+
+    amplitude: Number
+    kind: Any = None
+
+
+def _find_kind(obstacle: Any) -> str:
+    given = obstacle if isinstance(obstacle, Mapping) else {}
+    return '(hull)' if 'points' in given else '(box)' if 'size' in given else '(circle)'
+
+
+def _list_or(tag: str) -> Discriminator:
+    return Discriminator(lambda given: '(list)' if isinstance(given, list) else tag)
+
+
+AnyObstacle = Annotated[
+    Annotated[CircleFields, Tag('(circle)')] | Annotated[BoxFields, Tag('(box)')] | Annotated[HullFields, Tag('(hull)')],
+    Discriminator(_find_kind),
+]
+AnyGoal = Annotated[Annotated[Point, Tag('(list)')] | Annotated[GoalFields, Tag('(goal)')], _list_or('(goal)')]
+AnyGuess = Annotated[Annotated[Points, Tag('(list)')] | Annotated[BulgeFields, Tag('(guess)')], _list_or('(guess)')]
+LengthOrPair = Annotated[
+    Annotated[tuple[Length, Length], Strict(False), Tag('(list)')] | Annotated[Length, Tag('(number)')], _list_or('(number)')
+]
+
+
+class SceneFields(Fields):
+    """The fields of a scene that are no parameters: positions, velocities and so on [m, m/s, m/s^2]; goal or goals.
+
+    noise: c per step along x and y; guess: the path whose class alone is solved, as its points or its bulge.
+    """
+
+    start: Point
+    start_velocity: Point = (0.0, 0.0)
+    start_acceleration: Point = (0.0, 0.0)
+    start_stddev: LengthOrPair = 0.0
+    goal: AnyGoal | None = None
+    goals: Annotated[list[AnyGoal], Field(min_length=1, max_length=MOST_GOALS)] | None = None
+    noise: Annotated[tuple[Any, Any], Strict(False)] | None = None
+    obstacles: Annotated[list[AnyObstacle], Field(max_length=MOST_OBSTACLES, default_factory=list)]
+    guess: AnyGuess | None = None
+
+    def build_hand(self) -> HandState:
+        """Return the state of the hand at the start."""
+        mean = np.ravel([self.start, self.start_velocity, self.start_acceleration])
+        deviations = np.broadcast_to(np.asarray(self.start_stddev), 2)
+        return HandState(0, mean, np.diag([*np.square(deviations), 0.0, 0.0, 0.0, 0.0]))
+
+    def build_goals(self) -> GoalTable:
+        """Return the goals; raises SceneError."""
+        if (self.goal is None) == (self.goals is None):
+            raise SceneError('goal', 'either goal or goals', 'neither' if self.goal is None else 'both')
+        given = self.goals or ([] if self.goal is None else [self.goal])
+        rows = [Goal(each.position, each.name, each.object) if isinstance(each, GoalFields) else each for each in given]
+        return collect_goals('goals', rows)
+
+    def build_obstacles(self) -> Obstacles:
+        """Return the obstacles; raises SceneError, with a note for every further error."""
+        errors: list[FocError] = []
+        shapes = [collect(errors, _build_shape, row, each) for row, each in enumerate(self.obstacles)]
+        if errors:
+            raise join_errors(errors)
+        return collect_obstacles([each for each in shapes if each is not None])
+
+
+KINDS: dict[str, type[Fields]] = {
+    '(circle)': CircleFields,
+    '(box)': BoxFields,
+    '(hull)': HullFields,
+    '(goal)': GoalFields,
+    '(guess)': BulgeFields,
+}
+NAMES = {'': [*SceneFields.model_fields, *PARAMETERS]} | {tag: [*kind.model_fields] for tag, kind in KINDS.items()}
+"""Names of the fields of a scene, and of the mappings in it by their tags."""
 
 
 def load_scene(file: Path | str) -> ReachingScene:
@@ -67,58 +191,44 @@ def load_scene(file: Path | str) -> ReachingScene:
 
 def parse_scene(document: object) -> ReachingScene:
     """Return the scene of a document of mappings, lists and numbers; raises SceneError, with a note for every further error."""
-    scene = _read_mapping('scene', document)
-    errors = _find_unknown_fields('', scene, FIELDS)
-    config = collect(errors, _read_config, scene)
-    obstacles = collect(errors, _read_obstacles, scene.get('obstacles', []))
-    hand, goals = collect(errors, _read_hand, scene), collect(errors, _read_goals, scene)
-    guess = collect(errors, _read_guess, scene['guess']) if 'guess' in scene else None
-    if config is None or obstacles is None or hand is None or goals is None or errors:
+    if not isinstance(document, dict):
+        raise SceneError('scene', 'a mapping of fields', reprlib.repr(document))
+    errors: list[FocError] = []
+    config = collect(errors, _read_config, document)
+    fields = collect(errors, _read_fields, {name: value for name, value in document.items() if name not in PARAMETERS})
+    obstacles = table = None
+    if fields is not None:
+        obstacles, table = collect(errors, fields.build_obstacles), collect(errors, fields.build_goals)
+    if config is None or fields is None or obstacles is None or table is None or errors:
         raise join_errors(errors)
-    start = hand.mean[:2]
-    avoided, field = obstacles.grow(config.scene.hand_radius), 'goal' if 'goal' in scene else 'goals'
-    collect_all(check_outside, [('start', start, avoided), *((field, goal, avoided) for goal in goals)])
     noise = np.array([config.foc.noise_x, config.foc.noise_y])
-    if guess is None:
-        return ReachingScene(hand, goals, obstacles, noise, None, config)
-    if len(goals) > 1:
-        raise SceneError('guess', 'one goal, which it leads to', f'{len(goals)} goals')
-    return ReachingScene(hand, goals, obstacles, noise, guess_path(start, goals[0], config.foc.steps, *guess), config)
+    scene = ReachingScene(fields.build_hand(), table.positions, obstacles, noise, None, config, table.names, table.objects)
+    scene.check()
+    if fields.guess is None:
+        return scene
+    if len(scene.goals) > 1:
+        raise SceneError('guess', 'one goal, which it leads to', f'{len(scene.goals)} goals')
+    bulge = fields.guess.amplitude if isinstance(fields.guess, BulgeFields) else 0.0
+    via = None if isinstance(fields.guess, BulgeFields) else np.array(fields.guess).reshape(-1, 2)
+    return replace(scene, guess=guess_path(scene.hand.mean[:2], scene.goals[0], config.foc.steps, bulge, via))
 
 
-def guess_path(start: Array, goal: Array, steps: int, amplitude: float = 0.0, via: Array | None = None) -> Array:
-    """Return positions at steps 0..N, (N + 1, 2) [m], from start (2,) to goal (2,), with the timing of a minimum-jerk movement.
-
-    They are the share s = 10 r^3 - 15 r^4 + 6 r^5, r = k/N, along the straight line, plus amplitude sin(pi r) [m] to its left; or
-    along the line through the points `via` (m, 2). If `via` has N + 1 points, it is returned as it is.
-    """
-    if via is not None and len(via) == steps + 1:
-        return via
-    ratio = np.arange(steps + 1) / steps
-    progress = 10 * ratio**3 - 15 * ratio**4 + 6 * ratio**5
-    if via is not None:
-        points = np.vstack([start, via, goal])
-        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        return np.column_stack([np.interp(progress * length[-1], length, axis) for axis in points.T])
-    direction = goal - start
-    distance = float(np.hypot(*direction))
-    if not distance:
-        raise SceneError('guess', 'a goal away from the start', f'both at {start.tolist()}')
-    left = np.array([-direction[1], direction[0]]) / distance
-    path: Array = start + progress[:, None] * direction + amplitude * np.sin(np.pi * ratio)[:, None] * left
-    return path
+def _read_fields(given: Mapping[str, Any]) -> SceneFields:
+    try:
+        return SceneFields.model_validate(given)
+    except ValidationError as invalid:
+        raise join_errors([SceneError(*each) for each in describe_errors(invalid, NAMES)]) from None
 
 
 def _read_config(scene: Mapping[str, Any]) -> Config:
     """Return the parameters of the scene, checked against their own bounds under the names of the fields."""
     given = [(field, parameter, scene[field]) for field, parameter in PARAMETERS.items() if field in scene]
-    if 'noise' in scene:
-        x, y = _read_list('noise', scene['noise'], 2)
-        given += [('noise', 'foc.noise_x', x), ('noise', 'foc.noise_y', y)]
+    if isinstance(noise := scene.get('noise'), list) and len(noise) == 2:
+        given += [('noise', f'foc.noise_{axis}', value) for axis, value in zip('xy', noise, strict=True)]
     config, errors = replace_values(Config(), {'duration.model': 'fixed'}), []
     for field, parameter, value in given:
         try:
-            config = replace_values(config, {parameter: _convert_numeral(value)})
+            config = replace_values(config, {parameter: value})
         except ParameterError as error:
             errors.append(SceneError(field, error.expected, error.got))
     if not errors and config.foc.strategy != 'fixed':
@@ -129,154 +239,8 @@ def _read_config(scene: Mapping[str, Any]) -> Config:
     return config
 
 
-def _read_hand(scene: Mapping[str, Any]) -> HandState:
-    if 'start' not in scene:
-        raise SceneError('start', 'two numbers', 'nothing')
-    stddev = scene.get('start_stddev', 0.0)
-    pair = stddev if isinstance(stddev, list) else [stddev, stddev]
-    points = [(field, scene.get(field, [0.0, 0.0])) for field in STATE_FIELDS[:3]]
-    *mean, deviations = collect_all(_read_point, [*points, ('start_stddev', pair, 0.0)])
-    return HandState(0, np.ravel(mean), np.diag([*np.square(deviations), 0.0, 0.0, 0.0, 0.0]))
-
-
-def _read_goals(scene: Mapping[str, Any]) -> Array:
-    if ('goal' in scene) == ('goals' in scene):
-        raise SceneError('goal', 'either goal or goals', 'both' if 'goal' in scene else 'neither')
-    if 'goal' in scene:
-        return np.array([_read_point('goal', scene['goal'])])
-    goals = _read_points('goals', scene['goals'], MOST_GOALS)
-    if not goals:
-        raise SceneError('goals', 'at least one point', '[]')
-    return np.array(goals)
-
-
-def _read_obstacles(given: object) -> Obstacles:
-    rows: dict[str, tuple[Array, Array, float, float]] = {}
-    errors: list[FocError] = []
-    for place, each in enumerate(_read_rows('obstacles', given, MOST_OBSTACLES)):
-        row = collect(errors, _read_obstacle, place, each, rows)
-        if row is not None:
-            rows[row[0]] = row[1]
-    if errors:
-        raise join_errors(errors)
-    centres, polygons, radii, stddevs = zip(*rows.values(), strict=True) if rows else ((), (), (), 0.0)
-    return make_obstacles(centres, radii, stddevs, tuple(rows), polygons=polygons)
-
-
-def _read_obstacle(place: int, given: object, before: Container[str]) -> tuple[str, tuple[Array, Array, float, float]]:
-    """Return the id of an obstacle, which must differ from those before it, and its centre, polygon, radius and deviation."""
-    field = f'obstacles[{place}]'
-    obstacle = _read_mapping(field, given)
-    errors = _find_unknown_fields(f'{field}.', obstacle, OBSTACLE_FIELDS)
-    identity = collect(errors, _read_identity, f'{field}.id', obstacle.get('id', place), before)
-    numbers = collect(errors, _read_obstacle_numbers, field, obstacle)
-    if identity is None or numbers is None or errors:
-        raise join_errors(errors)
-    return identity, (*_read_polygon(field, obstacle, numbers), numbers['radius'], numbers['radius_stddev'])
-
-
-def _read_obstacle_numbers(field: str, obstacle: Mapping[str, Any]) -> dict[str, float]:
-    """Return the numbers of an obstacle by field; those that it may lack are 0."""
-    given = [name for name in OBSTACLE_NUMBERS if name in obstacle]
-    numbers = collect_all(_read_number, [(f'{field}.{name}', obstacle[name], OBSTACLE_NUMBERS[name]) for name in given])
-    return {'radius': 0.0, 'radius_stddev': 0.0, 'yaw': 0.0} | dict(zip(given, numbers, strict=True))
-
-
-def _read_identity(field: str, identity: object, before: Container[str]) -> str:
-    if type(identity) not in (int, str) or not _ID.fullmatch(str(identity)):
-        expected = 'a whole number, or a name of letters, digits, _ and ., of at most 40 characters'
-        raise SceneError(field, expected, reprlib.repr(identity))
-    if str(identity) in before:
-        raise SceneError(field, 'another id than the obstacles before it', reprlib.repr(identity))
-    return str(identity)
-
-
-def _read_polygon(field: str, obstacle: Mapping[str, Any], numbers: Mapping[str, float]) -> tuple[Array, Array]:
-    """Return centre and polygon, as `Obstacles` has them: a hull where there are points, a box where there is a size.
-
-    numbers: those of the obstacle, by field.
-    """
-    kind = next((name for name in ('points', 'size') if name in obstacle), 'radius')
-    needed, unused = {'points': ((), 'xy'), 'size': ('xy', ''), 'radius': (('x', 'y', 'radius'), ('yaw',))}[kind]
-    errors = [SceneError(f'{field}.{name}', 'a number', 'nothing') for name in needed if name not in obstacle]
-    errors += [
-        SceneError(f'{field}.{name}', 'to be given with a size, and without points', reprlib.repr(obstacle[name]))
-        for name in (*unused, *(('size', 'yaw') if kind == 'points' else ()))
-        if name in obstacle
-    ]
-    if errors:
-        raise join_errors(errors)
-    centre, radius = np.array([numbers.get(axis, 0.0) for axis in 'xy']), numbers['radius']
-    if kind == 'radius':
-        return centre, np.zeros((1, 2))
-    points = _read_points(f'{field}.points', obstacle['points']) if kind == 'points' else []
-    size = _read_point(f'{field}.size', obstacle['size'], 0.0) if kind == 'size' else []
+def _build_shape(row: int, given: CircleFields | BoxFields | HullFields) -> Shape:
     try:
-        shape = Box(centre, size, numbers['yaw'], radius) if kind == 'size' else Hull(points, radius)
+        return given.build()
     except SceneError as error:
-        raise SceneError(error.field.replace('obstacle.', f'{field}.', 1), error.expected, error.got) from error
-    return np.array(shape.centre), shape.polygon
-
-
-def _read_guess(given: object) -> tuple[float, Array | None]:
-    """Return amplitude [m] and points of a guess, as `guess_path` takes them."""
-    if isinstance(given, list):
-        return 0.0, np.array(_read_points('guess', given)).reshape(-1, 2)
-    mapping = _read_mapping('guess', given)
-    if errors := _find_unknown_fields('guess.', mapping, ('amplitude', 'kind')):
-        raise join_errors(errors)
-    if 'amplitude' not in mapping:
-        raise SceneError('guess.amplitude', 'a number', 'nothing')
-    return _read_number('guess.amplitude', mapping['amplitude']), None
-
-
-def _read_mapping(field: str, value: object) -> Mapping[str, Any]:
-    if not isinstance(value, dict):
-        raise SceneError(field, 'a mapping of fields', reprlib.repr(value))
-    return value
-
-
-def _find_unknown_fields(prefix: str, fields: Mapping[str, Any], known: tuple[str, ...]) -> list[FocError]:
-    """Return an error for each unknown field."""
-    names = ', '.join(known)
-    return [
-        SceneError(f'{prefix}{str(name)[:40]}', f'a known field{suggest(name, known) or f": {names}"}', reprlib.repr(value))
-        for name, value in fields.items()
-        if name not in known
-    ]
-
-
-def _read_list(field: str, value: object, length: int) -> list[Any]:
-    if not isinstance(value, list) or len(value) != length:
-        raise SceneError(field, f'a list of {length} numbers', reprlib.repr(value))
-    return value
-
-
-def _read_rows(field: str, value: object, most: int) -> list[Any]:
-    if not isinstance(value, list):
-        raise SceneError(field, 'a list', reprlib.repr(value))
-    if len(value) > most:
-        raise SceneError(field, f'a list of at most {most}', f'one of {len(value)}')
-    return value
-
-
-def _read_point(field: str, value: object, low: float = -FARTHEST) -> list[float]:
-    return [_read_number(field, each, low) for each in _read_list(field, value, 2)]
-
-
-def _read_points(field: str, value: object, most: int = MOST_POINTS) -> list[list[float]]:
-    points = _read_rows(field, value, most)
-    return collect_all(_read_point, [(f'{field}[{row}]', point) for row, point in enumerate(points)])
-
-
-def _read_number(field: str, value: object, low: float = -FARTHEST) -> float:
-    number = _convert_numeral(value)
-    if isinstance(number, bool) or not isinstance(number, (int, float)) or not low <= number <= FARTHEST:
-        raise SceneError(field, f'a number in [{low:g}, {FARTHEST:g}]', reprlib.repr(value))
-    return float(number)
-
-
-def _convert_numeral(value: object) -> object:
-    """Convert a text such as '1e6' to a number: YAML 1.1 does not take it for one; 1e400 is none."""
-    is_numeral = isinstance(value, str) and _NUMERAL.fullmatch(value) is not None
-    return float(value) if is_numeral and math.isfinite(float(value)) else value  # type: ignore[arg-type]
+        raise SceneError(error.field.replace('obstacle', f'obstacles[{row}]', 1), error.expected, error.got) from error

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
 from typing import TypeVar
@@ -20,8 +20,8 @@ from rich.table import Table
 T = TypeVar('T')
 COLUMNS = 80
 """Width of a terminal, into which all tables fit [characters]."""
-PRINTED = 20
-"""A counter is printed each time that it has grown by this, where there is no terminal."""
+QUIET_S = 10.0
+"""Time after which a progress is printed, where there is no terminal [s]."""
 LONGEST_FIRST, LEAST_LAST = 32, 12
 """Widths to which the first and the last column of a wide table are folded [characters]."""
 
@@ -35,40 +35,21 @@ class _Console(Console):
 
 
 def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
-    """Yield the items and show a progress bar; words: its description; total: number of items."""
+    """Yield the items and show a progress bar, or a line of text every some seconds where there is no terminal.
+
+    words: its description; total: number of items.
+    """
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield from items
+        next_s = time.monotonic() + QUIET_S
+        for done, item in enumerate(items, 1):
+            yield item
+            if time.monotonic() >= next_s:
+                print(f'{words}: {done} of {total}', file=sys.stderr, flush=True)
+                next_s = time.monotonic() + QUIET_S
         return
     with Progress(console=console, transient=True) as progress:
         yield from progress.track(items, total=total, description=words)
-
-
-class Counter:
-    """A number that is shown in a progress bar, or where there is no terminal in a line of text at times.
-
-    Attributes: done, the number.
-    """
-
-    def __init__(self, progress: Progress, words: str, total: int) -> None:
-        self.done = 0
-        self._progress, self._task = progress, progress.add_task(words, total=total)
-        self._words, self._total = words, total
-
-    def show(self, done: int) -> None:
-        """Show a number."""
-        self.done = done
-        self._progress.update(self._task, completed=done)
-        if self._progress.disable and done % PRINTED == 0:
-            print(f'{self._words}: {done} of {self._total}', file=sys.stderr, flush=True)
-
-
-@contextmanager
-def show_counter(words: str, total: int) -> Iterator[Counter]:
-    """Return a counter with a progress bar; words: its description; total: the number at its end."""
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-        yield Counter(progress, words, total)
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:

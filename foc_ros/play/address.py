@@ -8,17 +8,12 @@ import ipaddress
 from socket import socket
 
 from foc_ros.core.errors import FocError, InputError
+from foc_ros.io import fields  # noqa: F401  what is missing is said before anything is loaded
 
 try:
     from tornado.netutil import bind_sockets
 except ImportError as error:
     raise FocError("play needs tornado: install python3-tornado, or pip install 'foc_ros[play]'") from error
-try:
-    from pydantic import VERSION  # of the messages of the page: what is missing is said before anything is loaded
-except ImportError as error:
-    raise FocError("play needs pydantic of version 2: pip install 'foc_ros[play]'") from error
-if VERSION.startswith('1.'):
-    raise FocError(f"play needs pydantic of version 2, and {VERSION} is installed: pip install 'foc_ros[play]'")
 
 
 def is_loopback(host: str) -> bool:

@@ -9,18 +9,15 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from foc_ros.core.errors import InputError
+from foc_ros.io.fields import Fields, describe_errors
 
-from .scene import Fields, PlayScene, Point, X, Y
+from .scene import PlayScene, Point, X, Y
 
 LONGEST_MESSAGE = 65_536
 """Bytes of a message, at most."""
 AHEAD_MS = 1000.0
 """Time by which a message may be ahead of the clock of the page, as it is known from the messages before [ms]."""
 NANOSECONDS_PER_MS = 1_000_000
-LONGEST_VALUE = 80
-"""Characters of a value that is shown in an error."""
-EXPECTED = {'missing': 'a value', 'extra_forbidden': 'no such field', 'json_invalid': 'JSON'}
-"""What was expected, by the kind of an error whose own words do not say it."""
 Time = Annotated[float, Field(ge=0.0, le=1e10)]
 """Time of the page's clock, which begins when the page is opened [ms]."""
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
@@ -105,11 +102,8 @@ def parse_message(text: str | bytes) -> Message:
     try:
         return _ADAPTER.validate_json(text)
     except ValidationError as invalid:
-        error = invalid.errors()[0]
-    name = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in error['loc']).lstrip('.')
-    wanted = EXPECTED.get(error['type'], error['msg'].removeprefix('Input should be ').removeprefix('Input '))
-    got = 'none' if error['type'] == 'missing' else repr(error['input'])
-    raise InputError(name or 'message', wanted, got if len(got) <= LONGEST_VALUE else f'{got[:LONGEST_VALUE]}...')
+        field, expected, got = describe_errors(invalid)[0]
+    raise InputError(field or 'message', expected, got)
 
 
 class PageClock:

@@ -9,13 +9,15 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
 from foc_ros.core.types import Array, Obstacles
+from foc_ros.io.fields import Fields
 from foc_ros.reporting.encode import encode_candidate, encode_unsolved
-from foc_ros.reporting.views import SLOTS, Snapshot, parse_label
+from foc_ros.reporting.tracks import Slots
+from foc_ros.reporting.views import Snapshot, parse_label
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
 from foc_ros.ros.messages.types import MessageTypes
 
@@ -41,12 +43,6 @@ X = Annotated[float, Field(ge=BOUNDS[0], le=BOUNDS[1])]
 Y = Annotated[float, Field(ge=BOUNDS[2], le=BOUNDS[3])]
 Size = Annotated[float, Field(ge=0.002, le=0.3)]
 """Radius or full length of an obstacle [m]."""
-
-
-class Fields(BaseModel):
-    """Values of a message of the page: exactly the declared fields, of exactly their types, and finite."""
-
-    model_config = ConfigDict(extra='forbid', frozen=True, strict=True, allow_inf_nan=False)
 
 
 class Place(Fields):
@@ -151,23 +147,6 @@ def make_random_scene(random: np.random.Generator, goals: Sequence[Place]) -> Pl
             obstacles.append(box if is_box else PlacedCircle(x=x, y=y, radius=extent))
             taken.append((x, y, extent))
     return PlayScene(obstacles=obstacles, goals=list(goals))
-
-
-class Slots:
-    """Gives each class a slot of letter and colour, which it keeps while it is among the candidates."""
-
-    def __init__(self) -> None:
-        self._slots: dict[int, int] = {}
-        self._free = list(range(SLOTS))
-
-    def assign(self, ways: Sequence[int]) -> list[int | None]:
-        """Return the slots of the present classes; a class that finds none has None."""
-        for way in set(self._slots) - set(ways):
-            self._free.append(self._slots.pop(way))  # the slot that has been free for longest is used first
-        for way in ways:
-            if way not in self._slots and self._free:
-                self._slots[way] = self._free.pop(0)
-        return [self._slots.get(way) for way in ways]
 
 
 def view_candidates(snapshot: Snapshot, slots: Slots) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.core.types import Prediction
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND
+from foc_ros.reporting.tracks import Slots
 from foc_ros.reporting.views import build_snapshot
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -73,7 +74,7 @@ class Session:
         self._scene: scene.PlayScene = scene.FIRST_SCENE
         self._page: Send | None = None
         self._kept: dict[str, dict[str, Any]] = {}
-        self._clock, self._slots = PageClock(), scene.Slots()
+        self._clock, self._slots = PageClock(), Slots()
         self._hands: deque[tuple[int, HandMessage]] = deque(maxlen=REMEMBERED_HANDS)
         self._tasks: tasks.Tasks | None = None
         self._guided_before = self._is_guided

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures for print, by matplotlib: scenes with candidates, the measured hand, likelihoods and speeds.
+"""Pictures for print, by matplotlib: scenes with candidates, and the measured hand.
 
 Every picture shows the same thing in the same way. A path is a solid line that begins at the hand, and is the thicker the more
 likely it is; it is dotted if it is not known to avoid the obstacles as surely as wanted. A path that is no proper prediction,
@@ -19,12 +19,11 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import FocError, InputError
-from foc_ros.core.obstacles.geometry import find_limits, trace_obstacle
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles
+from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obstacle
+from foc_ros.core.types import Array, Obstacles
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 
 from .legend import describe_in_legend
-from .tracks import CandidateTracks
 from .views import COLOURS, LIKELY, SLOTS, CandidateView, HandTrajectory, Snapshot, UnsolvedView
 
 try:
@@ -152,6 +151,7 @@ def draw_scene(
     An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the
     goals (g, 2) have their names, by default the numbers in the labels of candidates.
     """
+    holds_goal = np.any(find_holders(goals, obstacles), axis=0).tolist()
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
         ring = STDDEVS * float(obstacles.radius_stddev[row])
         look = {'facecolor': '0.65', 'edgecolor': '0.35', 'linewidth': 0.8, 'zorder': 1.0, 'label': 'obstacle'}
@@ -160,7 +160,9 @@ def draw_scene(
             look = {'facecolor': '0.88', 'edgecolor': '0.7', 'linewidth': 0.6, 'zorder': 0.9, 'label': RADIUS_STDDEV}
             axes.add_patch(make_obstacle_patch(obstacles, row, ring, **look))
         if len(obstacles) <= NAMED_OBSTACLES:
-            axes.text(*centre, name, ha='center', va='center', fontsize=8, clip_on=True)
+            below = 12 if holds_goal[row] else 0  # where the sign of the goal does not cover it
+            look = {'xytext': (0, -below), 'textcoords': 'offset points', 'ha': 'center', 'va': 'center'}
+            axes.annotate(name, centre, fontsize=8, annotation_clip=True, **look)
     for number, goal in enumerate(goals):
         look = {'marker': '*', 'markersize': 12, 'color': 'black', 'markerfacecolor': 'white', 'linestyle': ''}
         axes.plot(*goal, zorder=5, label='goal', **look)
@@ -241,43 +243,6 @@ def draw_movement(axes: Any, positions: Array, number: int) -> None:
     tail, head = positions[len(positions) * 2 // 3], positions[len(positions) * 3 // 4]
     axes.annotate('', head, tail, arrowprops={'arrowstyle': '-|>', 'color': colour, 'linewidth': 0.0, 'mutation_scale': 16})
     draw_tag(axes, positions[len(positions) * (2 + number % 2) // 6], str(number + 1), colour)
-
-
-def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None:
-    """Draw the likelihoods of the tracks that have a slot over time [s].
-
-    A track has a gap where it has no candidate. The share that no candidate has is hatched.
-    """
-    times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
-    drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
-    for rank, (track, (first, values)) in enumerate(drawn.items()):
-        colour = CLASS_COLOURS[tracks.slots[track] % COLOURS]
-        axes.plot(times[first : first + len(values)], values, color=colour, linewidth=1.8, marker='.', markersize=2.5)
-        known = np.flatnonzero(np.isfinite(values))
-        row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
-        draw_tag(axes, (times[first + row], values[row]), get_letter(tracks.slots[track]), colour)
-    unknown = np.array([each.unknown_share + each.other_share for each in tracks.snapshots])
-    if unknown.any():
-        look = {'facecolor': 'none', 'edgecolor': '0.6', 'hatch': '////', 'linewidth': 0.0, 'step': 'mid'}
-        axes.fill_between(times, 1.0 - unknown, 1.0, label='unknown, or another goal', **look)
-        axes.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, frameon=False, fontsize=7)
-    axes.set(ylim=(-0.03, 1.03), ylabel='likelihood')
-    axes.tick_params(labelbottom=False)
-
-
-def draw_speeds(
-    axes: Any, hand: HandTrajectory, snapshot: Snapshot, slots: Mapping[str, int], span: Span, origin_ns: int
-) -> None:
-    """Draw predicted speeds and the measured speed within a span [ns], which is pale after the stamp of the snapshot."""
-    now_s = (snapshot.stamp_ns - origin_ns) / NANOSECONDS
-    for each in reversed(snapshot.candidates):
-        look = get_candidate_style(slots.get(each.label), each.likelihood, each.is_compromised)
-        axes.plot(now_s + each.times, each.speed, **look)
-    times = hand.seconds_after(origin_ns)
-    for rows, colour in ((hand.between(snapshot.stamp_ns, span[1]), '0.55'), (hand.between(span[0], snapshot.stamp_ns), 'black')):
-        axes.plot(times[rows], hand.speed[rows], color=colour, linewidth=1.8)
-    axes.set(ylabel='speed [m/s]', xlabel='time [s]')
-    axes.set_ylim(bottom=0.0)
 
 
 def draw_tag(axes: Any, position: Any, text: str, colour: str) -> None:

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, PredictedCandidate, Prediction
+from foc_ros.core.types import Array, Obstacles, Prediction
 
 from .draw import (
     STYLE,
@@ -20,17 +21,14 @@ from .draw import (
     draw_candidates,
     draw_hand,
     draw_hand_now,
-    draw_likelihoods,
     draw_movement,
     draw_scene,
-    draw_speeds,
     number_labels,
     open_figure,
     save_figure,
 )
 from .legend import draw_legend, measure_legend
-from .tracks import CandidateTracks
-from .views import HandTrajectory, Snapshot, build_candidate_views, build_snapshot, build_unsolved_views
+from .views import HandTrajectory, Snapshot, build_snapshot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,10 +36,10 @@ if TYPE_CHECKING:
 WIDTH_IN = 6.4
 
 
-def draw_snapshot(axes: Any, snapshot: Snapshot, bounds: Bounds, slots: Mapping[str, int] | None = None) -> None:
-    """Draw a scene with the candidates in it, the hand and a legend; slots: by label, in order of likelihood if not given."""
+def draw_snapshot(axes: Any, snapshot: Snapshot, bounds: Bounds) -> None:
+    """Draw a scene with the candidates in it, lettered in order of likelihood, the hand and a legend of all that is drawn."""
     draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
-    draw_candidates(axes, snapshot, number_labels(snapshot.candidates) if slots is None else slots)
+    draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
     if snapshot.hand is not None:
         draw_hand_now(axes, snapshot.hand[None])
     draw_legend(axes, None if snapshot.candidates else 'no candidate could be solved')
@@ -75,15 +73,12 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     return axes
 
 
-def plot_outcomes(
-    file: Path | str, obstacles: Obstacles, goals: Array, outcomes: Sequence[PredictedCandidate], start: Array
-) -> None:
-    """Write a picture of candidates in their scene, in the format of the file's suffix.
+def write_picture(file: Path | str, prediction: Prediction) -> None:
+    """Write a picture of a prediction, in the format of the file's suffix.
 
-    goals (g, 2), start (2,) [m]. Raises InputError if the suffix is not that of a picture format or the file cannot be written.
+    Raises InputError if the suffix is not that of a picture format or the file cannot be written.
     """
-    views = build_candidate_views(outcomes, len(goals)), None, build_unsolved_views(outcomes, len(goals))
-    save_figure(make_scene_figure(Snapshot(0, obstacles, goals, *views, hand=start)), file)
+    save_figure(make_scene_figure(build_snapshot(prediction)), file)
 
 
 def make_scene_figure(snapshot: Snapshot) -> Figure:
@@ -107,39 +102,13 @@ def make_recording_figure(
     return figure
 
 
-def make_snapshot_figure(hand: HandTrajectory, tracks: CandidateTracks, row: int, span: Span, bounds: Bounds) -> Figure:
-    """Return a figure of one snapshot during a movement: the scene above, likelihoods and speeds of the whole movement below.
-
-    row: of the snapshot in the tracks; span: start and end [ns] of the movement.
-    """
-    snapshot, slots = tracks.snapshots[row], tracks.slots_at(row)
-    origin_ns = int(hand.stamps_ns[0])
-    now_s, begin_s, end_s = ((stamp - origin_ns) / NANOSECONDS for stamp in (snapshot.stamp_ns, *span))
-    heights = [_get_height(bounds, snapshot) + 0.4, 2.1, 1.9]
-    with open_figure(WIDTH_IN, sum(heights)) as figure:
-        scene, likelihoods, speeds = figure.subplots(3, 1, height_ratios=heights)
-        draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
-        draw_candidates(scene, snapshot, slots)
-        draw_hand(scene, hand, snapshot.stamp_ns, span)
-        draw_legend(scene)
-        draw_likelihoods(likelihoods, tracks.between(*span), origin_ns)
-        draw_speeds(speeds, hand, snapshot, slots, span, origin_ns)
-        for axes in (likelihoods, speeds):
-            axes.axvline(now_s, color='0.4', linewidth=1.0)
-            axes.set_xlim(begin_s, end_s)
-        scene.set_title(f'at {now_s:.2f} s')
-    return figure
-
-
 def make_moment_figure(hand: HandTrajectory, snapshot: Snapshot, span: Span) -> Figure:
     """Return a figure of one snapshot with the hand during a movement, whose start and end [ns] are span."""
     bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
     with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
         axes = figure.subplots()
-        draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
-        draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
         draw_hand(axes, hand, snapshot.stamp_ns, span)
-        draw_legend(axes)
+        draw_snapshot(axes, replace(snapshot, hand=None), bounds)
     return figure
 
 

@@ -22,7 +22,9 @@ LABELS_IN = 0.5
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
 SIGNS = 6
-"""Signs of a scene at most, but for those of a hand that moves."""
+"""Signs of a scene at most, but for those of a hand that moves and for dotted lines."""
+DOTTED = 'dotted: not known to avoid as surely as wanted'
+"""What the line of a compromised or estimated candidate means."""
 _PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
 """Subplot and place of axes before a legend took a part of it."""
 
@@ -39,7 +41,8 @@ def describe_in_legend(view: CandidateView | UnsolvedView, letter: str = ' ', re
 
 def measure_legend(candidates: Sequence[CandidateView | UnsolvedView]) -> float:
     """Return the height of the legend of a scene that is as wide as a page [in]."""
-    lines = sum(1 + fill(describe_in_legend(each), COLUMNS).count('\n') for each in candidates) + -(-SIGNS // 2)
+    signs = SIGNS + any(isinstance(each, CandidateView) and each.is_compromised for each in candidates)
+    lines = sum(1 + fill(describe_in_legend(each), COLUMNS).count('\n') for each in candidates) + -(-signs // 2)
     return lines * LINE * SIZE_PT / 72.0 + 0.05
 
 
@@ -48,6 +51,8 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
 
     The text is as small as the place needs. A second call replaces the legend of the first.
     """
+    from matplotlib.lines import Line2D  # `draw` says what to do where it is missing
+
     figure, name = axes.figure, f'legend {id(axes)}'
     for earlier in [each for each in figure.axes if each.get_gid() == name]:
         earlier.remove()
@@ -57,6 +62,8 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
     columns = NARROW_COLUMNS if is_narrow else COLUMNS
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     candidates = sorted((label for label in named if '%  ' in label), key=lambda label: (-_read_share(label), label))
+    if any(isinstance(named[label], Line2D) and named[label].get_linestyle() == ':' for label in candidates):
+        named[DOTTED] = Line2D([], [], color='0.35', linestyle=':', linewidth=2.0)
     signs = [label for label in named if label not in candidates]
     texts = [fill(label, columns, subsequent_indent=' ' * 10) for label in candidates]
     sign_columns = 1 if is_narrow else 2

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a recording: a directory with one interactive page, pictures for print, and the numbers."""
+"""The report of a recording: a directory with one interactive page, a picture of all movements, and the numbers."""
 
 from __future__ import annotations
 
@@ -19,16 +19,11 @@ from foc_ros.io.outputs import MARK, OVERVIEW, REPORT_FILES, check_report
 
 from .draw import Span, save_figure
 from .encode import compute_recording_bounds, encode_report, round_number
-from .figures import make_recording_figure, make_snapshot_figure
+from .figures import make_recording_figure
 from .page import render
-from .tracks import CandidateTracks, build_candidate_tracks
+from .tracks import build_candidate_tracks
 from .views import NOTED, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
 
-MOST_PICTURES = 8
-SINGLE_MOVEMENT_FRACTIONS = (0.1, 0.3, 0.5, 0.7)
-"""Fractions of its duration at which a movement is pictured if it is the only one."""
-FRACTION = 0.3
-"""Fraction of its duration at which each of several movements is pictured."""
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""
 LATE_SHARE = 0.05
@@ -74,7 +69,7 @@ def write_report(
     summary: Mapping[str, str],
     tables: Sequence[Table] = (),
 ) -> list[Path]:
-    """Write index.html, predictions.json and pictures into a directory, replacing those of an earlier report; return the files.
+    """Write index.html, predictions.json and overview.png into a directory, replacing an earlier report; return the files.
 
     hand: the measured movement; snapshots: the predictions in order of their stamps; summary: facts for a table of the page;
     tables: further ones. Raises InputError if the directory cannot be written or contains other files of those names, or if the
@@ -101,7 +96,7 @@ def write_report(
     page_file, numbers_file = (directory / name for name in REPORT_FILES)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        pictures = _write_pictures(directory, hand, tracks, spans)
+        pictures = _write_overview(directory / OVERVIEW, hand, snapshots, spans)
         page_file.write_text(html, encoding='utf-8', errors='replace')
         numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
     except OSError as error:
@@ -109,34 +104,15 @@ def write_report(
     return [page_file, numbers_file, *pictures]
 
 
-def _write_pictures(directory: Path, hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence[Span]) -> list[Path]:
-    """Write the overview and the pictures of single predictions; return the files."""
-    solved = [each for each in tracks.snapshots if each.candidates]
+def _write_overview(file: Path, hand: HandTrajectory, snapshots: Sequence[Snapshot], spans: Sequence[Span]) -> list[Path]:
+    """Write the picture of all movements; return the file, nothing where no candidate was solved."""
+    solved = [each for each in snapshots if each.candidates]
     if not solved:
         return []
-    bounds = compute_recording_bounds(hand, solved)
     goals = np.unique(np.concatenate([each.goals for each in solved]), axis=0)
-    figures = {OVERVIEW: make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds)}
-    for count, (row, span) in enumerate(_select_rows(tracks.snapshots, spans).items()):
-        figures[f'moment_{count + 1:02d}.png'] = make_snapshot_figure(hand, tracks, row, span, bounds)
-    for name, figure in figures.items():
-        save_figure(figure, directory / name)
-    return [directory / name for name in figures]
-
-
-def _select_rows(snapshots: Sequence[Snapshot], spans: Sequence[Span]) -> dict[int, Span]:
-    """Return the rows of the snapshots to be pictured, each with its movement."""
-    shown = np.unique(np.linspace(0, len(spans) - 1, min(len(spans), MOST_PICTURES)).round().astype(int))
-    fractions = SINGLE_MOVEMENT_FRACTIONS if len(spans) == 1 else (FRACTION,)
-    stamps = np.array([each.stamp_ns for each in snapshots])
-    is_solved = np.array([bool(each.candidates) for each in snapshots])
-    selected: dict[int, Span] = {}
-    for start_ns, end_ns in (spans[number] for number in shown):
-        inside = np.flatnonzero(is_solved & (stamps >= start_ns) & (stamps <= end_ns))
-        for fraction in fractions if len(inside) else ():
-            wanted_ns = start_ns + fraction * (end_ns - start_ns)
-            selected[int(inside[np.argmin(np.abs(stamps[inside] - wanted_ns))])] = (start_ns, end_ns)
-    return selected
+    figure = make_recording_figure(hand, solved[0].obstacles, goals, spans, compute_recording_bounds(hand, solved))
+    save_figure(figure, file)
+    return [file]
 
 
 def describe_late(snapshots: Sequence[Snapshot]) -> str:

@@ -16,7 +16,7 @@ from .views import COLOURS, SLOTS, Snapshot
 
 @dataclass(frozen=True)
 class CandidateTracks:
-    """Snapshots with their candidates associated over time: a track has the candidates whose class has the same number.
+    """Snapshots with their candidates associated over time: a track has the candidates of one class.
 
     tracks: for each snapshot, the number of the track of each candidate, by label; slots: of each track, the slot that gives its
     letter and colour. Tracks without a slot are missing there.
@@ -47,35 +47,42 @@ class CandidateTracks:
         }
 
 
+class Slots:
+    """Gives each class a slot of letter and colour, which it keeps also over an absence, unless another class needs it."""
+
+    def __init__(self) -> None:
+        self._owners: dict[int, int] = {}
+        self._used = [0] * SLOTS
+        self._turn = 0
+
+    def assign(self, ways: Sequence[int]) -> list[int | None]:
+        """Return the slots of the present classes, by their numbers; a class that finds none has None.
+
+        A slot whose colour (slot modulo COLOURS) is unused is preferred, then the one that has been free for longest.
+        """
+        self._turn += 1
+        slots = {way: slot for slot, way in self._owners.items() if way in ways}
+        for way in ways:
+            colours = {slot % COLOURS for slot in slots.values()}
+            free = [slot for slot in range(SLOTS) if slot not in slots.values()]
+            if way not in slots and free:
+                slots[way] = min(free, key=lambda slot: (slot % COLOURS in colours, self._used[slot], slot))
+                self._owners[slots[way]] = way
+        for slot in slots.values():
+            self._used[slot] = self._turn
+        return [slots.get(way) for way in ways]
+
+
 def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
-    """Return the candidates of successive snapshots by track, and give the tracks their letters and colours.
+    """Return the candidates of successive snapshots by track, and the letters and colours of the tracks.
 
-    A track has the candidates of one class. Tracks are numbered from 0 in order of their appearance, whatever the classes were
-    numbered before the first snapshot.
+    A track has the candidates of one class, as long as it has one letter. Tracks are numbered from 0 in order of their
+    appearance, whatever the classes were numbered before the first snapshot.
     """
-    numbers: dict[int, int] = {}
-    tracks = [{each.label: numbers.setdefault(each.way, len(numbers)) for each in snapshot.candidates} for snapshot in snapshots]
-    return CandidateTracks(snapshots, tracks, assign_slots(snapshots, tracks))
-
-
-def assign_slots(
-    snapshots: Sequence[Snapshot], tracks: Sequence[Mapping[str, int]], count: int = SLOTS, colours: int = COLOURS
-) -> dict[int, int]:
-    """Return the slot in [0, count) of each track; simultaneous tracks have different slots.
-
-    Tracks that begin together receive their slots in order of likelihood. A slot whose colour (slot modulo colours) is unused at
-    that time is preferred, then the one that has been free for longest. A track that finds no free slot has none.
-    """
-    last_row = {track: row for row, numbers in enumerate(tracks) for track in numbers.values()}
-    slots: dict[int, int] = {}
-    begun: set[int] = set()
-    taken_until = dict.fromkeys(range(count), -1)
-    for row, (snapshot, numbers) in enumerate(zip(snapshots, tracks, strict=True)):
-        for track in (numbers[each.label] for each in snapshot.candidates):
-            free = [slot for slot, until in taken_until.items() if until < row]
-            if track not in begun and free:
-                used = {slot % colours for slot, until in taken_until.items() if until >= row}
-                slots[track] = min(free, key=lambda slot: (slot % colours in used, taken_until[slot], slot))
-                taken_until[slots[track]] = last_row[track]
-            begun.add(track)
-    return slots
+    given, numbers, tracks = Slots(), dict[tuple[int, int | None], int](), list[dict[str, int]]()
+    for snapshot in snapshots:
+        ways = [each.way for each in snapshot.candidates]
+        keys = zip(ways, given.assign(ways), strict=True)
+        found = [numbers.setdefault(key, len(numbers)) for key in keys]
+        tracks.append({each.label: track for each, track in zip(snapshot.candidates, found, strict=True)})
+    return CandidateTracks(snapshots, tracks, {track: slot for (_, slot), track in numbers.items() if slot is not None})

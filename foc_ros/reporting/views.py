@@ -142,7 +142,7 @@ class Snapshot(Record):
         The name is empty if the path leads through no obstacle.
 
         The obstacles have their mean sizes and move on at their velocities. The beginning of a path within an obstacle that the
-        hand is in does not count, nor do depths of less than GRAZE_M.
+        hand is in does not count, nor its end within one that is its goal, nor do depths of less than GRAZE_M.
         """
         rows = [row for row, name in enumerate(self.obstacles.ids) if name not in self.cleared]
         curve, blocking = view.curve, self.obstacles.take(rows)
@@ -152,12 +152,12 @@ class Snapshot(Record):
         centres = blocking.centre + times[:, None, None] * blocking.velocity
         depths = blocking.radius - measure_offsets(curve, blocking, centres)[1]
         is_inside = depths > GRAZE_M
-        has_left = np.maximum.accumulate(~is_inside, axis=0)
-        entered = np.argwhere(is_inside & has_left)
+        between = np.maximum.accumulate(~is_inside, axis=0) & np.maximum.accumulate(~is_inside[::-1], axis=0)[::-1]
+        entered = np.argwhere(is_inside & between)
         if not len(entered):
             return '', 0.0
         first = int(entered[0, 1])
-        deepest = np.argmax(np.where(has_left[:, first], depths[:, first], -np.inf))
+        deepest = np.argmax(np.where(between[:, first], depths[:, first], -np.inf))
         return blocking.ids[first], float(deepest / (len(curve) - 1))
 
     def describe_ghost(self, view: CandidateView | UnsolvedView) -> tuple[str, float | None]:

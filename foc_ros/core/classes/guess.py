@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array, Obstacles
 
@@ -67,6 +68,25 @@ def timed(path: Array, velocity: Array, duration_s: float, steps: int) -> Array:
     heading = step / max(float(np.hypot(*step)), np.finfo(float).tiny)
     at = compute_progress(float(along[-1]), float(heading @ velocity), duration_s, steps)
     return np.column_stack([np.interp(at, along, axis) for axis in path.T])
+
+
+def guess_path(start: Array, goal: Array, steps: int, amplitude: float = 0.0, via: Array | None = None) -> Array:
+    """Return positions at steps 0..N, (N + 1, 2) [m], from start (2,) to goal (2,), with the timing of a minimum-jerk movement.
+
+    They are on the line through the points `via` (m, 2), or on the straight line plus amplitude sin(pi k/N) [m] to its left. If
+    `via` has N + 1 points, it is returned as it is.
+    """
+    if via is not None and len(via) == steps + 1:
+        return via
+    path = timed(np.vstack([start, *([] if via is None else via), goal]), np.zeros(2), 1.0, steps)
+    if via is not None:
+        return path
+    direction = goal - start
+    distance = float(np.hypot(*direction))
+    if not distance:
+        raise SceneError('guess', 'a goal away from the start', f'both at {start.tolist()}')
+    aside = amplitude / distance * np.array([-direction[1], direction[0]])
+    return path + np.outer(np.sin(np.pi * np.arange(steps + 1) / steps), aside)
 
 
 def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacles, names: Names) -> list[Array]:

@@ -175,9 +175,10 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     is_settled = now.is_settled[row] or now.gain[row] < LARGEST_TOLERANCE
     is_short = problem.preference.is_hard and k < problem.wanted_k * (1.0 - REACHED)
     if is_late or not (is_settled or is_short):
-        cause = 'out of time' if is_late else 'not settled'
-        message = f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated'
-        return collect(point, row, Status.DEADLINE, message, aims_at_eta=False)
+        status, cause = _name_unsettled(point, row)
+        return collect(
+            point, row, status, f'{cause}: eta {reached:.4g} so far, and the likelihood is estimated', aims_at_eta=False
+        )
     if problem.preference.is_hard:
         message = f'eta {problem.eta:g} is out of reach: the largest found is {reached:.4g}'
     else:
@@ -185,6 +186,13 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
             f'eta {reached:.6g} of the wanted {problem.eta:g}: more would cost more than likelihood.shortfall, or is out of reach'
         )
     return collect(point, row, Status.ETA_UNREACHABLE, message)
+
+
+def _name_unsettled(point: Point, row: int) -> tuple[Status, str]:
+    """Return status and cause of a problem that is not settled."""
+    if point.is_late(row):
+        return Status.DEADLINE, 'out of time'
+    return Status.ESTIMATED, f'not settled after {int(point.now.iterations[row])} QPs'
 
 
 def solve_fixed(
@@ -204,7 +212,8 @@ def _finish_curve(point: Point, row: int, is_touching: bool, status: Status, mes
     """Return the result of a strategy of tau and lambda, unless the point is none."""
     is_late = point.is_late(row)
     if is_late or not (point.now.is_done[row] or point.now.gain[row] < LARGEST_TOLERANCE):
-        status, message = Status.DEADLINE, f'{"out of time" if is_late else "not settled"}: the likelihood is estimated'
+        status, cause = _name_unsettled(point, row)
+        message = f'{cause}: the likelihood is estimated'
     elif is_touching:
         status, message = Status.INFEASIBLE, INFEASIBLE
     return collect(point, row, status, message, **rest)

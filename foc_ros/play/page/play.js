@@ -235,10 +235,11 @@ function setArranging(on) {
 }
 
 let shownWays = '';
-// Writes the table of candidates, with bars in the colours of their paths, if it has changed.
+// Writes the table of candidates, with bars in the colours of their paths, if it has changed; by goals and names, so that a bar stays
+// where it is while likelihoods change.
 function showWays() {
   const known = view.hidden ? [] : view.candidates.filter(({ likelihood }) => likelihood !== null);
-  const rows = known.filter((each) => each.likelihood >= NOTED);
+  const rows = known.filter((each) => each.likelihood >= NOTED).sort((a, b) => a.goal - b.goal || a.words.localeCompare(b.words));
   const others = known.filter((each) => each.likelihood < NOTED);
   const rest = others.reduce((sum, each) => sum + each.likelihood, 0);
   if (others.length) rows.push({ slot: null, likelihood: rest, words: `${others.length} more, each below 1 %`, ghost: '' });
