@@ -12,12 +12,9 @@ from evaluation_samples import TWO_CLASSES, make_candidates, observation, record
 
 from foc_ros.analysis.evaluation.baselines import (
     BASELINES,
-    SINGER_SETTINGS,
-    _discretise,
     boltzmann_shares,
     compute_straight_costs,
     compute_straight_positions,
-    forecast_singer,
     forecast_straight_minimum_jerk,
     guess_constant_velocity,
     guess_nearest_gap,
@@ -25,8 +22,10 @@ from foc_ros.analysis.evaluation.baselines import (
     make_baselines,
     power_rule_shares,
 )
-from foc_ros.analysis.evaluation.observations import GOAL, HORIZONS_S, PATH_CLASS, TIMES_S, ask, ask_main
+from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask, ask_main
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
+from foc_ros.analysis.evaluation.singer import SINGER_SETTINGS, _discretise, forecast_singer
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, TIMES_S
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT
 

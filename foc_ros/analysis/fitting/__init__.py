@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.analysis.evaluation.scores import CENTRAL, choose_held_out, resample
+from foc_ros.analysis.evaluation.scores import choose_held_out
+from foc_ros.analysis.intervals import CENTRAL, resample
 from foc_ros.core.config import list_parameters
 from foc_ros.core.types import Array
 
@@ -30,7 +31,7 @@ Setting = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings (nan: none), and its data."""
+    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings, and its data."""
 
     name: str
     value: float
@@ -45,9 +46,8 @@ class Estimate:
         return cls(name, value, min(low, value), max(high, value), how)
 
     def as_json(self) -> dict[str, Any]:
-        """Return plain values; an unknown end of the interval is null."""
-        ends = [None if math.isnan(end) else end for end in (self.low, self.high)]
-        return {'value': self.value, 'interval': ends, 'how': self.how}
+        """Return plain values."""
+        return {'value': self.value, 'interval': [self.low, self.high], 'how': self.how}
 
 
 @dataclass
@@ -66,6 +66,23 @@ class Findings:
     def values(self) -> dict[str, float | str]:
         """The values that were found, by name."""
         return {name: each.value for name, each in self.estimates.items()} | self.chosen
+
+    def take(self, later: Findings) -> None:
+        """Add what a later step found; what an earlier step determined stays determined."""
+        for name, each in later.estimates.items():
+            before = self.estimates.get(name, each)
+            how = each.how if before.how == each.how else f'{before.how}, then {each.how}'
+            ends = (before.low, before.high) if before.value == each.value else (each.low, each.high)
+            self.estimates[name] = replace(each, low=min(each.low, ends[0]), high=max(each.high, ends[1]), how=how)
+        self.chosen |= later.chosen
+        undetermined = self.undetermined | later.undetermined
+        self.undetermined = {name: why for name, why in undetermined.items() if name not in self.values}
+        self.warnings += later.warnings
+
+
+def is_cross_validated(recordings: Sequence[object]) -> bool:
+    """Return whether there are enough recordings to hold one out."""
+    return len(recordings) >= 3
 
 
 def clip_to_bounds(name: str, value: float, least: float = 0.0) -> float:
