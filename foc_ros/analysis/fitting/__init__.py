@@ -10,8 +10,9 @@ value: where its profile, the best log-likelihood over all other parameters, is 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,11 @@ def clip_to_bounds(name: str, value: float, least: float = 0.0) -> float:
     return float(f'{min(max(value, bound.low, least), bound.high):.6g}')
 
 
+def list_settings(values: Mapping[str, Iterable[float]]) -> tuple[Setting, ...]:
+    """Return all combinations of values by name, each value once."""
+    return tuple(dict(zip(values, each, strict=True)) for each in product(*map(dict.fromkeys, values.values())))
+
+
 @dataclass(frozen=True)
 class SettingTable:
     """Log-likelihoods, or log-densities, of n recordings under s settings (n, s) [nat]; nan where nothing is known.
@@ -116,8 +122,18 @@ class SettingTable:
         """Return the column of some, for each recording (n,), that is best for the other groups."""
         return np.array(columns)[choose_held_out(np.nan_to_num(self.values[:, columns]), groups)]
 
-    def score(self, chosen: int | NDArray[np.intp]) -> float:
-        """Return the mean over the recordings under the column chosen for all, or for each of them (n,)."""
+    def list_choices(
+        self, given: Setting, columns: Sequence[int] | NDArray[np.intp], names: Sequence[str]
+    ) -> dict[str, NDArray[np.intp]]:
+        """Return the columns chosen for the recordings (n,), of these names, by how they were chosen from some."""
+        n = len(self.values)
+        choices = {'as given': np.full(n, self.settings.index(given)), 'fitted': np.full(n, self.find_best(columns))}
+        if is_cross_validated(names):
+            choices['without the recording'] = self.choose_held_out(columns, names)
+        return choices
+
+    def score(self, chosen: NDArray[np.intp]) -> float:
+        """Return the mean over the recordings under the column chosen for each of them (n,)."""
         return float(np.nanmean(self.values[np.arange(len(self.values)), chosen]))
 
     def determine(self, given: Setting) -> tuple[NDArray[np.intp], dict[str, str]]:

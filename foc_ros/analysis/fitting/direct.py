@@ -30,7 +30,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +49,7 @@ from foc_ros.core.hand.kalman import Update, compute_gramian, compute_transition
 from foc_ros.core.learning.movements import has_covered_distance
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Record, SampleStatus
 
-from . import Estimate, Findings, SettingTable, clip_to_bounds
+from . import Estimate, Findings, SettingTable, clip_to_bounds, list_settings
 
 MIN_SAMPLES = 10
 POSITION_STDDEV, JERK_DENSITY = 'estimator.position_stddev', 'estimator.jerk_density'
@@ -140,10 +139,8 @@ def tabulate_innovations(
 
     Every filter that is tried starts anew where the given one does not continue, so that all are compared by the same samples.
     """
-    deviations = list(product(position_stddevs, jerk_densities))
-    position, jerk = np.array(deviations).T ** 2
-    names = POSITION_STDDEV, JERK_DENSITY
-    settings = tuple(dict(zip(names, each, strict=True)) for each in deviations)
+    settings = list_settings({POSITION_STDDEV: position_stddevs, JERK_DENSITY: jerk_densities})
+    position, jerk = np.array([tuple(each.values()) for each in settings]).T ** 2
     return SettingTable(np.array([_compute_log_likelihoods(each, given, position, jerk) for each in hands]), settings)
 
 

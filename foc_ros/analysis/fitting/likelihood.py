@@ -19,7 +19,7 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, replace_values
 from foc_ros.core.types import Array
 
-from . import Findings, Setting, SettingTable, is_cross_validated
+from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
 
 RULES = (
     *(make_plain(LikelihoodConfig(), beta) for beta in (0.5, 1.0, 2.0, 3.0, 6.0, 12.0)),
@@ -62,11 +62,11 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> t
         words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
         found.warnings.append(f'likelihood.beta: in {100 * missed:.0f} % of the predictions {words}')
     uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
-    scores = {'uniform': float(np.mean(uniform)), 'as given': table.score(0), 'fitted': table.score(table.find_best(columns))}
+    names = [each.name for each in recordings]
+    scores = {'uniform': float(np.mean(uniform))}
+    scores |= {how: table.score(each) for how, each in table.list_choices(given, columns, names).items()}
     if is_cross_validated(recordings):
-        names = [each.name for each in recordings]
         taken = [each[0][1].answers[each[0][1].truth] if each else name for each, name in zip(questions, names, strict=True)]
-        scores['without the recording'] = table.score(table.choose_held_out(columns, names))
         if len(set(taken)) > 1:
             scores['without its way'] = table.score(table.choose_held_out(columns, taken))
     return found, {'ways': scores}
@@ -74,9 +74,9 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> t
 
 def _list_likelihoods(given: Setting) -> tuple[Setting, ...]:
     """Return the settings of the likelihood that are tried, the given one first."""
-    values = [dict.fromkeys((given[name], *tried)) for name, tried in LIKELIHOODS.items()]
-    ahead = [dict(zip(LIKELIHOODS, each, strict=True)) for each in product(*values)]
-    plain = [{**given, 'likelihood.beta': beta, 'likelihood.planning_horizon_s': WHOLE_WAY_S} for beta in values[0]]
+    ahead = list_settings({name: (given[name], *tried) for name, tried in LIKELIHOODS.items()})
+    betas = dict.fromkeys(each['likelihood.beta'] for each in ahead)
+    plain = [{**given, 'likelihood.beta': beta, 'likelihood.planning_horizon_s': WHOLE_WAY_S} for beta in betas]
     return (*ahead, *plain)
 
 

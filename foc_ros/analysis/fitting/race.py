@@ -94,11 +94,10 @@ def _scale(config: Config, powers: Mapping[str, float], factor: float) -> Config
 
 @dataclass(frozen=True)
 class ReplayScores:
-    """Log-likelihoods of predictions, each under all parameters that need no replay, (q,); uniform: of a guess among classes."""
+    """Log-likelihoods of predictions, of classes above uniform, each under all parameters that need no replay, (q,) [nat]."""
 
     classes: dict[Key, Array] = field(default_factory=dict)
     positions: dict[Key, Array] = field(default_factory=dict)
-    uniform: dict[Key, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -132,12 +131,11 @@ def score_observations(recording: ObservedRecording, config: Config) -> ReplaySc
     found = ReplayScores()
     gaps = {observation.stamp_ns: question for observation, question in ask_all(recording, GAP)}
     for observation, question in ask_main(recording):
-        key = recording.name, observation.stamp_ns
         questions = [question, *([gaps[observation.stamp_ns]] if observation.stamp_ns in gaps else [])]
         shares = [power_rule_shares(observation, rule) for rule in RULES]
         probabilities = [[Forecast.from_shares(each, about).true_probability(about) for each in shares] for about in questions]
-        found.classes[key] = np.log(probabilities).sum(axis=0)
-        found.uniform[key] = -sum(np.log(about.possible) for about in questions)
+        uniform = [[1.0 / about.possible] for about in questions]
+        found.classes[recording.name, observation.stamp_ns] = np.log(np.divide(probabilities, uniform)).sum(axis=0)
     for observation in recording.observations:
         densities = compute_mean_densities(observation, observation.candidates.mixture, config, FEW_WIDENINGS)
         if densities is not None:
@@ -151,26 +149,23 @@ def compare_settings(settings: Sequence[Sequence[ReplayScores]], names: Sequence
     settings: by setting and recording. A prediction that a setting could not make counts as the worst of those that others made
     in its place; of classes at most as a uniform guess.
     """
-    uniform = {key: value for parts in settings for part in parts for key, value in part.uniform.items()}
     classes = [_take_best([each.classes for each in parts]) for parts in settings]
     positions = [_take_best([each.positions for each in parts]) for parts in settings]
-    return np.array([_average_by_recording(classes, uniform, names), _average_by_recording(positions, {}, names)])
+    return np.array([_average_by_recording(classes, 0.0, names), _average_by_recording(positions, np.inf, names)])
 
 
 def _take_best(parts: Sequence[Mapping[Key, Array]]) -> dict[Key, float]:
     """Return the log-likelihoods under the parameters that are best for all predictions together."""
     rows = {key: row for part in parts for key, row in part.items()}
-    if not rows:
-        return {}
-    best = int(np.sum(list(rows.values()), axis=0).argmax())
+    best = int(np.sum(list(rows.values()), axis=0).argmax()) if rows else 0
     return {key: float(row[best]) for key, row in rows.items()}
 
 
-def _average_by_recording(found: Sequence[Mapping[Key, float]], most: Mapping[Key, float], names: Sequence[str]) -> Array:
+def _average_by_recording(found: Sequence[Mapping[Key, float]], most: float, names: Sequence[str]) -> Array:
     """Return the means (s, n) over the predictions of each recording; most: what a missing prediction counts at most."""
-    keys = sorted({key for each in (*found, most) for key in each})
-    *table, bound = np.array([[each.get(key, np.nan) for key in keys] for each in (*found, most)])
-    worst = np.nanmin([*table, bound], axis=0)
+    keys = sorted({key for each in found for key in each})
+    table = np.array([[each.get(key, np.nan) for key in keys] for each in found])
+    worst = np.minimum(np.nanmin(table, axis=0), most)
     recording = np.array([names.index(name) for name, _ in keys], dtype=np.intp)
     counts = np.maximum(np.bincount(recording, minlength=len(names)), 1)
     return np.array([np.bincount(recording, np.where(np.isnan(row), worst, row), len(names)) / counts for row in table])

@@ -23,7 +23,7 @@ from foc_ros.core.hand.duration import is_passing
 from foc_ros.core.plant.replanning import triple_integrator_goal_map, triple_integrator_process_covariance
 from foc_ros.core.types import Array
 
-from . import Findings, Setting, SettingTable, is_cross_validated
+from . import Findings, Setting, SettingTable, list_settings
 
 PROCESS_NOISE, ENDPOINT_STDDEV, SPREAD = 'foc.process_noise', 'foc.endpoint_stddev', 'duration.spread'
 WIDENINGS = {
@@ -49,21 +49,17 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> tup
     """
     before = flatten(config)
     given = {name: float(before[name]) for name in WIDENINGS}
-    axes = [dict.fromkeys((0.0, given[name], *tried)) for name, tried in WIDENINGS.items()]
-    widenings = tuple(product(*axes))
-    settings = tuple(dict(zip(WIDENINGS, each, strict=True)) for each in widenings)
-    rows = []
+    settings = list_settings({name: (0.0, given[name], *tried) for name, tried in WIDENINGS.items()})
+    widenings, rows = [tuple(each.values()) for each in settings], []
     for recording in recordings:
         shares = [power_rule_shares(each, config.likelihood) for each in recording.observations]
         pairs = zip(recording.observations, shares, strict=True)
         known = [found for pair in pairs if (found := compute_mean_densities(*pair, config, widenings)) is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(settings), np.nan))
-    table, n = SettingTable(np.array(rows), settings), len(recordings)
+    table = SettingTable(np.array(rows), settings)
     found, columns = table.estimate(given, 'density of true positions')
-    chosen = {'motor noise alone': np.zeros(n, dtype=np.intp), 'as given': np.full(n, settings.index(given))}
-    chosen['fitted'] = np.full(n, table.find_best(columns))
-    if is_cross_validated(recordings):
-        chosen['without the recording'] = table.choose_held_out(columns, [each.name for each in recordings])
+    chosen = {'motor noise alone': np.zeros(len(recordings), dtype=np.intp)}
+    chosen |= table.list_choices(given, columns, [each.name for each in recordings])
     coverage = {name: compute_coverage(recordings, config, [widenings[each] for each in chosen[name]]) for name in chosen}
     return found, {
         'positions': {name: table.score(each) for name, each in chosen.items()},
