@@ -28,7 +28,7 @@ def resample(statistic: Callable[[NDArray[np.intp]], float], n: int) -> Array:
     return np.asarray(drawn.bootstrap_distribution)
 
 
-def compute_mean_interval(values: Array, group: Array, seed: int = SEED, resamples: int = RESAMPLES) -> list[float]:
+def compute_mean_interval(values: Array, group: NDArray[Any], seed: int = SEED, resamples: int = RESAMPLES) -> list[float]:
     """Return the interval of 95 % [low, high] of the mean of values (m,), at least one, of which groups (m,) are drawn."""
     _, number = np.unique(group, return_inverse=True)
     sums, counts = np.bincount(number, values), np.bincount(number)

@@ -40,7 +40,8 @@ def _find_walls_beside(obstacles: Obstacles, row: Rows, member: int, outwards: A
     """Return those walls whose nearest point is beside an obstacle, where a unit vector (2,) points, rather than ahead of it."""
     walls = np.flatnonzero(row == WALL)
     towards = -measure_offsets(obstacles.centre[member], obstacles.take(walls))[0][0]
-    return walls[towards @ outwards >= np.abs(towards @ [outwards[1], -outwards[0]])]
+    is_beside: NDArray[np.bool_] = towards @ outwards >= np.abs(towards @ [outwards[1], -outwards[0]])
+    return walls[is_beside]
 
 
 def _measure_distances(obstacles: Obstacles) -> Array:

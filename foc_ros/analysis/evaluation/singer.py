@@ -106,4 +106,4 @@ def _tabulate_densities(recording: ObservedRecording) -> Array:
     mean, variance = forecast_singer(path.stamps_ns, path.positions, stamps_ns, np.array(HORIZONS_S))
     true = np.array([each.truth.positions[HORIZONS] for each in observations])
     squared = ((true[:, None] - mean) ** 2).sum(axis=-1)
-    return np.log(2.0 * np.pi * variance) + squared / (2.0 * variance)
+    return np.asarray(np.log(2.0 * np.pi * variance) + squared / (2.0 * variance))

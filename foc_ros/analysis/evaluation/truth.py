@@ -21,7 +21,7 @@ TIMES_S = tuple(0.125 * step for step in range(1, 9))
 """Times ahead at which predicted positions are compared with the true ones [s]."""
 HORIZONS_S = (0.25, 0.5, 1.0)
 """Those of them that are reported."""
-HORIZONS = [TIMES_S.index(horizon) for horizon in HORIZONS_S]
+HORIZONS = np.array([TIMES_S.index(horizon) for horizon in HORIZONS_S])
 """Their indices."""
 RESOLUTION = 0.02
 """Travel is counted in steps of this share of the extent of the path, so that noise at rest adds none."""

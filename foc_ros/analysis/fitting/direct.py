@@ -219,7 +219,7 @@ def find_samples(hand: RecordedHand, config: Config) -> list[Sample]:
 
 def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the constants of the configured model of duration."""
-    samples = [found for hand in hands if (found := find_samples(hand, config))]
+    samples = [moving for hand in hands if (moving := find_samples(hand, config))]
     powers = CONSTANTS[config.duration.model]
     names, exponents = tuple(powers), np.array(list(powers.values()))
     if not samples:

@@ -54,7 +54,8 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> tup
     for recording in recordings:
         shares = [power_rule_shares(each, config.likelihood) for each in recording.observations]
         pairs = zip(recording.observations, shares, strict=True)
-        known = [found for pair in pairs if (found := compute_mean_densities(*pair, config, widenings)) is not None]
+        densities = [compute_mean_densities(*pair, config, widenings) for pair in pairs]
+        known = [each for each in densities if each is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(settings), np.nan))
     table = SettingTable(np.array(rows), settings)
     found, columns = table.estimate(given, 'density of true positions')
