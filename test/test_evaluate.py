@@ -25,8 +25,12 @@ GOAL = [(0.3, 0.0)]
 
 
 def write_three(folder: Path) -> Path:
-    """Write three reaches past one obstacle."""
-    return write_tables(folder, {name: reach(aside, GOAL[0]) for name, aside in ASIDE.items()}, GOAL, OBSTACLE)
+    """Write three reaches past one obstacle, the last one with a wrong label."""
+    write_tables(folder, {name: reach(aside, GOAL[0]) for name, aside in ASIDE.items()}, GOAL, OBSTACLE)
+    # low x is on neither side of a movement along x; by convention the left counts as high
+    labels = {'left': 1, 'right': 0, 'left too': 0}
+    (folder / 'labels.csv').write_text('recording,gap\n' + ''.join(f'{name},{gap}\n' for name, gap in labels.items()))
+    return folder
 
 
 @pytest.fixture
@@ -61,6 +65,7 @@ def test_reaches_past_an_obstacle_are_scored_by_class(whole: dict) -> None:
     assert sum(each['predictions'] for each in by_class['foc']['by_tenth']) == by_class['foc']['predictions']
     assert sum(each['count'] for each in by_class['foc']['reliability']) == by_class['foc']['predictions']
     assert whole['parameters']['foc.steps'] == 20
+    assert whole['labels_not_taken'] == {'left too': 'label 0, path 1'}
 
 
 def test_in_order_a_recording_is_evaluated_with_what_was_learnt_in_those_before(tables: Path, whole: dict) -> None:
@@ -168,9 +173,6 @@ def test_the_errors_of_all_tables_are_found_at_once(tables: Path, capsys: pytest
 def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_labels(
     tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # low x is on neither side of a movement along x; by convention the left counts as high
-    labels = {'left': 1, 'right': 0, 'left too': 0}
-    (tables / 'labels.csv').write_text('recording,gap\n' + ''.join(f'{name},{gap}\n' for name, gap in labels.items()))
     assert run(tables, '--report', str(tmp_path / 'report')) == 0
     out, err = capsys.readouterr()
     assert err == 'foc_ros evaluate: left too: the label differs from the recorded path: label 0, path 1\n'

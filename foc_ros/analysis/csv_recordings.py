@@ -15,7 +15,7 @@ import numpy as np
 
 from foc_ros.core.errors import FocError, RecordingError, collect, warn
 from foc_ros.core.types import NANOSECONDS, Array
-from foc_ros.io.bags import TYPESTORE, BagWriter
+from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.csv_tables import Column, Row, parse_rows, read_rows
 from foc_ros.ros.messages.encode_inputs import encode_boxes, encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -147,13 +147,6 @@ def _find_doubt(rows: Array) -> tuple[tuple[str, str], str]:
 def _find_nearest_unit(units: Mapping[str, float], value: float, usual: float) -> str:
     """Return the unit in which a value is nearest to a usual one, by their ratio."""
     return min(units, key=lambda each: abs(math.log(value * units[each] / usual)))
-
-
-def write_movement(bag: Path, movement: Movement, scene: RecordedScene) -> None:
-    """Write one bag with hand poses, obstacles and, where there are any, goals, in the order of their stamps."""
-    with BagWriter(bag) as writer:
-        for stamp_ns, topic, message in recorded_messages(movement, scene):
-            writer.write(topic, message, stamp_ns)
 
 
 def recorded_messages(movement: Movement, scene: RecordedScene) -> Iterator[tuple[int, str, Any]]:

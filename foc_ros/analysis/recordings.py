@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import ClassVar
 
 from foc_ros.core.errors import FocError, InputError, RecordingError, collect, collect_all, join_errors
-from foc_ros.io.bags import BagReader, Item, check_bag, is_bag_file
+from foc_ros.io.bags import BagReader, BagWriter, Item, check_bag, is_bag_file
 from foc_ros.io.terminal import show_progress
 
-from .csv_recordings import Movement, read_movements, recorded_messages, warn_of_far_scenes, write_movement
+from .csv_recordings import Movement, read_movements, recorded_messages, warn_of_far_scenes
 from .scenes import FindScene, RecordedScene, read_box_scenes, read_scenes
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
@@ -153,7 +153,9 @@ def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, outp
         if bag.exists():
             raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
     for bag, movement in show_progress(bags.items(), 'convert', len(bags)):
-        write_movement(bag, movement, found[movement.name].scene)
+        with BagWriter(bag) as writer:
+            for stamp_ns, topic, message in recorded_messages(movement, found[movement.name].scene):
+                writer.write(topic, message, stamp_ns)
     hands = sum(len(each.stamps_ns) for each in movements)
     scenes = [(each, found[each.name].scene) for each in movements]
     numbers = [len(scene.find_boxes(each.positions) or scene.obstacles) for each, scene in scenes]

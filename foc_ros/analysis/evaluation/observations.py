@@ -173,10 +173,8 @@ def observe_all(
 
     in_order: the recordings of an operator follow one another, with what is learnt from one to the next.
     """
-    if not in_order:
-        return collect(partial(observe, config=config), list(recordings.items()), 'replay')
-    operators = list(group_by_operator(recordings).items())
-    parts, failed = collect(partial(observe_in_order, config=config), operators, 'replay')
+    groups = group_by_operator(recordings) if in_order else {name: [each] for name, each in recordings.items()}
+    parts, failed = collect(partial(observe_in_order, config=config), list(groups.items()), 'replay')
     failed |= {name: reason for _, reasons in parts for name, reason in reasons.items()}
     return [each for observed, _ in parts for each in observed], failed
 
