@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.gaps import find_open_gaps
 from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
-from foc_ros.analysis.evaluation.truth import TIMES_S, GroundTruth, RecordedPath
+from foc_ros.analysis.evaluation.truth import TIMES_S, GroundTruth, RecordedPath, find_open_gaps
 from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles

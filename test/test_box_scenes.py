@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.evaluation.labels import find_label_mismatches
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.other_goal import leave_goals_out
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask_all
+from foc_ros.analysis.evaluation.report import find_label_mismatches
 from foc_ros.analysis.recordings import TableRecording, find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config

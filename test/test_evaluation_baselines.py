@@ -22,9 +22,9 @@ from foc_ros.analysis.evaluation.baselines import (
     make_baselines,
     power_rule_shares,
 )
+from foc_ros.analysis.evaluation.positions import SINGER_SETTINGS, _discretise, forecast_singer
 from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask, ask_main
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
-from foc_ros.analysis.evaluation.singer import SINGER_SETTINGS, _discretise, forecast_singer
 from foc_ros.analysis.evaluation.truth import HORIZONS_S
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT

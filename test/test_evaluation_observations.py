@@ -13,7 +13,6 @@ from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.csv_recordings import EPOCH_NS
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
-from foc_ros.analysis.evaluation.gaps import find_open_gaps
 from foc_ros.analysis.evaluation.observations import (
     ObservedRecording,
     interpolate_path,
@@ -22,7 +21,7 @@ from foc_ros.analysis.evaluation.observations import (
     observe_in_order,
 )
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
-from foc_ros.analysis.evaluation.truth import TIMES_S, RecordedPath, find_rows_ahead
+from foc_ros.analysis.evaluation.truth import TIMES_S, RecordedPath, find_open_gaps, find_rows_ahead
 from foc_ros.analysis.recordings import BagRecording, convert_tables, find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core import tracks

@@ -18,8 +18,8 @@ from foc_ros.analysis.evaluation.truth import TIMES_S
 from foc_ros.analysis.fitting import Findings, race
 from foc_ros.analysis.fitting.direct import fit_duration, fit_other_models
 from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage, find_worse_positions, make_verdict
+from foc_ros.analysis.fitting.one_replay import compute_mean_densities, fit_widening, widen_covariances
 from foc_ros.analysis.fitting.race import DURATIONS, Replays, make_eta_settings, make_movement_settings
-from foc_ros.analysis.fitting.widening import compute_mean_densities, fit_widening, widen_covariances
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values

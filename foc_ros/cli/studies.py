@@ -121,7 +121,7 @@ def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = F
     study.check(EVALUATION_PAGE)
     recordings = find_recordings(data)
     write_report = study.load_report('evaluation_report')
-    from foc_ros.analysis.evaluation import labels, observations, other_goal, report
+    from foc_ros.analysis.evaluation import observations, other_goal, report
 
     with study.open_workers():
         observed, failed = observations.observe_all(recordings, study.params, in_order)
@@ -137,7 +137,7 @@ def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = F
                 warn_all('evaluate', ['no recording has several goals of which one could be left out'])
             else:
                 answer['verdict'].append(other_goal.describe_scores(answer['other_goal']))
-    mismatches = labels.find_label_mismatches(data, observed)
+    mismatches = report.find_label_mismatches(data, observed)
     differ = 'the label differs from the recorded path'
     warn_all('evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
     answer |= {'failed': failed, 'labels_not_taken': mismatches}

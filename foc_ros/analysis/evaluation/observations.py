@@ -36,8 +36,7 @@ from foc_ros.core.types import (
     Solution,
 )
 
-from .gaps import Sides, find_open_gaps
-from .truth import TIMES_S, Bools, GroundTruth, RecordedPath, find_ground_truth
+from .truth import TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
 
 
 @dataclass(frozen=True, eq=False)

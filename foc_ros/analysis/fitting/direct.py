@@ -35,8 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from foc_ros.analysis.evaluation.gaps import find_open_gaps
-from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedPath
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedPath, find_open_gaps
 from foc_ros.analysis.intervals import CENTRAL, resample
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay

@@ -27,9 +27,8 @@ from foc_ros.core.errors import RecordingError
 
 from . import Findings, clip_to_bounds, is_cross_validated
 from .direct import RecordedHand, fit_duration, fit_estimator, fit_fading, fit_max_candidates, fit_wait, read_hand
-from .likelihood import fit_likelihood
+from .one_replay import COVERAGE_LEVEL, NO_WIDENING, fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
-from .widening import COVERAGE_LEVEL, NO_WIDENING, fit_widening
 
 PREDICTIONS = 10
 """About as many predictions are made in each recording, because neighbours say the same."""

@@ -33,8 +33,7 @@ from foc_ros.core.types import Array
 
 from . import Estimate, Findings, clip_to_bounds
 from .direct import CONSTANTS, RecordedHand, fit_other_models
-from .likelihood import RULES
-from .widening import FEW_WIDENINGS, NO_WIDENING, compute_mean_densities
+from .one_replay import FEW_WIDENINGS, NO_WIDENING, RULES, compute_mean_densities
 
 NOISES, DURATIONS = (0.06, 0.25, 2.0), (0.7, 1.4, 2.0)
 """Factors tried beside 1."""
