@@ -98,7 +98,7 @@ class Recorded:
 
 
 def test_a_recording_is_pictured_with_its_prediction_and_one_that_cannot_be_read_is_passed_over() -> None:
-    config = Config().with_values({'foc.steps': 20, 'homotopy.max_candidates': 2})
+    config = Config()
     html = render_example({'broken': Recorded(is_broken=True), 'whole': Recorded()}, config)
     assert html.count('<img') == 1 and 'whole, 0.' in html and 'after the hand began to move' in html
     assert render_example({'broken': Recorded(is_broken=True)}, config) == ''

@@ -42,10 +42,7 @@ WORSE_COVERAGE = 0.01
 """Fall of the share of true positions in the region of 90 % that is told."""
 SMALLER_IS_BETTER = ('error_m', 'nlpd')
 """Measures that begin with one of these are better if they are smaller."""
-PARAMETER_COLUMNS = ('parameter', 'given', 'fitted', '95 %', 'data')
-SCORE_COLUMNS = ('score', 'setting', 'value')
 CHANGES = ('better', 'worse')
-COMPARISON_COLUMNS = ('with the same recordings', 'before', 'after', '')
 COMPARISON_TITLES = {
     'class_gain': ('log-likelihood of the answer taken, above uniform [nat]', 1.0, 3),
     'gap_right': ('next gap correct [%]', 100.0, 1),
@@ -276,7 +273,7 @@ def make_verdict(answer: Mapping[str, Any]) -> list[str]:
     return judged or ['The fitted parameters change no measure.']
 
 
-def format_scores(answer: Mapping[str, Any]) -> Rows:
+def _format_scores(answer: Mapping[str, Any]) -> Rows:
     """Return the rows of the scores in an answer of `fit --json`."""
     return [
         (SCORE_TITLES[score], setting, '-' if value is None else f'{value:.3f}')
@@ -285,11 +282,11 @@ def format_scores(answer: Mapping[str, Any]) -> Rows:
     ]
 
 
-def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[None, tuple[str, ...], Rows]]:
-    """Yield the tables of an answer of `fit --json`."""
-    yield None, PARAMETER_COLUMNS, format_parameters(answer)
-    yield None, SCORE_COLUMNS, format_scores(answer)
-    yield None, COMPARISON_COLUMNS, format_comparison(answer)
+def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], Rows]]:
+    """Yield title, columns and rows of the tables of an answer of `fit --json`."""
+    yield 'Before and after', ('with the same recordings', 'before', 'after', ''), format_comparison(answer)
+    yield 'Parameters', ('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer)
+    yield 'Scores', ('score', 'setting', 'value'), _format_scores(answer)
 
 
 def make_sentences(answer: Mapping[str, Any]) -> list[str]:
