@@ -97,6 +97,7 @@ def test_the_ground_truth_is_that_of_the_path(data: Path) -> None:
     progress = [each.truth.progress for each in recording.observations]
     assert progress[0] == 0.0 and progress == sorted(progress) and progress[-1] > 0.5
     assert not last.truth.is_ahead[0] and np.isnan(last.truth.positions[-1]).all()
+    assert 0.0 <= last.truth.left_s < 0.3 and first.truth.left_s == pytest.approx(1.2, abs=0.1)
 
 
 def test_no_goal_is_true_for_predictions_with_other_goals(data: Path) -> None:

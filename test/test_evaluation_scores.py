@@ -204,6 +204,9 @@ def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is
     flat = np.log(2 * np.pi)
     assert scores['nlpd']['foc'] == {'0.25': pytest.approx(flat + 2.0), '0.5': pytest.approx(flat + 8.0), '1': None}
     assert scores['nlpd']['Singer Kalman']['0.5'] > 0.0
+    ended = observation(TWO_CLASSES, positions=np.full((H, 2), np.nan))
+    both = compute_position_scores([recorded(observation(TWO_CLASSES, positions=away), ended)])
+    assert str(both['displacement_m']) == str(scores['displacement_m']), 'a movement that has ended does not count'
 
 
 def test_the_region_of_one_gaussian_is_its_ellipse() -> None:

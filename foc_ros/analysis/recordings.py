@@ -93,7 +93,7 @@ def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recordin
 
 
 def read_tables(data: Path) -> dict[str, TableRecording]:
-    """Return the recordings of a folder of tables by name; raises RecordingError, see :func:`_combine`."""
+    """Return the recordings of a folder of tables by name; raises RecordingError, see :func:`_read_with_scenes`."""
 
     def read() -> FindScene:
         trials, obstacles = data / TRIALS, data / OBSTACLES
@@ -101,10 +101,10 @@ def read_tables(data: Path) -> dict[str, TableRecording]:
             return read_box_scenes(data / SCENES, trials if trials.exists() else None)
         return read_scenes(obstacles if obstacles.exists() else None, data / GOALS)
 
-    return _combine(data / RECORDINGS, read, data)
+    return _read_with_scenes(data / RECORDINGS, read, data)
 
 
-def _combine(file: Path, read: Callable[[], FindScene], data: Path) -> dict[str, TableRecording]:
+def _read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> dict[str, TableRecording]:
     """Return the recordings of a table with their scenes; data: what a warning names.
 
     Raises one RecordingError for the errors of all tables if a table has no scenes or no recording that can be used.
@@ -146,7 +146,7 @@ def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, outp
     """
     if obstacles is None and not table.is_dir():
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
-    found = read_tables(table) if obstacles is None else _combine(table, partial(read_scenes, obstacles, goals), table)
+    found = read_tables(table) if obstacles is None else _read_with_scenes(table, partial(read_scenes, obstacles, goals), table)
     movements = collect_all(TableRecording.read_movement, [(each,) for each in found.values()])
     bags = {output / name: movement for name, movement in _name_bags(movements).items()}
     for bag in bags:
