@@ -30,8 +30,8 @@ def find_widest(printed: str) -> int:
     [
         ['solve', 'scene.yaml', '--monte-carlo', '100'],
         ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'), '--params', 'slow.yaml'],
-        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1', '--params', 'slow.yaml'],
-        ['evaluate', 'data', '--workers', '1', '--params', 'slow.yaml'],
+        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1'],
+        ['evaluate', 'data', '--workers', '1'],
     ],
     ids=lambda arguments: arguments[0],
 )
