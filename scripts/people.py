@@ -17,8 +17,11 @@ from pathlib import Path
 from page import ROOT, SHARED, format_table, write_blocks
 
 from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, published_shares
-from foc_ros.analysis.evaluation.observations import HORIZONS_S, PATH_CLASS, ObservedRecording, ask_all, observe_in_order
-from foc_ros.analysis.evaluation.scores import compute_position_scores, score_forecasts, summarise
+from foc_ros.analysis.evaluation.observations import ObservedRecording, observe_in_order
+from foc_ros.analysis.evaluation.positions import compute_position_scores
+from foc_ros.analysis.evaluation.questions import PATH_CLASS, ask_all
+from foc_ros.analysis.evaluation.scores import score_forecasts, summarise
+from foc_ros.analysis.evaluation.truth import HORIZONS_S
 from foc_ros.analysis.parallel import collect_all, open_workers
 from foc_ros.analysis.recordings import Recording, find_recordings, group_by_operator
 from foc_ros.core.config import Config
@@ -62,9 +65,7 @@ def format_ways(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
     """Return gain, share correct, calibration error and the worst tenth of the forecasts of the ways."""
     asked = [(n, each, question) for n, seen in enumerate(recordings) for each, question in ask_all(seen, PATH_CLASS)]
     found = summarise(
-        score_forecasts(
-            (n, each.truth.progress, question, PUBLISHED.forecast(each, question, None)) for n, each, question in asked
-        )
+        score_forecasts((n, each, question, PUBLISHED.forecast(each, question, None)) for n, each, question in asked)
     )
     worst = min(each['gain'] for each in found['by_tenth'] if each['gain'] is not None)
     values = found['gain'], 100 * found['right'], found['expected_calibration_error'], worst

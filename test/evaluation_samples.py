@@ -8,15 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.observations import (
-    TIMES_S,
-    CandidateTable,
-    GroundTruth,
-    Observation,
-    ObservedRecording,
-    RecordedPath,
-    find_open_gaps,
-)
+from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
+from foc_ros.analysis.evaluation.truth import TIMES_S, GroundTruth, RecordedPath, find_open_gaps
 from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.types import LEFT, RIGHT, make_obstacles
@@ -71,6 +64,7 @@ def observation(
         positions=np.zeros((H, 2)) if positions is None else np.array(positions, dtype=float),
         progress=progress,
         approach=approach,
+        left_s=0.5,
     )
     return Observation(
         stamp_ns=0,

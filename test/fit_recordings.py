@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import evaluation_samples
 import numpy as np
 
 from foc_ros.analysis.fitting.direct import RecordedHand
@@ -27,21 +28,14 @@ def reach(goal: np.ndarray, bow: float, duration_s: float, hz: float, rng: np.ra
 
 def write_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float = 50.0, noise: float = 5e-4) -> Path:
     """Write recordings past one obstacle, left and right in turn; or to three goals in turn, without any."""
-    rng = np.random.default_rng(7)
-    folder.mkdir(parents=True, exist_ok=True)
-    lines = ['recording,t_s,x_m,y_m']
+    rng, reaches = np.random.default_rng(7), {}
     for number in range(count):
         goal = GOALS[1] if obstacle else GOALS[number % 3]
         bow = (0.06 if number % 2 else -0.06) if obstacle else 0.01 * rng.standard_normal()
         rows = reach(goal, bow, 1.2 + 0.1 * rng.standard_normal(), hz, rng, noise)
-        lines += [f'r{number},{t:.4f},{x:.6f},{y:.6f}' for t, x, y in rows]
-    (folder / 'recordings.csv').write_text('\n'.join(lines) + '\n')
-    used = GOALS[1:2] if obstacle else GOALS
-    (folder / 'goals.csv').write_text('x_m,y_m\n' + ''.join(f'{x},{y}\n' for x, y in used))
-    if obstacle:
-        x, y, radius = OBSTACLE
-        (folder / 'obstacles.csv').write_text(f'x_m,y_m,radius_m\n{x},{y},{radius}\n')
-    return folder
+        reaches[f'r{number}'] = rows[:, 0], rows[:, 1:]
+    used, obstacles = (GOALS[1:2], [OBSTACLE]) if obstacle else (GOALS, None)
+    return evaluation_samples.write_tables(folder, reaches, used, obstacles)
 
 
 def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> RecordedHand:

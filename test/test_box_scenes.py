@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ObservedRecording, ask_all, observe
+from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.other_goal import leave_goals_out
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask_all
 from foc_ros.analysis.evaluation.report import find_label_mismatches
 from foc_ros.analysis.recordings import TableRecording, find_recordings
 from foc_ros.cli.main import main
@@ -169,7 +170,8 @@ def test_every_recording_of_the_data_set_is_read() -> None:
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/hlp_reaching is not there')
 def test_the_sides_told_of_reaches_are_those_of_their_paths() -> None:
-    config = Config().with_values({'scene.hand_radius': 0.0125, 'rate_hz': 2.0})
+    quick = {'rate_hz': 1.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0}
+    config = Config().with_values({'scene.hand_radius': 0.0125, **quick})
     observed = [observe(each, config) for each in [*find_recordings(SHARED).values()][::20]]
     assert find_label_mismatches(SHARED, observed) == {}
     assert all(question.is_possible[question.truth] for each in observed for _, question in ask_all(each, GAP))

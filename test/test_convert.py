@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -216,18 +217,24 @@ def write_folder(folder: Path, separator: str = ',', comma: bool = False, second
         ({'metres': 1e3}, 'the position of recording a seems to be in mm: the hand moves at 576 m/s'),
         ({'metres': 1e2}, 'the position of recording a seems to be in cm: the hand moves at 57.6 m/s'),
         ({}, ''),
+        # beyond a bound, the doubt is told before it
+        ({'seconds': 1e6}, 't_s of recording a seems to be in us: the median time between two poses is 2e+04 s'),
+        ({'seconds': 1e9}, 't_s of recording a seems to be in ns: the median time between two poses is 2e+07 s'),
+        ({'metres': 1e6}, 'the position of recording a seems to be in um: the hand moves at 5.76e+05 m/s'),
     ],
 )
 def test_units_that_cannot_be_right_are_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], units: dict[str, float], words: str
 ) -> None:
     folder = write_folder(tmp_path / 'tables', **units)
-    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
-    table_words = f'foc_ros convert: {folder / "recordings.csv"}: {words}\n' if words else ''
-    assert capsys.readouterr().err == table_words
-    single = ['convert', str(folder / 'recordings.csv'), '--obstacles', str(folder / 'obstacles.csv')]
-    assert main([*single, '--output', str(tmp_path / 'others')]) == 0
-    assert capsys.readouterr().err == table_words
+    is_within_bounds = max(units.values(), default=1.0) <= 1e3
+    single = [str(folder / 'recordings.csv'), '--obstacles', str(folder / 'obstacles.csv')]
+    for number, arguments in enumerate(([str(folder)], single)):
+        code = main(['convert', *arguments, '--output', str(tmp_path / f'bags{number}')])
+        told, *bounds = capsys.readouterr().err.splitlines() or ['']
+        assert told == (f'foc_ros convert: {folder / "recordings.csv"}: {words}' if words else '')
+        assert (code, bool(bounds)) == ((0, False) if is_within_bounds else (2, True))
+        assert all('expected a number in [' in each for each in bounds)
 
 
 @pytest.mark.parametrize(('factor', 'unit', 'far_m'), [(1e3, 'mm', 320), (1e2, 'cm', 31.7)])
@@ -254,33 +261,10 @@ def test_a_scene_beyond_the_reach_of_its_recording_is_no_doubt(tmp_path: Path, c
     assert not capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ('units', 'words'),
-    [
-        ({'seconds': 1e6}, 't_s of recording a seems to be in us: the median time between two poses is 2e+04 s'),
-        ({'seconds': 1e9}, 't_s of recording a seems to be in ns: the median time between two poses is 2e+07 s'),
-        ({'metres': 1e6}, 'the position of recording a seems to be in um: the hand moves at 5.76e+05 m/s'),
-    ],
-)
-def test_units_that_exceed_a_bound_are_named_before_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], units: dict[str, float], words: str
-) -> None:
-    assert main(['convert', str(write_folder(tmp_path / 'tables', **units)), '--output', str(tmp_path / 'bags')]) == 2
-    first, *others = capsys.readouterr().err.splitlines()
-    assert first.endswith(words) and others and all('expected a number in [' in each for each in others)
-
-
 def test_times_that_repeat_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = '\n'.join(f'a,{0.02 * (i // 2):.2f},{0.001 * i},0' for i in range(20))
     assert convert(tmp_path, recordings=f'recording,t_s,x_m,y_m\n{rows}\n') == 0
     assert 't_s of recording a repeats: 10 of 19 rows have the time of the row before' in capsys.readouterr().err
-
-
-def test_a_header_may_follow_empty_lines_and_the_name_of_the_separator(tmp_path: Path) -> None:
-    folder = write_folder(tmp_path / 'tables', ';', True)
-    for file in folder.iterdir():
-        file.write_text('sep=;\n\n' + file.read_text())
-    assert len(next(iter(read_tables(folder).values())).read_movement().stamps_ns) == 50
 
 
 @pytest.mark.parametrize(
@@ -293,17 +277,25 @@ def test_a_number_of_another_country_or_language_is_named(
     assert re.search(f'row 2, column x_m: expected {words}', capsys.readouterr().err)
 
 
-@pytest.mark.parametrize(('separator', 'comma'), [('|', False), (' ', False), (';', True), ('\t', True)])
-def test_other_separators_and_decimal_commas_are_read(tmp_path: Path, separator: str, comma: bool) -> None:
+@pytest.mark.parametrize(
+    ('separator', 'comma', 'change'),
+    [
+        ('|', False, str),
+        (' ', False, str),
+        (';', True, str),
+        ('\t', True, str),
+        pytest.param(';', True, lambda text: 'sep=;\n\n' + text, id='the name of the separator and an empty line'),
+        pytest.param(',', False, lambda text: text.replace('\n', ',,\n'), id='empty columns of a spreadsheet'),
+    ],
+)
+def test_other_separators_and_decimal_commas_are_read(
+    tmp_path: Path, separator: str, comma: bool, change: Callable[[str], str]
+) -> None:
     usual = read_tables(write_folder(tmp_path / 'usual'))['a'].read_movement()
-    (found,) = read_tables(write_folder(tmp_path / 'other', separator, comma)).values()
+    folder = write_folder(tmp_path / 'other', separator, comma)
+    for file in folder.iterdir():
+        file.write_text(change(file.read_text()))
+    (found,) = read_tables(folder).values()
     movement = found.read_movement()
     assert movement.name == ('a, b' if comma else 'a')
     assert movement.stamps_ns == usual.stamps_ns and np.array_equal(movement.positions, usual.positions)
-
-
-def test_empty_columns_of_a_spreadsheet_are_not_read(tmp_path: Path) -> None:
-    folder = write_folder(tmp_path / 'tables')
-    for file in folder.iterdir():
-        file.write_text(file.read_text().replace('\n', ',,\n'))
-    assert len(read_tables(folder)['a'].read_movement().stamps_ns) == 50

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 from pathlib import Path
 
@@ -22,45 +24,58 @@ OBSTACLE = [(0.15, 0.0, 0.03)]
 GOAL = [(0.3, 0.0)]
 
 
+def write_three(folder: Path) -> Path:
+    """Write three reaches past one obstacle, the last one with a wrong label."""
+    write_tables(folder, {name: reach(aside, GOAL[0]) for name, aside in ASIDE.items()}, GOAL, OBSTACLE)
+    # low x is on neither side of a movement along x; by convention the left counts as high
+    labels = {'left': 1, 'right': 0, 'left too': 0}
+    (folder / 'labels.csv').write_text('recording,gap\n' + ''.join(f'{name},{gap}\n' for name, gap in labels.items()))
+    return folder
+
+
 @pytest.fixture
 def tables(tmp_path: Path) -> Path:
-    """Write three reaches past one obstacle."""
-    return write_tables(tmp_path / 'data', {name: reach(aside, GOAL[0]) for name, aside in ASIDE.items()}, GOAL, OBSTACLE)
+    return write_three(tmp_path / 'data')
 
 
-def run(data: Path, *options: str, workers: str = '1') -> int:
-    chosen = [workers] if workers.startswith('--') else ['--workers', workers]
-    return main(['evaluate', str(data), '--params', str(data / 'parameters.yaml'), *chosen, *options])
+def run(data: Path, *options: str, workers: str = '--workers=1') -> int:
+    return main(['evaluate', str(data), '--params', str(data / 'parameters.yaml'), workers, *options])
 
 
-def answer(data: Path, capsys: pytest.CaptureFixture[str], *options: str, code: int = 0, workers: str = '1') -> dict:
-    assert run(data, '--json', *options, workers=workers) == code
-    return json.loads(capsys.readouterr().out)
+def evaluate(data: Path, *options: str, code: int = 0, workers: str = '--workers=1') -> dict:
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        assert run(data, '--json', *options, workers=workers) == code
+    return json.loads(output.getvalue())
 
 
-def test_reaches_past_an_obstacle_are_scored_by_class(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = answer(tables, capsys)
-    assert found['recordings'] == 3 and found['failed'] == {} and found['predictions'] >= 12
-    assert set(found['questions']) == {'way', 'gap'}
-    by_class = found['questions']['way']
+@pytest.fixture(scope='module')
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict:
+    """Return the answer about the three reaches."""
+    return evaluate(write_three(tmp_path_factory.mktemp('whole') / 'data'))
+
+
+def test_reaches_past_an_obstacle_are_scored_by_class(whole: dict) -> None:
+    assert whole['recordings'] == 3 and whole['failed'] == {} and whole['predictions'] >= 12
+    assert set(whole['questions']) == {'way', 'gap'}
+    by_class = whole['questions']['way']
     assert by_class['uniform']['gain'] == 0.0 and by_class['uniform']['log_likelihood'] == pytest.approx(np.log(0.5))
     # a bent reach shows early on which side it will pass
     assert by_class['foc']['gain'] > 0.1 and by_class['constant velocity']['gain'] > 0.0
     assert sum(each['predictions'] for each in by_class['foc']['by_tenth']) == by_class['foc']['predictions']
     assert sum(each['count'] for each in by_class['foc']['reliability']) == by_class['foc']['predictions']
-    assert found['parameters']['foc.steps'] == 20
+    assert whole['parameters']['foc.steps'] == 20
+    assert whole['labels_not_taken'] == {'left too': 'label 0, path 1'}
 
 
-def test_in_order_a_recording_is_evaluated_with_what_was_learnt_in_those_before(
-    tables: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    apart, learnt = answer(tables, capsys), answer(tables, capsys, '--in-order')
-    assert learnt['recordings'] == apart['recordings'] and learnt == answer(tables, capsys, '--in-order')
-    assert learnt['questions']['way']['foc'] != apart['questions']['way']['foc']
-    assert learnt['questions']['way']['uniform'] == apart['questions']['way']['uniform']
-    (tables / 'recordings.csv').write_text((tables / 'recordings.csv').read_text() + 'short,0.0,nan,0.0\n')
-    failed = answer(tables, capsys, '--in-order', code=2)
-    assert list(failed['failed']) == ['short'] and failed['recordings'] == 3
+def test_in_order_a_recording_is_evaluated_with_what_was_learnt_in_those_before(tables: Path, whole: dict) -> None:
+    with (tables / 'recordings.csv').open('a') as file:
+        file.write('short,0.0,nan,0.0\n')
+    learnt = evaluate(tables, '--in-order', code=2)
+    assert list(learnt['failed']) == ['short'] and learnt['recordings'] == whole['recordings']
+    assert learnt == evaluate(tables, '--in-order', code=2)
+    assert learnt['questions']['way']['foc'] != whole['questions']['way']['foc']
+    assert learnt['questions']['way']['uniform'] == whole['questions']['way']['uniform']
 
 
 def forecast_first(observation: Observation, question: Question, confidence: float) -> Forecast:
@@ -68,9 +83,7 @@ def forecast_first(observation: Observation, question: Question, confidence: flo
     return Forecast.from_answer(question.answers[question.given[0]], confidence, question)
 
 
-def test_a_baseline_from_outside_is_compared(
-    tables: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_baseline_from_outside_is_compared(tables: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     extended = Registry('baseline', {})
     for name in BASELINES:
         extended.register(name, BASELINES.get(name))
@@ -78,56 +91,48 @@ def test_a_baseline_from_outside_is_compared(
     register_baseline('first answer', forecast_first, [0.0, 0.5])
     with pytest.raises(InputError, match='baseline: expected a new name besides foc, foc, held out'):
         register_baseline('uniform', forecast_first)
-    found = answer(tables, capsys)
+    found = evaluate(tables)
     assert list(found['questions']['way'])[-2:] == ['straight minimum jerk', 'first answer']
     scores = found['questions']['way']['first answer']
     assert scores['predictions'] == found['questions']['way']['foc']['predictions'] and scores['log_likelihood'] < 0.0
     assert found['settings']['way']['first answer'] in (0.0, 0.5)
 
 
-def test_reaches_without_obstacles_are_scored_by_goal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reaches_without_obstacles_are_scored_by_goal(tmp_path: Path) -> None:
     goals = [(0.3, 0.0), (0.0, 0.3), (-0.3, 0.0)]
     data = write_tables(tmp_path / 'free', {f'to{i}': reach(0.0, goal) for i, goal in enumerate(goals)}, goals)
-    found = answer(data, capsys)
+    found = evaluate(data)
     assert set(found['questions']) == {'goal'}
     goal = found['questions']['goal']['foc']
     assert goal['uniform'] == pytest.approx(-np.log(3.0))
     assert goal['by_tenth'][9]['right'] == 1.0 and goal['gain'] > 0.2
 
 
-def test_workers_do_not_matter_nor_whether_they_are_those_of_a_cluster(
-    tables: Path, capsys: pytest.CaptureFixture[str], cluster_address: str
-) -> None:
-    alone = answer(tables, capsys)
-    assert answer(tables, capsys, workers='2') == alone
-    assert answer(tables, capsys, workers=f'--scheduler={cluster_address}') == alone
+def test_workers_do_not_matter_nor_whether_they_are_those_of_a_cluster(tables: Path, whole: dict, cluster_address: str) -> None:
+    assert evaluate(tables, workers='--workers=2') == whole
+    assert evaluate(tables, workers=f'--scheduler={cluster_address}') == whole
 
 
-def test_bags_are_scored_as_their_tables(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bags_are_scored_as_their_tables(tables: Path, tmp_path: Path, whole: dict) -> None:
     bags = tmp_path / 'bags'
-    csv = [str(tables / name) for name in ('recordings.csv', 'obstacles.csv', 'goals.csv')]
-    assert main(['convert', csv[0], '--obstacles', csv[1], '--goals', csv[2], '--output', str(bags)]) == 0
-    capsys.readouterr()
+    assert main(['convert', str(tables), '--output', str(bags)]) == 0
     (bags / 'parameters.yaml').write_text((tables / 'parameters.yaml').read_text())
-    whole = answer(bags, capsys)
-    expected = answer(tables, capsys)
+    found = evaluate(bags)
     # bags are sorted by name, the recordings of a table are not
-    for question, by_predictor in expected['questions'].items():
+    for question, by_predictor in whole['questions'].items():
         for predictor, scores in by_predictor.items():
-            assert whole['questions'][question][predictor]['log_likelihood'] == pytest.approx(scores['log_likelihood'])
+            assert found['questions'][question][predictor]['log_likelihood'] == pytest.approx(scores['log_likelihood'])
     assert main(['evaluate', str(bags / 'left'), '--workers', '1', '--params', str(bags / 'parameters.yaml')]) == 0
 
 
 def test_a_bad_recording_fails_by_name_and_the_others_are_scored(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with (tables / 'recordings.csv').open('a') as file:
         file.write('broken,0.0,0.0,0.0\nbroken,0.1,nan,0.0\nbackward,1.0,0.0,0.0\nbackward,0.5,0.1,0.0\nshort,0.0,0.0,0.0\n')
-    assert run(tables, '--json') == 2
-    captured = capsys.readouterr()
-    found = json.loads(captured.out)
+    found = evaluate(tables, code=2)
     assert found['recordings'] == 3 or 'short' not in found['failed']
     assert {'broken', 'backward'} <= set(found['failed'])
     assert 'column x_m' in found['failed']['broken'] and 'column t_s' in found['failed']['backward']
-    assert 'foc_ros evaluate: broken: ' in captured.err
+    assert 'foc_ros evaluate: broken: ' in capsys.readouterr().err
 
 
 def test_the_exit_code_is_3_where_nothing_can_be_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -165,31 +170,22 @@ def test_the_errors_of_all_tables_are_found_at_once(tables: Path, capsys: pytest
     assert [line.partition('.csv: ')[0].rpartition('/')[2] for line in lines] == ['obstacles', 'goals', 'recordings']
 
 
-def test_a_label_of_another_class_is_reported(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # low x is on neither side of a movement along x; by convention the left counts as high
-    labels = {'left': 1, 'right': 0, 'left too': 0}
-    (tables / 'labels.csv').write_text('recording,gap\n' + ''.join(f'{name},{gap}\n' for name, gap in labels.items()))
-    found = answer(tables, capsys)
-    assert found['labels_not_taken'] == {'left too': 'label 0, path 1'}
-
-
-def test_the_report_is_one_page(tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_labels(
+    tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run(tables, '--report', str(tmp_path / 'report')) == 0
+    out, err = capsys.readouterr()
+    assert err == 'foc_ros evaluate: left too: the label differs from the recorded path: label 0, path 1\n'
     page = (tmp_path / 'report' / 'evaluation.html').read_text('utf-8')
     assert page.count('<img') == 5 and 'constant velocity' in page  # one of them is a recording with its prediction
-    out = capsys.readouterr().out
     assert out.endswith(f'\nreport: file://{tmp_path}/report/evaluation.html\n')
     assert 'log-likelihood above uniform [nat]' in out and 'foc, held out' in out
+    lines = out.splitlines()
+    assert max(map(len, lines[:-1])) <= 80
+    assert any(line.startswith('Homotopy classes: foc is better than uniform (+') for line in lines)
+    assert any(line.startswith('Positions 0.5 s ahead: ') for line in lines)
 
 
 def test_a_report_that_cannot_be_written_is_refused_before_the_work(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(tables, '--report', str(tables / 'goals.csv')) == 2
     assert '--report: expected a folder' in capsys.readouterr().err
-
-
-def test_tables_and_verdict_fit_into_80_columns(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(tables) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 80
-    assert any(line.startswith('Homotopy classes: foc is better than uniform (+') for line in lines)
-    assert any(line.startswith('Positions 0.5 s ahead: ') for line in lines)

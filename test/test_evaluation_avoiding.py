@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from homotopy_scenes import AVOIDING
 
-from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles, observe
+from foc_ros.analysis.evaluation.observations import observe
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.evaluation.report import find_gaps, find_label_mismatches
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core.config import replace_values

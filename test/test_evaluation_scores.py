@@ -11,19 +11,20 @@ import pytest
 from evaluation_samples import TWO_CLASSES, H, make_candidates, observation, recorded
 
 from foc_ros.analysis.evaluation.baselines import UNCERTAINTY, Forecast, power_rule_shares, published_shares
-from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, TIMES_S, ask, find_relevant_obstacles
-from foc_ros.analysis.evaluation.report import compare_scores, make_verdict
+from foc_ros.analysis.evaluation.positions import compute_position_scores, find_denser_share
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
+from foc_ros.analysis.evaluation.report import make_verdict
 from foc_ros.analysis.evaluation.scores import (
     Scores,
     choose_held_out,
-    compute_position_scores,
+    compare_scores,
     compute_reliability,
-    find_denser_share,
     find_final_leads,
     find_tenths,
     score_forecasts,
     summarise,
 )
+from foc_ros.analysis.evaluation.truth import TIMES_S
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.types import LEFT, RIGHT
 
@@ -71,19 +72,19 @@ def ask_class(observed):
     return ask(PATH_CLASS, observed, frozenset('012'))
 
 
-def test_every_possible_answer_keeps_some_probability() -> None:
+def test_every_possible_answer_keeps_some_probability_and_all_sum_to_one() -> None:
     observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]))
     forecast = Forecast.from_shares(published_shares(observed), ask_class(observed))
     np.testing.assert_allclose(forecast.probability, (1.0 - UNCERTAINTY) * np.array([0.8, 0.2]) + UNCERTAINTY / 2.0)
     np.testing.assert_allclose(Forecast.uniform(ask_class(observed)).probability, [0.5, 0.5])
     np.testing.assert_allclose(Forecast.from_answer((R,), 0.6, ask_class(observed)).probability, [0.2, 0.8])
-
-
-def test_a_true_answer_that_no_candidate_gives_has_only_the_rest() -> None:
-    observed = observation(make_candidates([[L, L, L], [R, L, R]]), **TWO_ROWS, true_sides=(L, L, R))
-    assert Forecast.from_shares(published_shares(observed), ask_class(observed)).true_probability(
-        ask_class(observed)
-    ) == pytest.approx(UNCERTAINTY / 6.0)
+    observed = observation(make_candidates([[L, R, L], [R, L, L]], likelihood=[0.3, 0.7]), **TWO_ROWS, true_sides=(R, R, R))
+    question = ask_class(observed)
+    by_shares = Forecast.from_shares(published_shares(observed), question)
+    # no candidate gives the true answer
+    assert by_shares.true_probability(question) == pytest.approx(UNCERTAINTY / 6.0)
+    for forecast in (by_shares, Forecast.uniform(question), Forecast.from_answer((R, L, L), 0.4, question)):
+        assert forecast.probability.sum() + question.unlisted * forecast.each_other == pytest.approx(1.0)
 
 
 def test_an_unsolved_candidate_counts_as_published() -> None:
@@ -94,37 +95,25 @@ def test_an_unsolved_candidate_counts_as_published() -> None:
     assert power_rule_shares(observed, LikelihoodConfig())[2] == 0.0
 
 
-def test_forecasts_sum_to_one() -> None:
-    observed = observation(make_candidates([[L, R, L], [R, L, L]], likelihood=[0.3, 0.7]), **TWO_ROWS, true_sides=(R, R, R))
-    for forecast in (
-        Forecast.from_shares(published_shares(observed), ask_class(observed)),
-        Forecast.uniform(ask_class(observed)),
-        Forecast.from_answer((R, L, L), 0.4, ask_class(observed)),
-    ):
-        assert forecast.probability.sum() + ask_class(observed).unlisted * forecast.each_other == pytest.approx(1.0)
-
-
-def make_scores(confidence, right, recording=None, progress=None) -> Scores:
-    m = len(confidence)
-    zeros = np.zeros(m)
-    recording = zeros.astype(int) if recording is None else np.array(recording)
-    progress = zeros if progress is None else np.array(progress)
-    return Scores(recording, progress, zeros + 2.0, zeros, np.array(confidence), np.array(right, dtype=float), zeros)
+def make_scores(confidence, right, recording=None, progress=None, left_s=None) -> Scores:
+    zeros = np.zeros(len(confidence))
+    recording, progress, left_s = (zeros if each is None else np.array(each) for each in (recording, progress, left_s))
+    right = np.array(right, dtype=float)
+    return Scores(recording.astype(int), progress, left_s, zeros + 2.0, zeros, np.array(confidence), right, zeros)
 
 
 def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness() -> None:
-    observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]))
-    p = (1.0 - UNCERTAINTY) * 0.8 + UNCERTAINTY / 2.0
-    found = score_forecasts(
-        [
-            (0, 0.5, ask_class(observed), Forecast.from_shares(published_shares(observed), ask_class(observed))),
-            (0, 0.6, ask_class(observed), Forecast.uniform(ask_class(observed))),
-        ]
-    )
+    observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]), progress=0.5, approach=0.6)
+    question, p = ask_class(observed), (1.0 - UNCERTAINTY) * 0.8 + UNCERTAINTY / 2.0
+    forecasts = Forecast.from_shares(published_shares(observed), question), Forecast.uniform(question)
+    found = score_forecasts((0, observed, question, each) for each in forecasts)
     np.testing.assert_allclose(found.log_likelihood, np.log([p, 0.5]))
     np.testing.assert_allclose(found.confidence, [p, 0.5])
     np.testing.assert_allclose(found.correct, [1.0, 0.5])
     np.testing.assert_allclose(found.brier, [2.0 * (1.0 - p) ** 2, 0.5])
+    assert found.progress.tolist() == found.left_s.tolist() == [0.5, 0.5]
+    gap = ask(GAP, observed, frozenset('0'))
+    assert score_forecasts([(0, observed, gap, Forecast.uniform(gap))]).progress.tolist() == [0.6]
 
 
 def test_the_calibration_error_is_the_distance_of_confidence_and_share_correct() -> None:
@@ -179,22 +168,19 @@ def test_the_verdict_is_by_the_interval(interval: list[float], words: str) -> No
     ]
 
 
-def test_tenths_include_their_lower_bound() -> None:
-    assert find_tenths(np.array([0.0, 0.1, 0.3, 0.7, 0.99, 1.0])).tolist() == [0, 1, 3, 7, 9, 9]
-
-
-def test_the_final_lead_begins_after_the_last_wrong_forecast() -> None:
-    found = make_scores([0.5] * 6, [1, 0, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1], [0.1, 0.4, 0.6, 0.2, 0.5, 0.9])
-    assert find_final_leads(found) == {0: 2, 1: None}
-
-
-def test_a_summary_counts_by_tenths() -> None:
-    found = summarise(make_scores([0.5] * 4, [1, 0, 1, 1], progress=[0.05, 0.06, 0.95, 1.0]), np.array([1.0, 0.9, 0.2, 0.0]))
+def test_a_summary_counts_by_tenths_which_include_their_lower_bound() -> None:
+    found = summarise(make_scores([0.5] * 4, [1, 0, 1, 1], None, [0.05, 0.06, 0.95, 1.0], [1.0, 0.9, 0.2, 0.0]))
     assert [each['predictions'] for each in found['by_tenth']] == [2, 0, 0, 0, 0, 0, 0, 0, 0, 2]
     assert found['by_tenth'][0]['right'] == 0.5 and found['by_tenth'][1]['right'] is None
     assert found['right_from_half_way'] == 1.0
     assert (found['leads_for_good_from'], found['leads_for_good_before_s']) == (0.95, 0.2)
     assert found['gain'] == pytest.approx(np.log(2.0))
+    assert find_tenths(np.array([0.0, 0.1, 0.3, 0.7, 0.99, 1.0])).tolist() == [0, 1, 3, 7, 9, 9]
+
+
+def test_the_final_lead_begins_after_the_last_wrong_forecast() -> None:
+    found = make_scores([0.5] * 6, [1, 0, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1], [0.1, 0.4, 0.6, 0.2, 0.5, 0.9], [5, 4, 3, 9, 8, 7])
+    assert find_final_leads(found).tolist() == [[0.6, 1.0], [3.0, 0.0]]
 
 
 def test_a_held_out_recording_gets_the_setting_that_is_best_for_the_others() -> None:
@@ -218,6 +204,9 @@ def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is
     flat = np.log(2 * np.pi)
     assert scores['nlpd']['foc'] == {'0.25': pytest.approx(flat + 2.0), '0.5': pytest.approx(flat + 8.0), '1': None}
     assert scores['nlpd']['Singer Kalman']['0.5'] > 0.0
+    ended = observation(TWO_CLASSES, positions=np.full((H, 2), np.nan))
+    both = compute_position_scores([recorded(observation(TWO_CLASSES, positions=away), ended)])
+    assert str(both['displacement_m']) == str(scores['displacement_m']), 'a movement that has ended does not count'
 
 
 def test_the_region_of_one_gaussian_is_its_ellipse() -> None:

@@ -17,7 +17,7 @@ from bag_helpers import write_bag
 from fit_recordings import write_tables
 
 from foc_ros.analysis.fitting import fit as fitting
-from foc_ros.analysis.fitting import search
+from foc_ros.analysis.fitting import race
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
@@ -29,7 +29,7 @@ QUICK = {'foc.steps': 15, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.
 def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fitting, 'PREDICTIONS', 3)
     for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
-        monkeypatch.setattr(search, name, few)
+        monkeypatch.setattr(race, name, few)
 
 
 def _fit(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: str, **parameters: Any) -> tuple[dict[str, Any], Config]:
@@ -119,25 +119,26 @@ def test_two_recordings_do_not_determine_the_likelihood(tmp_path: Path, capsys: 
     assert shown['likelihood.beta'] == 'kept'
 
 
-def test_strategy_fixed_keeps_its_tau_and_lambda_and_says_so(past_an_obstacle: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    answer, config = _fit(past_an_obstacle, capsys, **{'foc.strategy': 'fixed', 'foc.tau': 1e-4})
+FIXED = {'foc.strategy': 'fixed', 'foc.tau': 1e-4}
+
+
+def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_lambda(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_bag(tmp_path / 'bags' / 'good')
+    (tmp_path / 'bags' / 'bad').mkdir()
+    (tmp_path / 'bags' / 'bad' / 'bad.mcap').write_bytes(b'nothing')
+    answer, config = _fit(tmp_path / 'bags', capsys, **FIXED)
+    assert answer['recordings'] == 1 and set(answer['failed']) == {'bad'}
+    assert any(words.startswith('cross-validation: 1 recordings are too few') for words in answer['warnings'])
     assert not {'foc.tau', 'foc.lam', 'foc.eta'} & set(answer['parameters'])
     assert config.foc.tau == 1e-4
     assert any(words.startswith('foc.tau, foc.lam: kept as they are') for words in answer['warnings'])
 
 
-def test_one_bag_and_a_broken_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_bag(tmp_path / 'bags' / 'good')
-    (tmp_path / 'bags' / 'bad').mkdir()
-    (tmp_path / 'bags' / 'bad' / 'bad.mcap').write_bytes(b'nothing')
-    answer, _ = _fit(tmp_path / 'bags', capsys, **{'foc.strategy': 'hc'})
-    assert answer['recordings'] == 1 and set(answer['failed']) == {'bad'}
-    assert any(words.startswith('cross-validation: 1 recordings are too few') for words in answer['warnings'])
-
-
 def test_the_result_is_printed_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag, given, output = write_bag(tmp_path / 'bag'), tmp_path / 'given.yaml', tmp_path / 'out.yaml'
-    given.write_text(dump_parameter_file(replace_values(Config(), {**QUICK, 'foc.strategy': 'hc'})))
+    given.write_text(dump_parameter_file(replace_values(Config(), {**QUICK, **FIXED})))
     options = ['--params', str(given), '--workers', '1', '--allow', 'positions', '--report', str(tmp_path)]
     assert main(['fit', str(bag), '--output', str(output), *options]) == 0
     words = capsys.readouterr().out

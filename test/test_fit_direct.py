@@ -16,7 +16,6 @@ from foc_ros.analysis.fitting.direct import (
     CANDIDATES,
     FADING,
     MAX_CLASSES,
-    Innovations,
     RecordedHand,
     count_classes,
     fit_duration,
@@ -24,6 +23,7 @@ from foc_ros.analysis.fitting.direct import (
     fit_fading,
     fit_max_candidates,
     fit_wait,
+    tabulate_innovations,
 )
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.kalman import compute_gramian, compute_transition, update
@@ -31,40 +31,45 @@ from foc_ros.core.types import Array, HandSample, SampleStatus, make_obstacles
 
 CONFIG = replace_values(Config(), {'estimator.acceleration_time_s': 0.0})
 GOAL = np.array([[0.3, 0.0]])
+BETA, WEAVING = 'likelihood.beta', 'likelihood.weaving'
 VALUES = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0])
 
 
 def _make_table(log_likelihood: Callable[[Array, Array], Array], values: Array = VALUES) -> SettingTable:
     """Return a table of one recording by exponent and weaving."""
     grid = [(beta, weaving) for beta in values for weaving in values]
-    settings = tuple({'likelihood.beta': beta, 'likelihood.weaving': weaving} for beta, weaving in grid)
+    settings = tuple({BETA: beta, WEAVING: weaving} for beta, weaving in grid)
     return SettingTable(log_likelihood(*np.array(grid).T)[None], settings)
 
 
-GIVEN = {'likelihood.beta': 2.0, 'likelihood.weaving': 4.0}
+GIVEN = {BETA: 2.0, WEAVING: 4.0}
 
 
-def test_a_sharp_peak_determines_both_parameters() -> None:
-    found = _make_table(lambda beta, weaving: -10.0 * ((beta - 6.0) ** 2 + (weaving - 2.0) ** 2)).estimate(GIVEN, 'how')[0]
-    assert found.values == {'likelihood.beta': 6.0, 'likelihood.weaving': 2.0} and found.undetermined == {}
+FLAT = 'all values tried, 1 to 8, explain the recordings within 2 nat'
+END = '8, the end of the values tried, explains the recordings best'
 
 
-def test_a_flat_profile_determines_nothing() -> None:
-    found = _make_table(lambda beta, weaving: -0.01 * ((beta - 6.0) ** 2 + (weaving - 2.0) ** 2)).estimate(GIVEN, 'how')[0]
-    assert found.estimates == {} and set(found.undetermined) == set(GIVEN)
-    assert found.undetermined['likelihood.beta'] == 'all values tried, 1 to 8, explain the recordings within 2 nat'
-
-
-def test_a_best_value_at_the_end_of_those_tried_determines_nothing() -> None:
-    found = _make_table(lambda beta, weaving: 10.0 * beta - 10.0 * (weaving - 2.0) ** 2).estimate(GIVEN, 'how')[0]
-    assert found.values == {'likelihood.weaving': 2.0}
-    assert found.undetermined == {'likelihood.beta': '8, the end of the values tried, explains the recordings best'}
-
-
-def test_the_bound_of_a_parameter_is_no_end_of_what_was_tried() -> None:
-    values = np.append(0.0, VALUES)
-    found = _make_table(lambda beta, weaving: -10.0 * beta - 10.0 * (weaving - 2.0) ** 2, values).estimate(GIVEN, 'how')[0]
-    assert found.values == {'likelihood.beta': 0.0, 'likelihood.weaving': 2.0}
+@pytest.mark.parametrize(
+    ('log_likelihood', 'values', 'expected', 'undetermined'),
+    [
+        pytest.param(lambda b, w: -10 * ((b - 6) ** 2 + (w - 2) ** 2), VALUES, (6.0, 2.0), {}, id='a sharp peak'),
+        pytest.param(
+            lambda b, w: -0.01 * ((b - 6) ** 2 + (w - 2) ** 2), VALUES, (None, None), {BETA: FLAT, WEAVING: FLAT}, id='flat'
+        ),
+        pytest.param(lambda b, w: 10 * b - 10 * (w - 2) ** 2, VALUES, (None, 2.0), {BETA: END}, id='best at the end'),
+        pytest.param(
+            lambda b, w: -10 * b - 10 * (w - 2) ** 2,
+            np.append(0.0, VALUES),
+            (0.0, 2.0),
+            {},
+            id='best at a bound',
+        ),
+    ],
+)
+def test_what_a_table_of_log_likelihoods_determines(log_likelihood, values, expected, undetermined) -> None:
+    found = _make_table(log_likelihood, values).estimate(GIVEN, 'how')[0]
+    assert found.values == {name: each for name, each in zip(GIVEN, expected, strict=True) if each is not None}
+    assert found.undetermined == undetermined
 
 
 def test_where_only_a_sum_is_determined_one_part_is_kept_and_the_other_follows() -> None:
@@ -116,7 +121,7 @@ def test_innovations_are_those_of_the_estimator() -> None:
             v = position - (compute_transition(dt) @ state.mean.reshape(3, 2))[0]
             total -= np.log(2 * np.pi * S) + v @ v / (2 * S)
         state = following
-    found = Innovations([each], config).tabulate([config.position_stddev], [config.jerk_density])
+    found = tabulate_innovations([each], config, [config.position_stddev], [config.jerk_density])
     assert found.values[0] == pytest.approx([total], rel=1e-9)
 
 
@@ -208,12 +213,6 @@ def test_a_lasting_acceleration_is_recognised() -> None:
     assert fit_fading(hands, replace_values(CONFIG, {'estimator.position_stddev': 1e-6})).values == {FADING: 0.0}
 
 
-def test_hands_at_rest_give_no_fading_time() -> None:
-    still = recorded_hand('still', 0.02 * np.arange(50.0), np.zeros((50, 2)), make_obstacles(), GOAL)
-    found = fit_fading([still], CONFIG)
-    assert found.estimates == {} and set(found.undetermined) == {FADING}
-
-
 def _make_resting(rest: float):
     return recorded_hand('one', *resting_reach(0.0, (0.3, 0.0), rest=rest), make_obstacles([], []), GOAL)
 
@@ -225,11 +224,15 @@ def test_half_of_the_wait_is_left_on_average_and_the_stay_at_the_goal_does_not_c
     assert found['duration.wait_s'].low < found['duration.wait_s'].value < found['duration.wait_s'].high
 
 
-def test_hands_that_never_rest_give_no_estimate() -> None:
+def test_hands_that_never_rest_give_no_wait_and_those_at_rest_no_fading_time() -> None:
     times = np.arange(0.0, 1.0, 0.02)
-    moving = recorded_hand('one', times, np.outer(times, [0.3, 0.0]), make_obstacles([], []), GOAL)
+    moving, still = (
+        recorded_hand('one', times, np.outer(times, [speed, 0.0]), make_obstacles([], []), GOAL) for speed in (0.3, 0.0)
+    )
     found = fit_wait([moving], Config()).estimates
     assert not found or found['duration.wait_s'].value < 0.1
+    found = fit_fading([still], CONFIG)
+    assert found.estimates == {} and set(found.undetermined) == {FADING}
 
 
 def make_hand(centres, goals=((1.0, 0.0),)) -> RecordedHand:

@@ -14,19 +14,12 @@ import pytest
 from evaluation_samples import TWO_CLASSES, H, observation, recorded
 from fit_recordings import recorded_hand, write_tables
 
-from foc_ros.analysis.evaluation.observations import TIMES_S
-from foc_ros.analysis.fitting import Findings, search
+from foc_ros.analysis.evaluation.truth import TIMES_S
+from foc_ros.analysis.fitting import Findings, race
 from foc_ros.analysis.fitting.direct import fit_duration, fit_other_models
 from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage, find_worse_positions, make_verdict
-from foc_ros.analysis.fitting.search import (
-    DURATIONS,
-    Replays,
-    compute_log_densities,
-    fit_widening,
-    make_eta_settings,
-    make_movement_settings,
-    widen_covariances,
-)
+from foc_ros.analysis.fitting.one_replay import compute_mean_densities, fit_widening, widen_covariances
+from foc_ros.analysis.fitting.race import DURATIONS, Replays, make_eta_settings, make_movement_settings
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
@@ -50,7 +43,7 @@ class KnownReplays:
 
     def search(self, settings: list[Config]) -> tuple[Config, Findings]:
         self.settings = settings
-        return search.search_settings('kind', settings, self)  # type: ignore[arg-type]
+        return race.search_settings('kind', settings, self)  # type: ignore[arg-type]
 
     def score(self, settings: list[Config], names: list[str], words: str) -> Array:
         self.rounds.append((len(settings), len(names)))
@@ -62,6 +55,8 @@ def test_the_better_choice_is_taken() -> None:
     config, found = KnownReplays([[0.0] * 8, [0.1, 0.2, 0.1, 0.2, 0.1, 0.2, 0.1, -0.1]]).search(ARRIVALS)
     assert found.chosen == {'duration.arrival': 'passing'} and config.duration.arrival == 'passing'
     assert found.warnings == [] and found.undetermined == {}
+    config, found = KnownReplays(np.zeros((2, 8))).search(ARRIVALS)
+    assert config == CONFIG and found.chosen == {}, 'equal scores'
 
 
 @pytest.mark.parametrize('scores', [[1.5, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2, 0.0], [0.5, 1.5], [1.0]])
@@ -71,13 +66,8 @@ def test_a_choice_that_is_better_by_chance_only_is_undetermined(scores: list[flo
     assert found.undetermined['duration.arrival'].startswith('no other value tried is better by more than chance')
 
 
-def test_the_given_setting_is_kept_where_scores_are_equal() -> None:
-    config, found = KnownReplays(np.zeros((2, 8))).search(ARRIVALS)
-    assert config == CONFIG and found.chosen == {}
-
-
 def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(search, 'PLAINLY_WORSE', 1e6)
+    monkeypatch.setattr(race, 'PLAINLY_WORSE', 1e6)
     settings = [replace_values(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(20)]
     quality = -np.abs(np.arange(20.0) - 13.0)[:, None] + 0.1 * np.random.default_rng(3).standard_normal((20, 40))
     replays = KnownReplays(quality)
@@ -86,6 +76,9 @@ def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_record
     assert config == settings[13]
     each = found.estimates['foc.eta']
     assert each.low <= each.value == settings[13].foc.eta <= each.high
+    many = KnownReplays(np.zeros((2, 500)))
+    many.search(ARRIVALS)
+    assert many.rounds[-1] == (2, race.MAX_RECORDINGS)
 
 
 def test_plainly_worse_settings_leave_at_once() -> None:
@@ -96,17 +89,11 @@ def test_plainly_worse_settings_leave_at_once() -> None:
     assert config.foc.eta in (0.52, 0.54, 0.6)
 
 
-def test_the_number_of_replayed_recordings_is_bounded() -> None:
-    replays = KnownReplays(np.zeros((2, 500)))
-    replays.search(ARRIVALS)
-    assert replays.rounds[-1] == (2, search.MAX_RECORDINGS)
-
-
 def test_classes_decide_and_positions_where_classes_are_alike() -> None:
     positions = np.array([[0.0, 0.0], [5.0, 5.0], [1.0, 1.0]])
-    assert search.rank(np.array([[[1.0, 1.2], [0.5, 0.8], [0.9, 1.4]], positions])) == [2, 0, 1]
-    assert search.rank(np.array([[[1.0, 1.2], [0.7, 1.55], [0.9, 1.4]], positions])) == [1, 2, 0]
-    assert search.rank(np.array([np.zeros((3, 2)), positions])) == [1, 2, 0]
+    assert race.rank(np.array([[[1.0, 1.2], [0.5, 0.8], [0.9, 1.4]], positions])) == [2, 0, 1]
+    assert race.rank(np.array([[[1.0, 1.2], [0.7, 1.55], [0.9, 1.4]], positions])) == [1, 2, 0]
+    assert race.rank(np.array([np.zeros((3, 2)), positions])) == [1, 2, 0]
 
 
 def test_worse_positions_have_a_warning() -> None:
@@ -144,13 +131,13 @@ def test_the_other_models_of_duration_come_with_their_constants_fitted() -> None
 def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    recordings = find_recordings(write_tables(tmp_path / 'data', count=4, hz=30.0))
+    recordings = find_recordings(write_tables(tmp_path / 'data', count=2, hz=30.0))
     names = list(recordings)
     hopeless = replace_values(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': math.inf})
     replays = Replays(recordings, {})
     scores = replays.score([hopeless, CONFIG], names, 'both')
-    assert scores.shape == (2, 2, 4) and scores[0, 1].mean() > scores[0, 0].mean() + 0.1
-    monkeypatch.setattr('foc_ros.analysis.fitting.search._score_replay', None)
+    assert scores.shape == (2, 2, 2) and scores[0, 1].mean() > scores[0, 0].mean() + 0.1
+    monkeypatch.setattr('foc_ros.analysis.fitting.race._score_replay', None)
     assert np.array_equal(replays.score([CONFIG, hopeless], names, 'again'), scores[:, ::-1])
 
 
@@ -172,42 +159,45 @@ def test_worse_positions_are_named_with_both_errors() -> None:
     assert sentence == 'Worse with the fitted parameters: error of positions 0.5 s ahead [mm] 63.0 to 96.0.'
 
 
-@pytest.mark.parametrize(('options', 'code'), [([], 2), (['--allow', 'positions'], 0)])
-def test_without_a_terminal_worse_positions_are_written_only_if_allowed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: list[str], code: int
+@pytest.mark.parametrize(
+    ('answer', 'options', 'is_written'),
+    [
+        (None, (), False),
+        (None, ('--allow', 'positions'), True),
+        ('y', (), True),
+        ('Yes ', (), True),
+        ('', (), False),
+        ('no', (), False),
+    ],
+)
+def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    answer: str | None,
+    options: tuple[str, ...],
+    is_written: bool,
 ) -> None:
-    fit, output = Fit(CONFIG), tmp_path / 'operator.yaml'
-    fit.comparison = {'error_m 0.5': {'before': 0.063, 'after': 0.096}}
-    monkeypatch.setattr('foc_ros.analysis.fitting.fit.fit_parameters', lambda *_, **__: fit)
-    data = write_tables(tmp_path / 'data', count=1)
-    assert main(['fit', str(data), '--output', str(output), '--workers', '1', *options]) == code
-    error = capsys.readouterr().err
-    assert 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm\n' in error
-    assert output.exists() == (code == 0)
-    assert (f'{output} is not written; --allow positions writes it all the same' in error) == (code == 2)
+    worse = 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm\n'
+    output, fit, asked = tmp_path / 'operator.yaml', Fit(CONFIG), []
 
-
-@pytest.mark.parametrize(('answer', 'is_written'), [('y', True), ('Yes ', True), ('', False), ('no', False)])
-def test_a_terminal_is_asked_before_worse_positions_are_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], answer: str, is_written: bool
-) -> None:
-    asked = []
-
-    def ask(question: str) -> str:
-        assert 'become worse' in capsys.readouterr().err and not output.exists()
+    def ask(question: str) -> str | None:
+        assert worse in capsys.readouterr().err and not output.exists()
         asked.append(question)
         return answer
 
-    output, fit = tmp_path / 'operator.yaml', Fit(CONFIG)
     fit.comparison = {'error_m 0.5': {'before': 0.063, 'after': 0.096}}
     monkeypatch.setattr('foc_ros.analysis.fitting.fit.fit_parameters', lambda *_, **__: fit)
-    monkeypatch.setattr(sys.stdin, 'isatty', lambda: True)
-    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
+    for stream in (sys.stdin, sys.stdout):
+        monkeypatch.setattr(stream, 'isatty', lambda: answer is not None)
     monkeypatch.setattr('builtins.input', ask)
     data = write_tables(tmp_path / 'data', count=1)
-    code = main(['fit', str(data), '--output', str(output), '--workers', '1'])
-    assert (code, output.exists()) == ((0, True) if is_written else (2, False))
-    assert asked == [f'Write {output} all the same? [y/N] ']
+    assert main(['fit', str(data), '--output', str(output), '--workers', '1', *options]) == (0 if is_written else 2)
+    assert output.exists() == is_written
+    assert asked == ([] if answer is None else [f'Write {output} all the same? [y/N] '])
+    error = capsys.readouterr().err
+    assert (f'{output} is not written; --allow positions writes it all the same' in error) != is_written
+    assert answer is not None or worse in error
 
 
 @pytest.mark.parametrize(
@@ -263,7 +253,7 @@ def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoin
 
 def test_the_density_is_that_of_the_widened_mixture() -> None:
     observed, widening = _make_recordings(0.006, 0.3)[0].observations[0], (0.5, 0.004, 0.2)
-    found = compute_log_densities(observed, np.array([0.3, 0.7]), Config(), [NONE, widening])
+    found = compute_mean_densities(observed, np.array([0.3, 0.7]), Config(), [NONE, widening])
     rows = [TIMES_S.index(each) for each in (0.25, 0.5, 1.0)]
     for value, each in zip(found, (NONE, widening), strict=True):
         covariance = widen_covariances(observed, [each], Config())[0, 0, rows]
@@ -274,7 +264,7 @@ def test_the_density_is_that_of_the_widened_mixture() -> None:
 
 
 def test_a_hand_at_rest_does_not_count() -> None:
-    assert compute_log_densities(observation(CANDIDATES, movement_age_s=0.0), np.array([0.5, 0.5]), Config(), [NONE]) is None
+    assert compute_mean_densities(observation(CANDIDATES, movement_age_s=0.0), np.array([0.5, 0.5]), Config(), [NONE]) is None
 
 
 def test_a_value_at_the_end_of_those_tried_is_not_taken() -> None:

@@ -12,8 +12,9 @@ import pytest
 from bag_helpers import messages, write_bag
 from test_demonstrations import GOAL, OBSTACLES, bow
 
+from foc_ros.analysis.learn import learn_recording
 from foc_ros.analysis.recordings import find_recordings
-from foc_ros.analysis.replay import Replay, learn_recording
+from foc_ros.analysis.replay import Replay
 from foc_ros.core.classes.library import MOST_STATES, is_same_recording
 from foc_ros.core.config import Config
 from foc_ros.core.learning import movements as learning

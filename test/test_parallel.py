@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -28,14 +29,14 @@ def parse_study(*given: str) -> Study:
     return bound.arguments['study']
 
 
-@pytest.mark.parametrize('count', [1, 2, 3])
-def test_results_come_in_order_and_do_not_depend_on_the_number_of_workers(count: int) -> None:
-    with open_workers(count):
+@pytest.mark.parametrize('count', [None, 1, 2, 3])
+def test_results_come_in_order_and_an_exception_is_the_failure_of_its_item_whatever_the_workers(count: int | None) -> None:
+    with nullcontext() if count is None else open_workers(count):
         assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
-
-
-def test_without_workers_this_process_computes() -> None:
-    assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
+        found = dict(run(worker_tasks.faulty, ITEMS[:4]))
+    assert found['r0'] == 0 and found['r3'] == 3
+    assert found['r1'] == Failure('number: expected another than 1, got 1')
+    assert found['r2'].reason.startswith("KeyError: 'two' (worker_tasks.py:")
 
 
 def test_the_cluster_gives_the_same_results(cluster_address: str) -> None:
@@ -58,15 +59,6 @@ def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(count: int) ->
 def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else(cluster_address: str) -> None:
     with open_workers(1, cluster_address):
         check_that_only_the_deadly_fail('KilledWorker')
-
-
-@pytest.mark.parametrize('count', [1, 2])
-def test_an_exception_is_the_failure_of_its_item(count: int) -> None:
-    with open_workers(count):
-        found = dict(run(worker_tasks.faulty, ITEMS[:4]))
-    assert found['r0'] == 0 and found['r3'] == 3
-    assert found['r1'] == Failure('number: expected another than 1, got 1')
-    assert found['r2'].reason.startswith("KeyError: 'two' (worker_tasks.py:")
 
 
 def test_an_argument_that_cannot_be_loaded_is_the_failure_of_its_item() -> None:
@@ -140,25 +132,17 @@ def test_a_wrong_number_of_workers_is_refused(given: tuple[str, ...]) -> None:
         parse_study(*given)
 
 
-def test_a_scheduler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip('distributed', reason='the extra cluster is not installed')
+def test_a_scheduler_that_is_not_there_or_has_no_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
     monkeypatch.setattr('foc_ros.analysis.parallel.CONNECT_S', 0.3)
     for address in ('tcp://127.0.0.1:9', 'nonsense://host'):
         refused = pytest.raises(InputError, match='--scheduler: expected the address of a Dask scheduler')
         with refused, parse_study('--scheduler', address).open_workers():
             pass
-
-
-def test_a_scheduler_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
-    monkeypatch.setattr('foc_ros.analysis.parallel.CONNECT_S', 0.3)
-    refused = pytest.raises(InputError, match='--scheduler: expected a Dask scheduler with workers, got none at')
-    with (
-        distributed.LocalCluster(n_workers=0, dashboard_address=':0') as cluster,
-        refused,
-        open_workers(1, cluster.scheduler_address),
-    ):
-        pass
+    with distributed.LocalCluster(n_workers=0, dashboard_address=':0') as cluster:
+        refused = pytest.raises(InputError, match='--scheduler: expected a Dask scheduler with workers, got none at')
+        with refused, open_workers(1, cluster.scheduler_address):
+            pass
 
 
 def test_a_scheduler_that_dies_ends_the_run_in_words() -> None:

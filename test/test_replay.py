@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 from dataclasses import replace
 from itertools import chain
@@ -29,37 +31,42 @@ from foc_ros.ros.messages.types import make_header
 
 FEW = 0.12
 """Seconds of a reach that are enough for a few predictions."""
+NAMES = 'label description goal sides status effort cost eta tau lambda likelihood qp_solves mean stddev'
+HEIGHT_NAMES = ' height height_velocity height_stddev'
 
 
-@pytest.fixture
-def bag(tmp_path: Path) -> Path:
-    return write_bag(tmp_path / 'reach', messages(seconds=FEW))
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_bag(tmp_path_factory.mktemp('replay') / 'reach', messages(seconds=FEW))
+
+
+@pytest.fixture(scope='module')
+def answer(bag: Path) -> dict[str, Any]:
+    """Return what `replay --json` prints of the bag."""
+    return replay_json(bag)
 
 
 def run(bag: Path, *options: str) -> int:
     return main(['replay', str(bag), '--params', write_parameters(bag.parent), *options])
 
 
-def answer_of(capsys: pytest.CaptureFixture[str], bag: Path, *options: str) -> dict[str, Any]:
-    assert run(bag, '--json', *options) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ''
-    return json.loads(captured.out, parse_constant=lambda name: pytest.fail(f'{name} is no JSON'))
+def replay_json(bag: Path, *options: str) -> dict[str, Any]:
+    output, errors = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+        assert run(bag, '--json', *options) == 0
+    assert errors.getvalue() == ''
+    return json.loads(output.getvalue(), parse_constant=lambda name: pytest.fail(f'{name} is no JSON'))
 
 
 def without_times(answer: dict[str, Any]) -> dict[str, Any]:
     return {**answer, 'summary': {name: value for name, value in answer['summary'].items() if name != 'prediction_ms'}}
 
 
-def test_json_has_the_promised_names(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    answer = answer_of(capsys, bag)
+def test_json_has_the_promised_names(answer: dict[str, Any]) -> None:
     samples = len(reach(FEW))
     summary = answer['summary']
-    assert {name: summary[name] for name in ('samples', 'predictions', 'refused')} == {
-        'samples': samples,
-        'predictions': samples,
-        'refused': {},
-    }
+    counts = {name: summary[name] for name in ('samples', 'predictions', 'refused')}
+    assert counts == {'samples': samples, 'predictions': samples, 'refused': {}}
     assert summary['duration_s'] == pytest.approx(FEW - 0.02 + 0.1)
     assert 0 < summary['prediction_ms']['p50'] <= summary['prediction_ms']['p99']
     assert [each['stamp_ns'] for each in answer['predictions']] == [ns(time) for time, _ in reach(FEW)]
@@ -68,36 +75,27 @@ def test_json_has_the_promised_names(bag: Path, capsys: pytest.CaptureFixture[st
         assert solved and sum(each['likelihood'] for each in solved) == pytest.approx(1 - prediction['other'])
         assert prediction['candidates'][0]['label'] == prediction['most_likely']
         for each in prediction['candidates']:
-            assert ' '.join(
-                each
-            ) == 'label description goal sides status effort cost eta tau lambda likelihood qp_solves mean stddev' + (
-                ' height height_velocity height_stddev' if each['likelihood'] else ''
-            )
+            assert ' '.join(each) == NAMES + (HEIGHT_NAMES if each['likelihood'] else '')
             assert each['goal'] == 0 and set(each['sides'].values()) <= {'left', 'right'}
             assert np.shape(each['mean']) == np.shape(each['stddev']) == (CONFIG.foc.steps + 1, 2)
         assert {each['sides']['7'] for each in solved} == {'left', 'right'}
         assert np.allclose([each['mean'][-1] for each in solved], [0.3, 0.0], atol=1e-6)
 
 
-def test_the_same_answer_each_time(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    first, second = (without_times(answer_of(capsys, bag)) for _ in range(2))
-    assert first == second
-
-
-def test_topics_by_type_give_the_same_answer(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_same_answer_each_time_also_with_topics_by_type(tmp_path: Path, bag: Path, answer: dict[str, Any]) -> None:
     names = {'/hand_pose': '/tool/pose', '/obstacles': '/perception/spheres', '/goals': '/targets'}
     renamed = write_bag(tmp_path / 'renamed', messages(seconds=FEW), names)
-    assert without_times(answer_of(capsys, renamed)) == without_times(answer_of(capsys, bag))
+    for each in (bag, renamed):
+        assert without_times(replay_json(each)) == without_times(answer)
 
 
-def test_a_topic_can_be_chosen(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_topic_can_be_chosen(tmp_path: Path, answer: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
     still = [('/left/measured_cp', stamp_ns, message) for topic, stamp_ns, message in messages(FEW) if topic == '/hand_pose'][:1]
     moving = [('/right/measured_cp' if each[0] == '/hand_pose' else each[0], *each[1:]) for each in messages(seconds=FEW)]
     arms = write_bag(tmp_path / 'arms', [*moving, *still])
     assert run(arms) == 2
     assert 'several topics could be hand_pose: /left/measured_cp, /right/measured_cp; choose with' in capsys.readouterr().err
-    chosen = answer_of(capsys, arms, '--remap', 'hand_pose:=/right/measured_cp')
-    assert chosen['predictions'] == answer_of(capsys, bag)['predictions']
+    assert replay_json(arms, '--remap', 'hand_pose:=/right/measured_cp')['predictions'] == answer['predictions']
 
 
 def test_the_rate_bounds_the_predictions(tmp_path: Path) -> None:
@@ -107,27 +105,20 @@ def test_the_rate_bounds_the_predictions(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path: Path) -> None:
-    spoiled = encode_hand_pose(TYPES, ns(0.01), FRAME, (float('nan'), 0.0, 0.0))
-    elsewhere = encode_hand_pose(TYPES, ns(0.03), 'camera', (0.0, 0.0, 0.0))
-    negative = encode_obstacles(TYPES, ns(0.05), FRAME, [(0.1, 0.0, 0.0, -0.1, 0.0, 1)])
-    partly = encode_obstacles(TYPES, ns(0.07), FRAME, [(0.15, 0.0, 0.0, 0.03, 0.002, 7), (float('inf'), 0, 0, 0.1, 0, 8)])
-    late = encode_hand_pose(TYPES, ns(0.02), FRAME, (0.0, 0.0, 0.0))
+    obstacles = [(0.15, 0.0, 0.0, 0.03, 0.002, 7), (float('inf'), 0, 0, 0.1, 0, 8)]
     bad = [
-        ('/hand_pose', ns(0.01), spoiled),
-        ('/hand_pose', ns(0.03), elsewhere),
-        ('/obstacles', ns(0.05), negative),
-        ('/obstacles', ns(0.07), partly),
-        ('/hand_pose', ns(0.09), late),
+        ('/hand_pose', ns(0.01), encode_hand_pose(TYPES, ns(0.01), FRAME, (float('nan'), 0.0, 0.0))),
+        ('/hand_pose', ns(0.03), encode_hand_pose(TYPES, ns(0.03), 'camera', (0.0, 0.0, 0.0))),
+        ('/obstacles', ns(0.05), encode_obstacles(TYPES, ns(0.05), FRAME, [(0.1, 0.0, 0.0, -0.1, 0.0, 1)])),
+        ('/obstacles', ns(0.07), encode_obstacles(TYPES, ns(0.07), FRAME, obstacles)),
+        ('/hand_pose', ns(0.09), encode_hand_pose(TYPES, ns(0.02), FRAME, (0.0, 0.0, 0.0))),
     ]
-    bag = write_bag(tmp_path / 'bad', sorted([*messages(seconds=FEW), *bad], key=lambda each: each[1]))
     replayed = Replay(CONFIG)
-    with BagReader(bag) as reader:
+    with BagReader(write_bag(tmp_path / 'bad', by_stamp(messages(seconds=FEW), bad))) as reader:
         stamps = [step.prediction.stamp_ns for step in replayed.steps(reader) if step.prediction]
     assert stamps == [ns(time) for time, _ in reach(FEW)]
-    expected = {'hand_lost': 1, 'hand_wrong_frame': 1, 'obstacles_invalid': 1, 'hand_late': 1}
-    counts = replayed.intake.counts
-    assert {name: counts.get(name) for name in expected} == expected
-    assert counts['obstacles_dropped_not_finite'] == 1
+    expected = {'hand_lost': 1, 'hand_wrong_frame': 1, 'obstacles_invalid': 1, 'hand_late': 1, 'obstacles_dropped_not_finite': 1}
+    assert {name: replayed.intake.counts.get(name) for name in expected} == expected
 
 
 def by_stamp(*given: list[tuple[str, int, Any]]) -> list[tuple[str, int, Any]]:
@@ -204,12 +195,6 @@ def test_a_scene_in_another_frame_than_the_first_pose_is_counted(tmp_path: Path,
     )
 
 
-def test_a_table_is_printed_without_json(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(bag) == 0
-    out, err = capsys.readouterr()
-    assert 'hand poses' in out and f'{len(reach(FEW))} with a solved candidate' in out and err == ''
-
-
 def test_nothing_solved_is_exit_3_and_says_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stale = [each for each in messages(seconds=FEW) if each[0] == '/hand_pose']
     stale += [
@@ -235,14 +220,13 @@ def test_parameters_are_the_nodes(tmp_path: Path, bag: Path, capsys: pytest.Capt
     assert capsys.readouterr().err == 'foc_ros replay: foc.steps: expected a number in [5, 400], got 2\n'
 
 
-def test_the_output_bag_holds_inputs_and_predictions(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_output_bag_holds_inputs_and_predictions(tmp_path: Path, bag: Path, answer: dict[str, Any]) -> None:
     assert run(bag, '--output', str(tmp_path / 'out')) == 0
     with BagReader(bag) as before, BagReader(tmp_path / 'out') as after:
         inputs = [(item.topic, item.log_ns, bytes(item.raw)) for item in before]
         assert [(item.topic, item.log_ns, bytes(item.raw)) for item in after] == inputs
         assert after.message_count == len(inputs) + 5 * len(reach(FEW))
-    capsys.readouterr()
-    assert without_times(answer_of(capsys, tmp_path / 'out')) == without_times(answer_of(capsys, bag))
+    assert without_times(replay_json(tmp_path / 'out')) == without_times(answer)
 
 
 def test_an_output_that_exists_is_left_alone(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -264,10 +248,12 @@ def test_a_damaged_recording_leaves_neither_json_nor_output(tmp_path: Path, caps
     assert out == '' and 'damaged or cut short' in err and not (tmp_path / 'out').exists()
 
 
-def test_a_report_is_written(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_is_printed_and_a_report_is_written(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('matplotlib', reason='matplotlib is not installed')
     assert run(bag, '--report', str(tmp_path / 'report')) == 0
-    assert capsys.readouterr().out.endswith(f'\nreport: file://{tmp_path}/report/index.html\n')
+    out, err = capsys.readouterr()
+    assert 'hand poses' in out and f'{len(reach(FEW))} with a solved candidate' in out and err == ''
+    assert out.endswith(f'\nreport: file://{tmp_path}/report/index.html\n')
     page = (tmp_path / 'report' / 'index.html').read_text('utf-8')
     assert 'reach' in page and 'hand poses' in page
 

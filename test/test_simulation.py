@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.parallel import open_workers
 from foc_ros.analysis.simulation import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
 from foc_ros.analysis.simulation.operators import (
     DT,
@@ -25,17 +25,18 @@ from foc_ros.analysis.simulation.operators import (
 )
 from foc_ros.analysis.simulation.study import (
     RULES,
+    Assistance,
     Trial,
     estimate_mean,
     make_pairs,
     measure_trial,
+    run_pair,
     run_trial,
-    simulate,
-    summarise,
 )
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.types import Array, make_obstacles
+from foc_ros.ros.parameters import dump_parameter_file
 
 GOALS = np.array([[0.3, 0.1], [0.3, -0.1]])
 QUICK = Config(budget_s=0.0).with_values({'foc.steps': 20, 'homotopy.max_candidates': 2, 'rate_hz': 10.0})
@@ -108,18 +109,21 @@ def test_every_rule_keeps_force_and_slew_within_the_limits(rule: str) -> None:
     assert (sizes.max() > 0.0) == (rule != 'none')
 
 
-def run_study(workers: int) -> list[dict[str, object]]:
-    with open_workers(workers):
-        results = simulate(make_pairs(['noisy', 'changes_way'], ['foc'], 2, 7), QUICK)
-    return summarise(results, 7)
+class Misled(Assistance):
+    """Takes a wrong way to be the likeliest, and draws back."""
+
+    def compute_force(self, step, position, velocity, acceleration) -> Array:
+        """Return a constant force."""
+        self.is_wrong = True
+        return np.array([-1.0, 0.0])
 
 
-def test_equal_seeds_give_equal_studies_whatever_the_workers() -> None:
-    cells = run_study(1)
-    assert cells == run_study(2)
-    assert [(cell['operator'], cell['assistance'], cell['trials']) for cell in cells] == [
-        (operator, rule, 2) for operator in ('noisy', 'changes_way') for rule in ('none', 'foc')
-    ]
+def test_a_wrong_way_costs_what_the_operator_needs_more_than_alone() -> None:
+    (pair,) = make_pairs(['noisy'], ['misled'], 1, 3)
+    measures = run_pair(pair, QUICK, {'none': Assistance, 'misled': Misled}).measures
+    for harm, name in (('wrong_way_s', 'completion_s'), ('wrong_way_effort', 'effort')):
+        assert measures['misled'][harm] == measures['misled'][name] - measures['none'][name] > 0.0
+        assert np.isnan(measures['none'][harm])
 
 
 def test_intervals_contain_the_mean_and_shrink_with_the_number_of_trials() -> None:
@@ -135,14 +139,25 @@ def test_intervals_contain_the_mean_and_shrink_with_the_number_of_trials() -> No
     assert estimate_mean(np.array([np.nan, np.inf]), 0) == (None, None)
 
 
-def test_the_command_prints_cells_and_writes_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def run(folder: Path, capsys: pytest.CaptureFixture[str], *options: str) -> list[dict]:
+    (folder / 'quick.yaml').write_text(dump_parameter_file(QUICK))
+    assert main(['simulate', '--params', str(folder / 'quick.yaml'), '--json', *options]) == 0
+    return json.loads(capsys.readouterr().out)['cells']
+
+
+def test_the_command_prints_equal_cells_whatever_the_workers_and_writes_a_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-    options = ['--operators', 'noisy', '--assistance', 'none,foc', '--trials', '2', '--workers', '1']
-    assert main(['simulate', *options, '--json', '--report', str(tmp_path)]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    cell = answer['cells'][1]
-    assert (cell['operator'], cell['assistance'], cell['trials']) == ('noisy', 'foc', 2)
-    assert cell['completion_s_interval'][0] <= cell['completion_s'] <= cell['completion_s_interval'][1]
+    options = ['--operators', 'noisy,changes_way', '--assistance', 'foc', '--trials', '1', '--seed', '7']
+    cells = run(tmp_path, capsys, *options, '--workers', '1', '--report', str(tmp_path))
+    assert cells == run(tmp_path, capsys, *options, '--workers', '2')
+    assert [(cell['operator'], cell['assistance'], cell['trials']) for cell in cells] == [
+        (operator, rule, 1) for operator in ('noisy', 'changes_way') for rule in ('none', 'foc')
+    ]
+    for cell in cells:
+        assert cell['completion_s_interval'][0] <= cell['completion_s'] <= cell['completion_s_interval'][1]
+    assert (cells[0]['effort_difference'], cells[0]['wrong_way_s']) == (0.0, None)
     page = (tmp_path / 'simulation.html').read_text('utf-8')
     assert page.count('<figure>') == 3 + 2 and 'foc' in page
 
@@ -162,20 +177,9 @@ def test_wrong_options_are_refused(options: list[str], words: str, capsys: pytes
     assert words in capsys.readouterr().err
 
 
-def write_recording(folder: Path, shift: Array) -> None:
-    """Write a recorded movement past an obstacle to one of two goals."""
-    s = np.linspace(0.0, 1.0, 40)
-    x = 0.3 * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    rows = [f'a,{t:.4f},{x:.5f},{y:.5f}' for t, x, y in zip(1.2 * s, x, 0.05 * np.sin(np.pi * s) + shift, strict=True)]
-    (folder / 'recordings.csv').write_text('\n'.join(['recording,t_s,x_m,y_m', *rows]), 'utf-8')
-    (folder / 'obstacles.csv').write_text('x_m,y_m,radius_m\n0.15,0.0,0.02\n', 'utf-8')
-    (folder / 'goals.csv').write_text('x_m,y_m\n0.3,0.0\n0.3,0.2\n', 'utf-8')
-
-
 def test_recorded_paths_are_intended_paths(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_recording(tmp_path, np.zeros(40))
-    options = ['--operators', 'human_paths', '--assistance', 'none', '--trials', '1', '--workers', '1', '--json']
-    assert main(['simulate', *options, '--recordings', str(tmp_path)]) == 0
-    cell = json.loads(capsys.readouterr().out)['cells'][0]
+    write_tables(tmp_path, {'a': reach(0.05, (0.3, 0.0))}, [(0.3, 0.0), (0.3, 0.2)], [(0.15, 0.0, 0.02)])
+    options = ['--operators', 'human_paths', '--assistance', 'none', '--trials', '1', '--workers', '1']
+    (cell,) = run(tmp_path, capsys, *options, '--recordings', str(tmp_path))
     assert cell['collision_rate'] == 0.0
     assert cell['min_clearance_m'] == pytest.approx(0.03, abs=0.01)

@@ -30,7 +30,6 @@ LONG = (
     'test_homotopy_shapes.py::test_brute_force_finds_none_in_many_more_scenes',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # all steps of a fit, of the paper's studies and of long reports
-    'test_fit.py::test_strategy_fixed_keeps_its_tau_and_lambda_and_says_so',
     'test_fit.py::test_without_obstacles_goals_*',
     'test_report.py::test_a_long_recording_is_thinned_out*',
     'test_paper.py::test_*trend*',

@@ -1,48 +1,25 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The recordings of a folder, bags or CSV tables alike, as streams of recorded messages; and tables converted to bags.
-
-Scenes of boxes in space are a table of their own: the boxes, walls and targets among which people reached, one scene for each
-recording. The columns are `recording`, `object`, the centre `x_m`, `y_m`, `z_m`, and the full lengths along these axes `width_m`,
-`depth_m` and `height_m`. The object `Target` is the goal of its recording, and no obstacle. Where a table of trials has
-the column `object`, which is what the hand picked up, all objects that are picked up in any recording are goals, and obstacles.
-"""
+"""The recordings of a folder, bags or CSV tables alike, as streams of recorded messages; and tables converted to bags."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import ClassVar
 
-import numpy as np
-
-from foc_ros.analysis.csv_recordings import (
-    Movement,
-    RecordedScene,
-    SceneTables,
-    parse_movement,
-    read_movement_rows,
-    read_movements,
-    read_scenes,
-    recorded_messages,
-    warn_of_doubts,
-    warn_of_far_scenes,
-    write_movement,
-)
 from foc_ros.core.errors import FocError, InputError, RecordingError, collect, collect_all, join_errors
-from foc_ros.io.bags import BagReader, Item, check_bag, is_bag_file
-from foc_ros.io.csv_tables import Column, Row, parse_rows, read_rows
+from foc_ros.io.bags import BagReader, BagWriter, Item, check_bag, is_bag_file
 from foc_ros.io.terminal import show_progress
+
+from .csv_recordings import Movement, read_movements, recorded_messages, warn_of_far_scenes
+from .scenes import FindScene, RecordedScene, read_box_scenes, read_scenes
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
 SCENES, TRIALS = 'scenes.csv', 'trials.csv'
-TARGET = 'Target'
-COLUMNS = tuple(Column(name) for name in ('x_m', 'y_m', 'z_m')) + tuple(
-    Column(name, 0.0) for name in ('width_m', 'depth_m', 'height_m')
-)
 
 
 @dataclass(frozen=True)
@@ -116,34 +93,31 @@ def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recordin
 
 
 def read_tables(data: Path) -> dict[str, TableRecording]:
-    """Return the recordings of a folder of tables by name.
+    """Return the recordings of a folder of tables by name; raises RecordingError, see :func:`_read_with_scenes`."""
+
+    def read() -> FindScene:
+        trials, obstacles = data / TRIALS, data / OBSTACLES
+        if (data / SCENES).exists():
+            return read_box_scenes(data / SCENES, trials if trials.exists() else None)
+        return read_scenes(obstacles if obstacles.exists() else None, data / GOALS)
+
+    return _read_with_scenes(data / RECORDINGS, read, data)
+
+
+def _read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> dict[str, TableRecording]:
+    """Return the recordings of a table with their scenes; data: what a warning names.
 
     Raises one RecordingError for the errors of all tables if a table has no scenes or no recording that can be used.
     """
     errors: list[FocError] = []
-    scenes = collect(errors, _read_scenes, data)
-    rows = collect(errors, read_movement_rows, data / RECORDINGS) or {}
-    warn_of_doubts(data / RECORDINGS, rows)
-    movements = {name: _parse_movement(name, each) for name, each in rows.items()}
+    find = collect(errors, read)
+    movements = read_movements(file, errors)
     failures = [each for each in movements.values() if isinstance(each, RecordingError)]
-    if scenes is None or len(failures) == len(movements):
+    if find is None or errors or len(failures) == len(movements):
         raise join_errors([*errors, *failures])
-    found = {name: TableRecording(name, movement, scenes.find(name)) for name, movement in movements.items()}
+    found = {name: TableRecording(name, movement, find(name)) for name, movement in movements.items()}
     warn_of_far_scenes(data, [(each.movement, each.scene) for each in found.values() if isinstance(each.movement, Movement)])
     return found
-
-
-def _parse_movement(name: str, rows: Iterable[Row]) -> Movement | RecordingError:
-    try:
-        return parse_movement(name, rows)
-    except RecordingError as error:
-        return error
-
-
-def _read_scenes(data: Path) -> SceneTables | BoxScenes:
-    if (data / SCENES).exists():
-        return BoxScenes(data / SCENES, read_picked(data / TRIALS) if (data / TRIALS).exists() else {})
-    return read_scenes(data / OBSTACLES if (data / OBSTACLES).exists() else None, data / GOALS)
 
 
 def _may_be_bag(path: Path) -> bool:
@@ -151,62 +125,6 @@ def _may_be_bag(path: Path) -> bool:
     if path.name.startswith('.'):
         return False
     return is_bag_file(path) or (path.is_dir() and any(map(is_bag_file, path.iterdir())))
-
-
-class BoxScenes:
-    """The scenes of a table by recording; a wrong table raises RecordingError.
-
-    picked: the object that was picked up, by recording; empty where the recordings end at a target.
-    """
-
-    def __init__(self, file: Path, picked: Mapping[str, str] = MappingProxyType({})) -> None:
-        self._file, self._picked = file, picked
-        self._boxes = read_boxes(file)
-
-    def find(self, name: str) -> RecordedScene:
-        """Return the scene of a recording; raises RecordingError where the table does not have its goal."""
-        boxes = self._boxes.get(name, {})
-        if self._picked:
-            found, offered = self._picked.get(name), {*self._picked.values()} & {*boxes}
-            if found not in offered:
-                raise RecordingError(f'{self._file}: no row of recording {name!r} has the object {found}, which was picked up')
-            objects = [each for each in boxes if each in offered]
-            return RecordedScene(goals=np.array([boxes[each][:3] for each in objects]), boxes=boxes, goal=objects.index(found))
-        if TARGET not in boxes:
-            raise RecordingError(f'{self._file}: no row of recording {name!r} has the object {TARGET}')
-        goals = np.array([boxes[TARGET][:3]])
-        return RecordedScene(goals=goals, boxes={key: box for key, box in boxes.items() if key != TARGET})
-
-
-def read_picked(file: Path) -> Mapping[str, str]:
-    """Return the object that was picked up by recording, from a table of trials; empty without the column `object`."""
-    found: dict[str, str] = {}
-
-    def parse(row: Row) -> None:
-        if row.cells.get('object') == '':
-            raise row.make_error('object', 'a name')
-        if 'object' in row.cells:
-            found[row.cells['recording']] = row.cells['object']
-
-    parse_rows(read_rows(file, ('recording',)), parse)
-    return found
-
-
-def read_boxes(file: Path) -> Mapping[str, Mapping[str, tuple[float, ...]]]:
-    """Return centre (3) and full lengths (3) [m] of each object by recording and name."""
-    found: dict[str, dict[str, tuple[float, ...]]] = {}
-
-    def parse(row: Row) -> None:
-        for column in ('recording', 'object'):
-            if not row.cells[column]:
-                raise row.make_error(column, 'a name')
-        boxes, name = found.setdefault(row.cells['recording'], {}), row.cells['object']
-        if name in boxes:
-            raise row.make_error('object', 'another name than the rows above of this recording')
-        boxes[name] = tuple(row.read_numbers(*COLUMNS))
-
-    parse_rows(read_rows(file, ('recording', 'object', *(each.name for each in COLUMNS))), parse)
-    return found
 
 
 def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, output: Path) -> str:
@@ -226,32 +144,23 @@ def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, outp
     InputError
         For a table of recordings without one of obstacles.
     """
-    scenes, movements = _read(table, obstacles, goals)
+    if obstacles is None and not table.is_dir():
+        raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
+    found = read_tables(table) if obstacles is None else _read_with_scenes(table, partial(read_scenes, obstacles, goals), table)
+    movements = collect_all(TableRecording.read_movement, [(each,) for each in found.values()])
     bags = {output / name: movement for name, movement in _name_bags(movements).items()}
     for bag in bags:
         if bag.exists():
             raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
     for bag, movement in show_progress(bags.items(), 'convert', len(bags)):
-        write_movement(bag, movement, scenes[movement.name])
+        with BagWriter(bag) as writer:
+            for stamp_ns, topic, message in recorded_messages(movement, found[movement.name].scene):
+                writer.write(topic, message, stamp_ns)
     hands = sum(len(each.stamps_ns) for each in movements)
-    numbers = [len(scenes[each.name].find_boxes(each.positions) or scenes[each.name].obstacles) for each in movements]
+    scenes = [(each, found[each.name].scene) for each in movements]
+    numbers = [len(scene.find_boxes(each.positions) or scene.obstacles) for each, scene in scenes]
     count = ' to '.join(str(each) for each in sorted({min(numbers), max(numbers)}))
     return f'{len(bags)} bags with {hands} hand poses and {count} obstacles written to {output}'
-
-
-def _read(table: Path, obstacles: Path | None, goals: Path | None) -> tuple[dict[str, RecordedScene], list[Movement]]:
-    """Return the scene of each recording by its name, and all movements."""
-    if obstacles is None and table.is_dir():
-        tables = read_tables(table)
-        movements = collect_all(TableRecording.read_movement, [(each,) for each in tables.values()])
-        return {name: each.scene for name, each in tables.items()}, movements
-    if obstacles is None:
-        raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
-    reading = [(read_movements, table), (read_scenes, obstacles, goals)]
-    movements, scenes = collect_all(lambda read, *files: read(*files), reading)
-    found = {each.name: scenes.find(each.name) for each in movements}
-    warn_of_far_scenes(table, [(each, found[each.name]) for each in movements])
-    return found, movements
 
 
 def _name_bags(movements: list[Movement]) -> dict[str, Movement]:

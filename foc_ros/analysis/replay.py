@@ -10,18 +10,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from foc_ros.analysis.recordings import Recording
-from foc_ros.core.classes.library import Demonstration
-from foc_ros.core.config import ONLINE, Config
+from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import FocError, MessageError, RecordingError, warn
+from foc_ros.core.errors import MessageError
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, HandSample, HandState, Prediction, SampleStatus
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
-from foc_ros.io.terminal import show_progress
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
 from foc_ros.ros.intake import DROPPED, Intake
 from foc_ros.ros.messages.encode_guidance import Place
@@ -204,33 +201,3 @@ class GuidanceReplay:
         # seconds since the epoch would be rounded to a quarter of a microsecond
         t = (now_ns - self._first_ns) / NANOSECONDS
         return GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages, acceleration=hand.mean[4:6])
-
-
-def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration, ...]:
-    """Return the movements of a recording that end at a goal (`foc_ros.core.learning.movements`), at most the last `MOST_LEARNT`.
-
-    Raises RecordingError where the recording cannot be read or contains none.
-    """
-    replayed = Replay(config.with_values({'experience.learning': ONLINE, 'homotopy.library': ''}))
-    for _ in replayed.take(recording.items()):
-        pass
-    movements = replayed.pipeline.learnt.movements.finish()
-    losses = replayed.describe_losses()
-    if not movements.learnt:
-        standing = f'no movement: the hand was never faster than {config.estimator.onset_speed:g} m/s'
-        unused = losses or replayed.pipeline.not_ready_reason()
-        raise RecordingError(f'{recording.name}: {movements.refusal or unused or standing}')
-    if losses:
-        warn(f'{recording.name}: {losses}')
-    return movements.learnt
-
-
-def learn_recordings(recordings: Mapping[str, Recording], config: Config) -> tuple[list[Demonstration], dict[str, str]]:
-    """Return the movements of all recordings, with a progress bar, and why recordings could not be used, by name."""
-    learnt, failed = list[Demonstration](), dict[str, str]()
-    for name, recording in show_progress(recordings.items(), 'learn', len(recordings)):
-        try:
-            learnt.extend(learn_recording(recording, config))
-        except FocError as error:
-            failed[name] = str(error)
-    return learnt, failed

@@ -53,7 +53,7 @@ def learn(data: Existing, /, *, output: Path, params: Params = DEFAULTS, json: b
     recordings = find_recordings(data)
     if len(recordings) > MOST_WAYS:
         raise InputError(f'{data}', f'at most {MOST_WAYS} recordings', len(recordings))
-    from foc_ros.analysis.replay import learn_recordings
+    from foc_ros.analysis.learn import learn_recordings
     from foc_ros.io.class_library import save_library
 
     learnt, failed = learn_recordings(recordings, params)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED, UNIFORM
-from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.report import GAP_TITLE, make_tables
 from foc_ros.analysis.evaluation.scores import TENTHS
 from foc_ros.analysis.recordings import Recording

@@ -8,15 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from foc_ros.analysis.fitting.fit import (
-    COMPARISON_COLUMNS,
-    PARAMETER_COLUMNS,
-    SCORE_COLUMNS,
-    format_comparison,
-    format_parameters,
-    format_scores,
-    make_verdict,
-)
+from foc_ros.analysis.fitting.fit import make_tables, make_verdict
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config
 from foc_ros.io.outputs import FIT_PAGE
@@ -57,15 +49,10 @@ def write_report(
     """
     count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
-    tables = (
-        ('Before and after', COMPARISON_COLUMNS, format_comparison(answer)),
-        ('Parameters', PARAMETER_COLUMNS, format_parameters(answer)),
-        ('Scores', SCORE_COLUMNS, format_scores(answer)),
-    )
     fitted = f'{len(answer["parameters"])} parameters were fitted to {count} recordings.'
     body = render_list([fitted, *make_verdict(answer)], 'In short')
     body += render_example(recordings, config) if recordings and config else ''
-    body += _draw_parameters(answer['parameters']) + render_tables(tables, EXPLANATIONS)
+    body += _draw_parameters(answer['parameters']) + render_tables(make_tables(answer), EXPLANATIONS)
     body += render_table((), commands, 'Run the node with these parameters')
     warnings = [*warn_of_few(count, 'recordings'), *answer['warnings'], *failed]
     write_page(directory, FIT_PAGE, render_page(f'Fit: {title}', body, warnings, config))

@@ -9,40 +9,34 @@ counts as the node publishes it: 0. Constant velocity, nearest gap and shortest 
 A baseline is added from outside by :func:`register_baseline`; the built-in ones are registered in the same way.
 
 **Straight minimum jerk** is the movement to a goal, obstacles disregarded: `core.hand.straight`.
-
-**The Singer model** of a manoeuvring target (Singer 1970, doi:10.1109/TAES.1970.310128) knows no scene. Per axis the state is
-(position, velocity, acceleration). The acceleration has the standard deviation sigma and decays with the time constant tau. It
-is driven by white noise, a' = -a / tau + w, of spectral density 2 sigma^2 / tau. A Kalman filter follows the recorded positions,
-and its state is propagated ahead. All settings are filtered together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import expm
+from scipy.interpolate import BPoly
 
-from foc_ros.analysis.evaluation.observations import GOAL, Answer, Observation, ObservedRecording, Question
 from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig
-from foc_ros.core.hand.straight import compute_straight_effort, compute_straight_jerk
+from foc_ros.core.hand.straight import compute_straight_effort
 from foc_ros.core.likelihood import OWN_SPREAD, compute_likelihoods
 from foc_ros.core.registry import Registry
-from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Record
+from foc_ros.core.types import LEFT, RIGHT, Array, Record
+
+from .observations import Observation, ObservedRecording
+from .questions import GOAL, Answer, Question
 
 UNCERTAINTY = 0.01
 TIE = 1e-12
-FIRST_SPEED = 1.0
-"""Standard deviation of the velocity at the first sample [m/s]."""
 PUBLISHED, REFITTED, PLAIN, UNIFORM, BOLTZMANN = 'foc', 'foc, held out', 'foc, plain rule', 'uniform', 'Boltzmann'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
-HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS = (
+PLANNING_HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS = (
     (0.0, 1.5, 2.5),
     (0.0, 0.5, 1.0),
     (1.0, 2.0, 3.0, 5.0),
@@ -138,11 +132,10 @@ def compute_straight_costs(observation: Observation) -> Array:
 
 def compute_straight_positions(observation: Observation, goal: int, seconds: Array) -> Array:
     """Return the positions (h, 2) [m] of the movement to a goal some seconds (h,) from now; at the goal once it has ended."""
-    state, times_s = _find_state(observation), _find_times(observation)[[goal]]
-    alpha, beta, gamma = (each[0] for each in compute_straight_jerk(state, observation.goals[[goal]], times_s))
-    t = np.minimum(seconds, times_s[0])[:, None]
-    x, v, a = state
-    return np.asarray(x + v * t + a * t**2 / 2 + (gamma * t**3 / 6 + beta * t**4 / 24 + alpha * t**5 / 120))
+    end, time_s = np.zeros((3, 2)), float(_find_times(observation)[goal])
+    end[0] = observation.goals[goal]
+    quintic = BPoly.from_derivatives([0.0, time_s], [_find_state(observation), end])
+    return np.asarray(quintic(np.minimum(seconds, time_s)))
 
 
 def _find_state(observation: Observation) -> Array:
@@ -154,78 +147,10 @@ def _find_state(observation: Observation) -> Array:
 
 
 def _find_times(observation: Observation) -> Array:
-    """Return the time to each goal, (g,) [s]."""
-    return np.array([_find_time(observation, goal) for goal in range(len(observation.goals))])
-
-
-def _find_time(observation: Observation, goal: int) -> float:
-    """Return the time that the predictor gave the movement to a goal, or the longest time where no candidate leads there."""
+    """Return the time (g,) [s] that the predictor gave the movement to each goal, the longest of all where it found no path."""
     candidates = observation.candidates
-    times = candidates.time_s[candidates.goal == goal]
-    return float(times[0]) if len(times) else float(candidates.time_s.max())
-
-
-class SingerSetting(NamedTuple):
-    """Standard deviations of the acceleration [m/s^2] and of a measured position [m], decay time of the acceleration [s]."""
-
-    acceleration_stddev: float
-    position_stddev: float
-    decay_s: float
-
-
-SINGER_SETTINGS = tuple(
-    SingerSetting(*each) for each in product(np.geomspace(0.05, 6.4, 8).tolist(), (2e-4, 1e-3), (0.1, 0.3, 1.0))
-)
-"""The settings that are tried."""
-
-
-def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array, ahead_s: Array) -> tuple[Array, Array]:
-    """Forecast the positions some times (h,) [s] after each of some stamps (m,) [ns], which are among those of the samples.
-
-    stamps_ns (n,), rising, and positions (n, 2) [m] of the samples. Returns the mean (m, s, h, 2) [m] and the variance (m, s, h)
-    [m^2] per axis under each of the s `SINGER_SETTINGS`; each forecast uses the samples up to its stamp.
-    """
-    accelerations, noises, _ = np.array(SINGER_SETTINGS).T
-    state, covariance = np.zeros((len(SINGER_SETTINGS), 3, 2)), np.zeros((len(SINGER_SETTINGS), 3, 3))
-    state[:, 0], covariance[:, 0, 0] = positions[0], noises**2
-    covariance[:, 1, 1], covariance[:, 2, 2] = FIRST_SPEED**2, accelerations**2
-    wanted, means, variances, last_ns = set(at_ns.tolist()), [], [], int(stamps_ns[0])
-    ahead = [_discretise(float(each)) for each in ahead_s]
-    for stamp_ns, position in zip(stamps_ns.tolist(), positions, strict=True):
-        if stamp_ns > last_ns:
-            state, covariance = _propagate(state, covariance, _discretise((stamp_ns - last_ns) / NANOSECONDS))
-            gain = covariance[:, :, 0] / (covariance[:, 0, 0] + noises**2)[:, None]
-            state = state + gain[:, :, None] * (position - state[:, 0])[:, None]
-            kept = np.eye(3) - gain[:, :, None] * np.eye(3)[0]
-            # Joseph form: the covariance stays positive
-            covariance = kept @ covariance @ kept.swapaxes(1, 2) + noises[:, None, None] ** 2 * gain[:, :, None] * gain[:, None]
-            last_ns = stamp_ns
-        if stamp_ns in wanted:
-            wanted.remove(stamp_ns)
-            later = [_propagate(state, covariance, each) for each in ahead]
-            means.append(np.stack([each[:, 0] for each, _ in later], axis=1))
-            variances.append(np.stack([each[:, 0, 0] for _, each in later], axis=1))
-    return np.array(means), np.array(variances)
-
-
-def _propagate(state: Array, covariance: Array, model: tuple[Array, Array]) -> tuple[Array, Array]:
-    transition, added = model
-    return transition @ state, transition @ covariance @ transition.swapaxes(1, 2) + added
-
-
-@lru_cache(maxsize=4096)
-def _discretise(dt: float) -> tuple[Array, Array]:
-    """Return transition and added covariance (s, 3, 3) over dt [s] for each setting, by Van Loan (1978)."""
-    rate = np.zeros((len(SINGER_SETTINGS), 6, 6))
-    accelerations, _, decays = np.array(SINGER_SETTINGS).T
-    drift = np.zeros((len(SINGER_SETTINGS), 3, 3))
-    drift[:, 0, 1] = drift[:, 1, 2] = 1.0
-    drift[:, 2, 2] = -1.0 / decays
-    rate[:, :3, :3], rate[:, 3:, 3:] = -drift, drift.swapaxes(1, 2)
-    rate[:, 2, 5] = 2.0 * accelerations**2 / decays
-    grown = expm(rate * dt)
-    transition = grown[:, 3:, 3:].swapaxes(1, 2)
-    return transition, transition @ grown[:, :3, 3:]
+    of_goal = [candidates.time_s[candidates.goal == goal] for goal in range(len(observation.goals))]
+    return np.array([each[0] if len(each) else candidates.time_s.max() for each in of_goal])
 
 
 ForecastFunction = Callable[[Observation, Question, Any], Forecast]
@@ -286,7 +211,7 @@ def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig
     """Return all parameters of the likelihood that are tried: one exponent for all choices, or near and far ones that differ."""
     ahead = (
         replace(make_ahead(published, horizon, seconds, beta), weaving=weaving)
-        for horizon, seconds, beta, weaving in product(HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS)
+        for horizon, seconds, beta, weaving in product(PLANNING_HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS)
     )
     return (*make_plain_rules((), published), *ahead)
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from foc_ros.analysis.csv_recordings import NO_GOAL
 from foc_ros.analysis.recordings import Recording, TableRecording
+from foc_ros.analysis.scenes import NO_GOAL
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.types import Array
 

@@ -1,34 +1,28 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""All predictors scored on all recordings: the result as plain values for JSON, as sentences, and as tables."""
+"""All predictors scored on all recordings: the result as plain values for JSON, sentences and tables; and labels checked."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
-from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, Observation, ObservedRecording, ask_all
-from foc_ros.analysis.evaluation.scores import (
-    TENTHS,
-    Scores,
-    choose_held_out,
-    compute_log_likelihoods,
-    compute_mean_interval,
-    compute_position_scores,
-    find_tenths,
-    score_forecasts,
-    summarise,
-)
 from foc_ros.analysis.parallel import collect_all
-from foc_ros.analysis.recordings import LABELS, TRIALS, read_picked
+from foc_ros.analysis.recordings import LABELS, TRIALS
+from foc_ros.analysis.scenes import read_picked
 from foc_ros.core.config import Config, flatten
-from foc_ros.core.types import LEFT, NANOSECONDS, Array
+from foc_ros.core.types import LEFT, Array
 from foc_ros.io.csv_tables import read_rows
+
+from .baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
+from .observations import Observation, ObservedRecording
+from .positions import compute_position_scores
+from .questions import GAP, GOAL, PATH_CLASS, Questions, ask_all
+from .scores import TENTHS, Scores, choose_held_out, compare_scores, compute_log_likelihoods, score_forecasts, summarise
 
 FITTED_TO = {PATH_CLASS: PATH_CLASS, GAP: PATH_CLASS, GOAL: GOAL}
 """The question by whose answers the settings of a predictor are chosen, for each question that it is scored by."""
@@ -62,22 +56,23 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
     What is fitted is scored on recordings that it was not fitted to. `questions`: values of `scores.summarise` by question and
     predictor; for `gap`, tenths and `right_from_half_way` count from row to row, else over the whole movement. `settings`: by
     question and predictor, the best for all recordings. `comparisons`: of the published predictions with each baseline, by
-    question. `positions`: values of `scores.compute_position_scores`. `verdict`: sentences.
+    question. `positions`: values of `positions.compute_position_scores`. `verdict`: sentences.
     """
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
     tables = collect_all(_tabulate_log_likelihoods, items, 'compare')
     table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
-    asked = [name for name in FITTED_TO if any(ask_all(recording, name) for recording in recordings)]
+    names = [each.name for each in recordings]
+    asked = {name: [ask_all(each, name) for each in recordings] for name in FITTED_TO}
+    asked = {name: questions for name, questions in asked.items() if any(questions)}
     scores = {
-        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], recordings, name) for each in baselines}
-        for name in asked
+        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], names, questions) for each in baselines}
+        for name, questions in asked.items()
     }
-    left_s = {name: _find_times_left(recordings, name) for name in asked}
     answer = {
         'recordings': len(recordings),
         'predictions': sum(len(recording.observations) for recording in recordings),
-        'questions': {name: {other: summarise(each, left_s[name]) for other, each in scores[name].items()} for name in asked},
+        'questions': {name: {other: summarise(each) for other, each in scores[name].items()} for name in asked},
         'comparisons': {
             name: {
                 other: compare_scores(scores[name][PUBLISHED], each, is_share=name == GAP)
@@ -97,29 +92,19 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
     return answer | {'verdict': make_verdict(answer)}
 
 
-def _find_times_left(recordings: Sequence[ObservedRecording], name: str) -> Array:
-    """Return the time [s] to the end of the movement from each observation to which a question is put, (m,)."""
-    return np.array([(each.path.end_ns - seen.stamp_ns) / NANOSECONDS for each in recordings for seen, _ in ask_all(each, name)])
-
-
 def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> LogLikelihoods:
     recording, baselines = item
     questions = {name: ask_all(recording, name) for name in (PATH_CLASS, GOAL)}
     return {(name, each.name): compute_log_likelihoods(questions[name], each) for name in questions for each in baselines}
 
 
-def _score_held_out(baseline: Baseline, table: Array, recordings: Sequence[ObservedRecording], name: str) -> Scores:
-    """Score a predictor, on each recording with the setting that is best for the others by a table (r, s)."""
-    choices = choose_held_out(table, [each.name for each in recordings])
+def _score_held_out(baseline: Baseline, table: Array, names: Sequence[str], questions: Sequence[Questions]) -> Scores:
+    """Score a predictor, on the questions of each recording with the setting that is best for the others by a table (r, s)."""
+    choices = choose_held_out(table, names)
     return score_forecasts(
-        (
-            number,
-            observation.truth.approach if name == GAP else observation.truth.progress,
-            question,
-            baseline.forecast(observation, question, baseline.settings[choices[number]]),
-        )
-        for number, recording in enumerate(recordings)
-        for observation, question in ask_all(recording, name)
+        (number, observation, question, baseline.forecast(observation, question, baseline.settings[choice]))
+        for number, (choice, asked) in enumerate(zip(choices, questions, strict=True))
+        for observation, question in asked
     )
 
 
@@ -134,43 +119,36 @@ def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -
     has the side of each box by the end of its name; where it says which object was picked up instead, that is the truth already.
     Raises RecordingError for a table that cannot be read.
     """
-    if (data / TRIALS).exists() and read_picked(data / TRIALS):
+    trials, labels = data / TRIALS, data / LABELS
+    compare: Callable[[Observation, Mapping[str, str]], str]
+    if trials.exists() and not read_picked(trials):
+        rows, compare = read_rows(trials, ('recording', 'sides')), _compare_sides
+    elif labels.exists() and not trials.exists():
+        rows, compare = read_rows(labels, ('recording',)), _compare_gaps
+    else:
         return {}
-    if (data / TRIALS).exists():
-        return _find_side_mismatches(data / TRIALS, recordings)
-    if not (data / LABELS).exists():
-        return {}
-    labels = {row.cells['recording']: row.cells for row in read_rows(data / LABELS, ('recording',))}
-    found = {}
-    for recording in recordings:
-        cells = labels.get(recording.name)
-        if cells is None:
-            found[recording.name] = 'no label'
-            continue
-        labelled = [text for column, text in cells.items() if column != 'recording']
-        taken = [str(gap) for gap in find_gaps(recording.observations[0])]
-        if labelled != taken:
-            found[recording.name] = f'label {" ".join(labelled)}, path {" ".join(taken)}'
-    return found
+    stated = {row.cells['recording']: row.cells for row in rows}
+    differences = {
+        each.name: compare(each.observations[0], stated[each.name]) if each.name in stated else 'no label' for each in recordings
+    }
+    return {name: words for name, words in differences.items() if words}
 
 
-def _find_side_mismatches(file: Path, recordings: Sequence[ObservedRecording]) -> dict[str, str]:
-    labels = {row.cells['recording']: row.cells['sides'] for row in read_rows(file, ('recording', 'sides'))}
-    found = {}
-    for recording in recordings:
-        first = recording.observations[0]
-        names = [identity.rpartition('/')[0] for identity in first.ids]
-        taken = {name: 'left' if side == LEFT else 'right' for name, side in zip(names, first.truth.sides, strict=True)}
-        labelled = [each.rpartition('=') for each in labels.get(recording.name, '').split()]
-        others = [
-            f'{name} label {side}, path {taken[full]}'
-            for name, _, side in labelled
-            for full, is_ahead in zip(names, first.truth.is_ahead, strict=True)
-            if is_ahead and full.endswith(name) and taken[full] != side
-        ]
-        if others or recording.name not in labels:
-            found[recording.name] = '; '.join(others) or 'no label'
-    return found
+def _compare_gaps(first: Observation, cells: Mapping[str, str]) -> str:
+    labelled = [text for column, text in cells.items() if column != 'recording']
+    taken = [str(gap) for gap in find_gaps(first)]
+    return '' if labelled == taken else f'label {" ".join(labelled)}, path {" ".join(taken)}'
+
+
+def _compare_sides(first: Observation, cells: Mapping[str, str]) -> str:
+    differences = []
+    for label in cells['sides'].split():
+        name, _, side = label.rpartition('=')
+        for identity, taken, is_ahead in zip(first.ids, first.truth.sides, first.truth.is_ahead, strict=True):
+            words = 'left' if taken == LEFT else 'right'
+            if is_ahead and identity.rpartition('/')[0].endswith(name) and words != side:
+                differences.append(f'{name} label {side}, path {words}')
+    return '; '.join(differences)
 
 
 def find_gaps(observation: Observation) -> list[int]:
@@ -179,21 +157,6 @@ def find_gaps(observation: Observation) -> list[int]:
     left_is_low = observation.left[0] < 0.0
     is_higher = (truth.sides == LEFT) != left_is_low
     return [int(is_higher[(row == each) & truth.is_ahead].sum()) for each in np.unique(row[truth.is_ahead])]
-
-
-def compare_scores(ours: Scores, other: Scores, is_share: bool) -> dict[str, Any]:
-    """Return the mean difference of two predictors in the same predictions, with its interval, and the tenths that are worse.
-
-    is_share: compare the shares of correct answers instead of the log-likelihoods of the true ones.
-    """
-    difference = ours.correct - other.correct if is_share else ours.log_likelihood - other.log_likelihood
-    tenths = find_tenths(ours.progress)
-    by_tenth = [difference[tenths == each] for each in range(TENTHS)]
-    return {
-        'difference': float(difference.mean()),
-        'interval': compute_mean_interval(difference, ours.recording),
-        'worse_tenths': [number for number, each in enumerate(by_tenth, 1) if len(each) and each.mean() < 0.0],
-    }
 
 
 def make_verdict(answer: Mapping[str, Any]) -> list[str]:

@@ -10,14 +10,16 @@ value: where its profile, the best log-likelihood over all other parameters, is 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.analysis.evaluation.scores import CENTRAL, choose_held_out, resample
+from foc_ros.analysis.evaluation.scores import choose_held_out
+from foc_ros.analysis.intervals import CENTRAL, resample
 from foc_ros.core.config import list_parameters
 from foc_ros.core.types import Array
 
@@ -30,7 +32,7 @@ Setting = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings (nan: none), and its data."""
+    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings, and its data."""
 
     name: str
     value: float
@@ -45,9 +47,8 @@ class Estimate:
         return cls(name, value, min(low, value), max(high, value), how)
 
     def as_json(self) -> dict[str, Any]:
-        """Return plain values; an unknown end of the interval is null."""
-        ends = [None if math.isnan(end) else end for end in (self.low, self.high)]
-        return {'value': self.value, 'interval': ends, 'how': self.how}
+        """Return plain values."""
+        return {'value': self.value, 'interval': [self.low, self.high], 'how': self.how}
 
 
 @dataclass
@@ -67,12 +68,34 @@ class Findings:
         """The values that were found, by name."""
         return {name: each.value for name, each in self.estimates.items()} | self.chosen
 
+    def take(self, later: Findings) -> None:
+        """Add what a later step found; what an earlier step determined stays determined."""
+        for name, each in later.estimates.items():
+            before = self.estimates.get(name, each)
+            how = each.how if before.how == each.how else f'{before.how}, then {each.how}'
+            ends = (before.low, before.high) if before.value == each.value else (each.low, each.high)
+            self.estimates[name] = replace(each, low=min(each.low, ends[0]), high=max(each.high, ends[1]), how=how)
+        self.chosen |= later.chosen
+        undetermined = self.undetermined | later.undetermined
+        self.undetermined = {name: why for name, why in undetermined.items() if name not in self.values}
+        self.warnings += later.warnings
+
+
+def is_cross_validated(recordings: Sequence[object]) -> bool:
+    """Return whether there are enough recordings to hold one out."""
+    return len(recordings) >= 3
+
 
 def clip_to_bounds(name: str, value: float, least: float = 0.0) -> float:
     """Return a value within the bounds of a parameter, and not below `least`; rounded, so that a file reads well."""
     bound = BOUNDS[name]
     assert bound.low is not None and bound.high is not None
     return float(f'{min(max(value, bound.low, least), bound.high):.6g}')
+
+
+def list_settings(values: Mapping[str, Iterable[float]]) -> tuple[Setting, ...]:
+    """Return all combinations of values by name, each value once."""
+    return tuple(dict(zip(values, each, strict=True)) for each in product(*map(dict.fromkeys, values.values())))
 
 
 @dataclass(frozen=True)
@@ -99,8 +122,18 @@ class SettingTable:
         """Return the column of some, for each recording (n,), that is best for the other groups."""
         return np.array(columns)[choose_held_out(np.nan_to_num(self.values[:, columns]), groups)]
 
-    def score(self, chosen: int | NDArray[np.intp]) -> float:
-        """Return the mean over the recordings under the column chosen for all, or for each of them (n,)."""
+    def list_choices(
+        self, given: Setting, columns: Sequence[int] | NDArray[np.intp], names: Sequence[str]
+    ) -> dict[str, NDArray[np.intp]]:
+        """Return the columns chosen for the recordings (n,), of these names, by how they were chosen from some."""
+        n = len(self.values)
+        choices = {'as given': np.full(n, self.settings.index(given)), 'fitted': np.full(n, self.find_best(columns))}
+        if is_cross_validated(names):
+            choices['without the recording'] = self.choose_held_out(columns, names)
+        return choices
+
+    def score(self, chosen: NDArray[np.intp]) -> float:
+        """Return the mean over the recordings under the column chosen for each of them (n,)."""
         return float(np.nanmean(self.values[np.arange(len(self.values)), chosen]))
 
     def determine(self, given: Setting) -> tuple[NDArray[np.intp], dict[str, str]]:

@@ -30,18 +30,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from foc_ros.analysis.evaluation.observations import HORIZONS_S, RecordedPath, find_open_gaps
-from foc_ros.analysis.evaluation.scores import CENTRAL, resample
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedPath, find_open_gaps
+from foc_ros.analysis.intervals import CENTRAL, resample
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.classes.rows import find_direction, find_rows, locate_rows
-from foc_ros.core.config import Config, DurationConfig, EstimatorConfig, clip_values, flatten, replace_values
+from foc_ros.core.config import Config, EstimatorConfig, clip_values, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.hand.duration import estimate_times_to_go
@@ -49,7 +48,7 @@ from foc_ros.core.hand.kalman import Update, compute_gramian, compute_transition
 from foc_ros.core.learning.movements import has_covered_distance
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Record, SampleStatus
 
-from . import Estimate, Findings, SettingTable, clip_to_bounds
+from . import Estimate, Findings, SettingTable, clip_to_bounds, list_settings
 
 MIN_SAMPLES = 10
 POSITION_STDDEV, JERK_DENSITY = 'estimator.position_stddev', 'estimator.jerk_density'
@@ -111,10 +110,6 @@ class RecordedHand(Record):
             state = updates[-1].state
         return updates
 
-    def estimate_states(self, config: Config) -> list[HandState]:
-        """Return the state that the estimator of a configuration gives at each sample."""
-        return [each.state for each in self.filter(config.estimator)]
-
 
 def read_hand(recording: Recording, config: Config) -> RecordedHand:
     """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
@@ -136,66 +131,53 @@ def read_hand(recording: Recording, config: Config) -> RecordedHand:
     return RecordedHand(recording.name, stamps_ns, positions, obstacles, goals, samples[0].frame_id)
 
 
-class Innovations:
-    """The recordings side by side, so that one pass filters all of them under all settings.
+def tabulate_innovations(
+    hands: Sequence[RecordedHand], given: EstimatorConfig, position_stddevs: Sequence[float], jerk_densities: Sequence[float]
+) -> SettingTable:
+    """Return the log-likelihood of the positions of each recording under all combinations of deviations.
 
     Every filter that is tried starts anew where the given one does not continue, so that all are compared by the same samples.
     """
+    settings = list_settings({POSITION_STDDEV: position_stddevs, JERK_DENSITY: jerk_densities})
+    position, jerk = np.array([tuple(each.values()) for each in settings]).T ** 2
+    return SettingTable(np.array([_compute_log_likelihoods(each, given, position, jerk) for each in hands]), settings)
 
-    def __init__(self, hands: Sequence[RecordedHand], given: EstimatorConfig) -> None:
-        most = max(len(each.times) for each in hands)
-        dt = np.full((most - 1, len(hands)), given.gap_s)
-        self._continues = np.zeros(dt.shape, dtype=bool)
-        self._positions = np.zeros((most, len(hands), 2))
-        for row, each in enumerate(hands):
-            continues = [updated.status is SampleStatus.ACCEPTED for updated in each.filter(given)[1:]]
-            self._continues[: len(continues), row] = continues
-            dt[: len(continues), row] = np.where(continues, np.diff(each.times), given.gap_s)
-            self._positions[: len(each.times), row] = each.positions
-        self._transition = np.array([[compute_transition(each) for each in row] for row in dt])
-        self._gramian = np.array([[compute_gramian(each) for each in row] for row in dt])
-        self._start = compute_gramian(given.gap_s)
 
-    def tabulate(self, position_stddevs: Sequence[float], jerk_densities: Sequence[float]) -> SettingTable:
-        """Return the log-likelihood of the positions of each recording under all combinations of deviations."""
-        deviations = list(product(position_stddevs, jerk_densities))
-        position, jerk = (column[:, None] ** 2 for column in np.array(deviations).T)
-        n = self._positions.shape[1]
-        start = np.zeros((len(deviations), 1, 3, 3))
-        start[..., 1:, 1:] = jerk[..., None, None] * self._start[1:, 1:]
-        start[:, 0, 0, 0] = position[:, 0]
-        mean = np.zeros((len(deviations), n, 3, 2))
-        mean[:, :, 0] = self._positions[0]
-        covariance, total = np.repeat(start, n, axis=1), np.zeros((len(deviations), n))
-        for A, G, continues, z in zip(self._transition, self._gramian, self._continues, self._positions[1:], strict=True):
-            mean, covariance = A @ mean, A @ covariance @ A.swapaxes(1, 2) + jerk[..., None, None] * G
-            S = np.maximum(covariance[..., 0, 0], 0.0) + position
-            v = z - mean[:, :, 0]
-            total -= np.where(continues, np.log(2.0 * np.pi * S) + (v**2).sum(axis=-1) / (2.0 * S), 0.0)
-            gain = covariance[..., 0] / S[..., None]
-            mean = mean + gain[..., None] * v[:, :, None, :]
-            covariance = covariance - gain[..., None] * covariance[..., None, 0, :]
-            if not continues.all():
-                mean[:, ~continues] = 0.0
-                mean[:, ~continues, 0] = z[~continues]
-                covariance[:, ~continues] = start
-        names = POSITION_STDDEV, JERK_DENSITY
-        return SettingTable(total.T, tuple(dict(zip(names, each, strict=True)) for each in deviations))
+def _compute_log_likelihoods(hand: RecordedHand, given: EstimatorConfig, position: Array, jerk: Array) -> Array:
+    """Return the log-likelihood of the positions under each setting of the variances (s,)."""
+    start = jerk[:, None, None] * compute_gramian(given.gap_s)
+    start[:, 0] = start[:, :, 0] = 0.0
+    start[:, 0, 0] = position
+    mean, covariance, total, last_ns = np.zeros((len(jerk), 3, 2)), start, np.zeros(len(jerk)), None
+    for stamp_ns, z, updated in zip(hand.stamps_ns.tolist(), hand.positions, hand.filter(given), strict=True):
+        if last_ns is None or updated.status is not SampleStatus.ACCEPTED:
+            mean, covariance = np.zeros_like(mean), start
+            mean[:, 0] = z
+        else:
+            dt = (stamp_ns - last_ns) / NANOSECONDS
+            A = compute_transition(dt)
+            mean, covariance = A @ mean, A @ covariance @ A.T + jerk[:, None, None] * compute_gramian(dt)
+            S, v = np.maximum(covariance[:, 0, 0], 0.0) + position, z - mean[:, 0]
+            total -= np.log(2.0 * np.pi * S) + (v**2).sum(axis=-1) / (2.0 * S)
+            gain = covariance[:, :, 0] / S[:, None]
+            mean = mean + gain[..., None] * v[:, None, :]
+            covariance = covariance - gain[..., None] * covariance[:, None, 0, :]
+        last_ns = stamp_ns
+    return total
 
 
 def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the deviations of the filter."""
-    innovations, how = Innovations(hands, config.estimator), 'innovations of the filter'
     given = {POSITION_STDDEV: config.estimator.position_stddev, JERK_DENSITY: config.estimator.jerk_density}
     ranges = dict(zip(given, (POSITION_STDDEVS, JERK_DENSITIES), strict=True))
-    coarse = innovations.tabulate(*([given[name], *ranges[name]] for name in given))
+    coarse = tabulate_innovations(hands, config.estimator, *([given[name], *ranges[name]] for name in given))
     columns, undetermined = coarse.determine(given)
     best = coarse.settings[coarse.find_best(columns)]
     finer = {
         name: [given[name], *(() if name in undetermined else np.clip(best[name] * FINE, ranges[name][0], ranges[name][-1]))]
         for name in given
     }
-    fine = innovations.tabulate(*finer.values())
+    fine, how = tabulate_innovations(hands, config.estimator, *finer.values()), 'innovations of the filter'
     return SettingTable(np.hstack([coarse.values, fine.values]), coarse.settings + fine.settings).estimate(given, how)[0]
 
 
@@ -210,7 +192,7 @@ def fit_fading(hands: Sequence[RecordedHand], config: Config) -> Findings:
 
 def _compute_fading_errors(hand: RecordedHand, config: Config) -> Array | None:
     """Return the mean error of a recording for each of `FADING_TIMES_S` [m/s]; None where nothing can be compared."""
-    states, times = hand.estimate_states(config), hand.times
+    states, times = [each.state for each in hand.filter(config.estimator)], hand.times
     is_moving = np.array([state.onset_ns is not None for state in states])
     mean, fading = np.array([state.mean for state in states]), np.array(FADING_TIMES_S[1:])
     errors = []
@@ -224,49 +206,33 @@ def _compute_fading_errors(hand: RecordedHand, config: Config) -> Array | None:
     return together.mean(axis=0) if len(together) else None
 
 
-class TimesToGo:
-    """The samples in movement of each recording that reached a goal."""
-
-    def __init__(self, hands: Sequence[RecordedHand], config: Config) -> None:
-        samples = [find_samples(each, config) for each in hands]
-        self.samples = [each for each in samples if each]
-
-    def compute_errors(self, duration: DurationConfig) -> Array:
-        """Return the mean absolute error of the time to go in each recording, (n,) [s]."""
-        return np.array(
-            [
-                np.mean([abs(estimate_times_to_go(hand, goal[None], duration)[0] - left) for hand, goal, left in each])
-                for each in self.samples
-            ]
-        )
-
-    def measure_variety(self, width: float) -> float:
-        """Return the standard deviation of the index of difficulty of the movements [bit]."""
-        distances = [np.hypot(*(each[0][1] - each[0][0].onset_position)) for each in self.samples]  # type: ignore[operator]
-        return float(np.log2(np.array(distances) / width + 1.0).std())
-
-
 def find_samples(hand: RecordedHand, config: Config) -> list[Sample]:
     """Return the samples in movement of a recording that covered the distance to a goal; none of another one."""
     path = hand.path
     if path.goal is None or not has_covered_distance(hand.positions, hand.goals[path.goal]):
         return []
-    left = [(state, (path.end_ns - state.stamp_ns) / NANOSECONDS) for state in hand.estimate_states(config)]
-    goal = hand.goals[path.goal]
-    return [(state, goal, seconds) for state, seconds in left if state.onset_ns is not None and seconds > MIN_TIME_S]
+    states, goal = [each.state for each in hand.filter(config.estimator)], hand.goals[path.goal]
+    left = [(state, goal, (path.end_ns - state.stamp_ns) / NANOSECONDS) for state in states if state.onset_ns is not None]
+    return [each for each in left if each[2] > MIN_TIME_S]
 
 
 def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the constants of the configured model of duration."""
-    times, powers = TimesToGo(hands, config), CONSTANTS[config.duration.model]
+    samples = [moving for hand in hands if (moving := find_samples(hand, config))]
+    powers = CONSTANTS[config.duration.model]
     names, exponents = tuple(powers), np.array(list(powers.values()))
-    if not times.samples:
+    if not samples:
         return Findings(undetermined=dict.fromkeys(names, 'no recording has a movement that ends near a goal'))
     given = np.array([flatten(config)[name] for name in names], dtype=float)
 
     def compute_errors(values: Array) -> Array:
+        """Return the mean absolute error of the time to go in each recording, (n,) [s]."""
         leaves = [name.partition('.')[2] for name in names]
-        return times.compute_errors(clip_values(config.duration, dict(zip(leaves, values.tolist(), strict=True))))
+        duration = clip_values(config.duration, dict(zip(leaves, values.tolist(), strict=True)))
+        errors = [
+            [abs(estimate_times_to_go(hand, goal[None], duration)[0] - left) for hand, goal, left in each] for each in samples
+        ]
+        return np.array([np.mean(each) for each in errors])
 
     tried = [given * factor**exponents for factor in FACTORS]
     errors = np.array([compute_errors(each) for each in tried])
@@ -274,21 +240,24 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
     _, undetermined = SettingTable.from_errors(errors.T, settings).determine(settings[FACTORS.index(1.0)])
     if undetermined:
         return Findings(undetermined=undetermined)
-    best, warnings = _find_best_factor(errors), []
+    best, found = _find_best_factor(errors), Findings()
     value = given * best**exponents
-    if len(names) > 1 and (deviation_bits := times.measure_variety(config.duration.target_width)) > NARROW_BITS:
-        value = np.abs(minimize(lambda each: float(compute_errors(np.abs(each)).mean()), value, method='Nelder-Mead').x)
-    elif len(names) > 1:
-        warnings.append(
-            'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
-            f'(indices of difficulty with a standard deviation of {deviation_bits:.2g} bit, {NARROW_BITS:g} are needed): '
-            'their ratio is kept'
-        )
+    if len(names) > 1:
+        distances = np.array([np.hypot(*(each[0][1] - each[0][0].onset_position)) for each in samples])  # type: ignore[operator]
+        deviation_bits = float(np.log2(distances / config.duration.target_width + 1.0).std())
+        if deviation_bits > NARROW_BITS:
+            value = np.abs(minimize(lambda each: float(compute_errors(np.abs(each)).mean()), value, method='Nelder-Mead').x)
+        else:
+            found.warnings.append(
+                'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
+                f'(indices of difficulty with a standard deviation of {deviation_bits:.2g} bit, {NARROW_BITS:g} are needed): '
+                'their ratio is kept'
+            )
     factors = np.percentile(resample(lambda rows: _find_best_factor(errors[:, rows]), errors.shape[1]) / best, CENTRAL)
-    estimates = {}
     for name, each, power in zip(names, value.tolist(), exponents, strict=True):
-        estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, each), each * factors**power, 'time to go')
-    return Findings(estimates, warnings=warnings)
+        resampled = each * factors**power
+        found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, each), resampled, 'time to go')
+    return found
 
 
 def _find_best_factor(errors: Array) -> float:
@@ -319,7 +288,7 @@ def fit_wait(hands: Sequence[RecordedHand], config: Config) -> Findings:
 def _compute_mean_wait(hand: RecordedHand, config: Config) -> float | None:
     """Return the mean time [s] from the samples at rest to the movement that follows, until the goal is reached."""
     waits, onset_ns = list[float](), None
-    for state in reversed(hand.estimate_states(config)):
+    for state in [each.state for each in reversed(hand.filter(config.estimator))]:
         if state.stamp_ns > hand.path.end_ns:
             continue
         if state.onset_ns is not None:

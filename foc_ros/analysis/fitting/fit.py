@@ -16,37 +16,19 @@ from typing import Any
 import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import Forecast, published_shares
-from foc_ros.analysis.evaluation.observations import GAP, ObservedRecording, ask_all, ask_main, observe
+from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.positions import compute_position_scores
+from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
 from foc_ros.analysis.evaluation.report import OURS
-from foc_ros.analysis.evaluation.scores import compute_position_scores
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
-from . import Estimate, Findings, clip_to_bounds
-from .direct import (
-    RecordedHand,
-    fit_duration,
-    fit_estimator,
-    fit_fading,
-    fit_max_candidates,
-    fit_wait,
-    read_hand,
-)
-from .search import (
-    COVERAGE_LEVEL,
-    Replays,
-    fit_likelihood,
-    fit_widening,
-    is_cross_validated,
-    make_eta_settings,
-    make_movement_settings,
-    make_noise_settings,
-    observe_by_motor_noise,
-    sample_names,
-    search_settings,
-)
+from . import Findings, clip_to_bounds, is_cross_validated
+from .direct import RecordedHand, fit_duration, fit_estimator, fit_fading, fit_max_candidates, fit_wait, read_hand
+from .one_replay import COVERAGE_LEVEL, NO_WIDENING, fit_likelihood, fit_widening
+from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
 
 PREDICTIONS = 10
 """About as many predictions are made in each recording, because neighbours say the same."""
@@ -60,10 +42,7 @@ WORSE_COVERAGE = 0.01
 """Fall of the share of true positions in the region of 90 % that is told."""
 SMALLER_IS_BETTER = ('error_m', 'nlpd')
 """Measures that begin with one of these are better if they are smaller."""
-PARAMETER_COLUMNS = ('parameter', 'given', 'fitted', '95 %', 'data')
-SCORE_COLUMNS = ('score', 'setting', 'value')
 CHANGES = ('better', 'worse')
-COMPARISON_COLUMNS = ('with the same recordings', 'before', 'after', '')
 COMPARISON_TITLES = {
     'class_gain': ('log-likelihood of the answer taken, above uniform [nat]', 1.0, 3),
     'gap_right': ('next gap correct [%]', 100.0, 1),
@@ -88,34 +67,20 @@ Rows = list[tuple[str, ...]]
 class Fit:
     """The state of a fit.
 
-    config; recordings: how many are used; estimates, chosen, undetermined and warnings: as of `Findings`; failed recordings with
-    reasons; scores as plain values; comparison: of the given parameters with the fitted ones.
+    config: with what was found so far; found; recordings: how many are used; failed recordings with reasons; scores as plain
+    values; comparison: of the given parameters with the fitted ones.
     """
 
     config: Config
+    found: Findings = field(default_factory=Findings)
     recordings: int = 0
-    estimates: dict[str, Estimate] = field(default_factory=dict)
-    chosen: dict[str, str] = field(default_factory=dict)
-    undetermined: dict[str, str] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)
     scores: dict[str, Any] = field(default_factory=dict)
     comparison: dict[str, dict[str, float | None]] = field(default_factory=dict)
 
     def take(self, found: Findings) -> None:
-        """Take what a step found into the configuration; what an earlier step determined stays determined."""
-        for name, each in found.estimates.items():
-            before = self.estimates.get(name)
-            how = each.how if before is None or before.how == each.how else f'{before.how}, then {each.how}'
-            low, high = each.low, each.high
-            if before is not None and before.value == each.value:
-                low, high = min(low, before.low), max(high, before.high)
-            self.estimates[name] = Estimate(name, each.value, low, high, how)
-        self.chosen |= found.chosen
-        self.undetermined |= found.undetermined
-        for name in (*self.estimates, *self.chosen):
-            self.undetermined.pop(name, None)
-        self.warnings.extend(found.warnings)
+        """Take what a step found into the configuration."""
+        self.found.take(found)
         self.config = replace_values(self.config, found.values)
 
 
@@ -132,18 +97,18 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     for step in (fit_estimator, fit_fading, fit_duration, fit_wait, fit_max_candidates):
         fit.take(step(hands, fit.config))
     if config.foc.strategy == 'fixed':
-        fit.warnings.append(f'foc.tau, foc.lam: kept as they are; {BY_EXAMPLE} finds them from movements')
+        fit.found.warnings.append(f'foc.tau, foc.lam: kept as they are; {BY_EXAMPLE} finds them from movements')
     duration_s = float(np.median([each.times[-1] for each in hands]))
     rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
     thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
     _search(hands, fit, Replays(usable, thinned | UNSCALED), may_lower_eta)
     _fit_to_one_replay(usable, fit, thinned | UNSCALED)
     given = flatten(config)
-    fit.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
+    fit.found.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
     fit.config = replace_values(fit.config, UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
     fit.comparison = compare_configs(compared, (config, fit.config), thinned)
-    fit.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
+    fit.found.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
     return fit
 
 
@@ -156,19 +121,20 @@ def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower
 
     if not any(len(each.obstacles) for each in hands):
         reason = 'no recording has an obstacle, without which neither margins nor noise show'
-        fit.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
+        fit.found.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
     elif fit.config.foc.strategy != 'fixed':
         # with strategy `fixed` eta has no effect, and lambda holds for the noise as it is
         take_best('noise', make_noise_settings(fit.config))
         take_best('eta', make_eta_settings(fit.config, may_lower_eta))
         if not may_lower_eta:
-            fit.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
+            fit.found.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
     take_best('movement', make_movement_settings(hands, fit.config))
 
 
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
-    observed, failed = observe_by_motor_noise(recordings, replace_values(fit.config, thinned), 'replay')
+    by_motor_noise = replace_values(fit.config, {**thinned, **NO_WIDENING})
+    observed, failed = collect(partial(observe, config=by_motor_noise), list(recordings.items()), 'replay')
     fit.failed.update(failed)
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
@@ -177,7 +143,7 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
         fit.take(found)
         fit.scores.update(scores)
     if not is_cross_validated(observed):
-        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
+        fit.found.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
 
 
 def compare_configs(
@@ -247,16 +213,16 @@ def find_lower_coverage(fit: Fit) -> list[str]:
 
 def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
     """Return a fit as plain values; node: the commands that run the node with it, without and with a ROS installation."""
-    before, options = flatten(given), f'--ros-args --params-file {output}'
+    before, found, options = flatten(given), fit.found, f'--ros-args --params-file {output}'
     return {
         'recordings': fit.recordings,
         'failed': fit.failed,
-        'parameters': {name: {**each.as_json(), 'given': before[name]} for name, each in fit.estimates.items()},
-        'chosen': {name: {'value': value, 'given': before[name]} for name, value in fit.chosen.items()},
-        'undetermined': {name: {'given': before[name], 'why': why} for name, why in fit.undetermined.items()},
+        'parameters': {name: {**each.as_json(), 'given': before[name]} for name, each in found.estimates.items()},
+        'chosen': {name: {'value': value, 'given': before[name]} for name, value in found.chosen.items()},
+        'undetermined': {name: {'given': before[name], 'why': why} for name, why in found.undetermined.items()},
         'scores': fit.scores,
         'comparison': fit.comparison,
-        'warnings': fit.warnings,
+        'warnings': found.warnings,
         'output': str(output),
         'node': [f'python -m foc_ros node {options}', f'ros2 run foc_ros foc_node {options}'],
     }
@@ -307,7 +273,7 @@ def make_verdict(answer: Mapping[str, Any]) -> list[str]:
     return judged or ['The fitted parameters change no measure.']
 
 
-def format_scores(answer: Mapping[str, Any]) -> Rows:
+def _format_scores(answer: Mapping[str, Any]) -> Rows:
     """Return the rows of the scores in an answer of `fit --json`."""
     return [
         (SCORE_TITLES[score], setting, '-' if value is None else f'{value:.3f}')
@@ -316,11 +282,11 @@ def format_scores(answer: Mapping[str, Any]) -> Rows:
     ]
 
 
-def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[None, tuple[str, ...], Rows]]:
-    """Yield the tables of an answer of `fit --json`."""
-    yield None, PARAMETER_COLUMNS, format_parameters(answer)
-    yield None, SCORE_COLUMNS, format_scores(answer)
-    yield None, COMPARISON_COLUMNS, format_comparison(answer)
+def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], Rows]]:
+    """Yield title, columns and rows of the tables of an answer of `fit --json`."""
+    yield 'Before and after', ('with the same recordings', 'before', 'after', ''), format_comparison(answer)
+    yield 'Parameters', ('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer)
+    yield 'Scores', ('score', 'setting', 'value'), _format_scores(answer)
 
 
 def make_sentences(answer: Mapping[str, Any]) -> list[str]:

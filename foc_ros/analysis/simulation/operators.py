@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.simulation import ACCURATE, CHANGES_WAY, HUMAN_PATHS, LAGGY, NOISY, UNANNOUNCED_GOAL
@@ -53,6 +53,11 @@ class IntendedPath(Record):
     velocity: Array
     acceleration: Array
 
+    @classmethod
+    def sample(cls, spline: BSpline, times: Array) -> IntendedPath:
+        """Return the path of a spline of positions at times (n,) [s]."""
+        return cls(spline(times), spline(times, 1), spline(times, 2))
+
     def join(self, steps: int, rest: IntendedPath) -> IntendedPath:
         """Return the path with another one behind its first steps."""
         parts = ((self.position, rest.position), (self.velocity, rest.velocity), (self.acceleration, rest.acceleration))
@@ -67,8 +72,7 @@ def interpolate_minimum_jerk(points: Array, times: Array, start: tuple[Array, Ar
     """
     conditions = ([(1, start[0]), (2, start[1])], [(1, np.zeros(2)), (2, np.zeros(2))])
     spline = make_interp_spline(times, points, k=5, bc_type=conditions)
-    at = np.append(np.arange(0.0, times[-1], DT), times[-1])
-    return IntendedPath(spline(at), spline(at, 1), spline(at, 2))
+    return IntendedPath.sample(spline, np.append(np.arange(0.0, times[-1], DT), times[-1]))
 
 
 def plan_path(
@@ -263,8 +267,7 @@ def read_task(recording: Recording, config: Config) -> Task | None:
         return None
     times = (stamps - stamps[0]) / NANOSECONDS
     spline = make_interp_spline(times, np.array([samples[row].position for row in rows]), k=5)
-    at = np.arange(0.0, times[-1], DT)
-    path = IntendedPath(spline(at), spline(at, 1), spline(at, 2))
+    path = IntendedPath.sample(spline, np.arange(0.0, times[-1], DT))
     obstacles, radius = scene.obstacles(int(stamps[-1])), config.scene.hand_radius
     if len(obstacles) and (measure_offsets(path.position, obstacles)[1] - obstacles.radius).min() <= radius:
         return None

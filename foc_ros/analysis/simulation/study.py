@@ -7,7 +7,6 @@ Each rule is told the scene and the goals, and has the same estimate of the hand
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.analysis.intervals import compute_mean_interval
 from foc_ros.analysis.parallel import collect_all
 from foc_ros.analysis.simulation import FOC, HUMAN_PATHS, NONE, OPERATORS
 from foc_ros.analysis.simulation.operators import DT, SimulatedArm, Task, draw_task
@@ -36,23 +36,13 @@ ARRIVED_M, STOPPED = 0.01, 0.05
 """Distance from the goal [m] and speed [m/s] at which a movement is complete."""
 EXTRA_S = 1.5
 """Time beyond that of the intended movement after which a trial ends."""
-MEASURES = (
-    'collision_rate',
-    'completion_s',
-    'min_clearance_m',
-    'path_m',
-    'effort',
-    'opposing_impulse',
-    'opposing_share',
-    'wrong_way_s',
-    'wrong_way_effort',
-)
 WRONG_S = 0.1
 """Time for which the likeliest way has to be a wrong one for a trial to count in the harm of wrong ways [s]."""
 RESAMPLES = 2000
+HARMS = {'wrong_way_s': 'completion_s', 'wrong_way_effort': 'effort'}
+"""What an operator needs more than alone where the likeliest way was wrong, nan elsewhere, and the measure that it is of."""
 SHOWN_TRIALS = 3
 """Number of trials of each operator that are kept with their paths."""
-Row = dict[str, float | None]
 COLUMNS = {
     'collision_rate': ('collisions [%]', 100.0, 1),
     'completion_s': ('time [s]', 1.0, 2),
@@ -64,11 +54,11 @@ COLUMNS = {
     'wrong_way_s': ('extra time, wrong way [s]', 1.0, 2),
     'wrong_way_effort': ('extra effort, wrong way [N² s]', 1.0, 2),
 }
-"""Heading, factor and digits of every measure."""
+"""The measures by name: heading, factor and digits."""
 
 
-class Assistance(ABC):
-    """A rule in one trial. Attributes: is_wrong, whether its likeliest way is not the intended one."""
+class Assistance:
+    """A rule in one trial; this one gives no force. Attributes: is_wrong, whether its likeliest way is not the intended one."""
 
     def __init__(self, task: Task, config: Config) -> None:
         self.task, self.config, self.is_wrong = task, config, False
@@ -82,23 +72,13 @@ class Assistance(ABC):
         if step % POSE_STEPS == 0:
             self.pipeline.add_hand_sample(HandSample(round((1.0 + step * DT) * NANOSECONDS), measured))
         assert self.pipeline.hand_state is not None
-        mean = self.pipeline.hand_state.mean
-        target = self.compute_force(step, *mean.reshape(3, 2))
+        target = self.compute_force(step, *self.pipeline.hand_state.mean.reshape(3, 2))
         settings = self.config.guidance
-        change = shorten(shorten(target, find_largest_force(settings)) - self._force, settings.slew * DT)
-        self._force = self._force + change
+        self._force = self._force + shorten(shorten(target, find_largest_force(settings)) - self._force, settings.slew * DT)
         return self._force
 
-    @abstractmethod
-    def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Return the wanted force (2,) [N] for the estimated position [m], velocity [m/s] and acceleration [m/s^2], (2,) each."""
-
-
-class NoAssistance(Assistance):
-    """The operator alone."""
-
     def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
-        """Return no force."""
+        """Return the wanted force (2,) [N] for the estimated position [m], velocity [m/s] and acceleration [m/s^2], (2,) each."""
         return np.zeros(2)
 
 
@@ -137,7 +117,8 @@ def is_wrong_way(prediction: Prediction, task: Task, step: int) -> bool:
     return any(intended.get(name, side) != side for name, side in likeliest.sides.items())
 
 
-RULES: Mapping[str, type[Assistance]] = {NONE: NoAssistance, FOC: FocAssistance}
+Rules = Mapping[str, type[Assistance]]
+RULES: Rules = {NONE: Assistance, FOC: FocAssistance}
 """The rules of `simulate` by name. A study may have others: they need a task and a configuration, as `Assistance` has them."""
 
 
@@ -212,12 +193,7 @@ def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
         'effort': DT * float((trial.effort**2).sum()),
         'opposing_impulse': opposing,
         'opposing_share': opposing / trial.duration_s / f_max,
-        'wrong_s': DT * float(trial.is_wrong.sum()),
     }
-
-
-Rules = Mapping[str, type[Assistance]]
-"""Assistance rules by name."""
 
 
 @dataclass(frozen=True)
@@ -242,7 +218,7 @@ class PairResult:
     """The measures of one pair by rule; task and trials: of the first pairs only, for pictures."""
 
     operator: str
-    measures: Mapping[str, Row]
+    measures: Mapping[str, Mapping[str, float]]
     task: Task | None
     trials: Mapping[str, Trial]
 
@@ -269,19 +245,13 @@ def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
     """Run all rules of a pair."""
     task, noise = pair.draw()
     trials = {rule: run_trial(task, rules[rule], config, noise) for rule in pair.assistance}
-    raw = {rule: measure_trial(trial, task, config.guidance.f_max) for rule, trial in trials.items()}
-    measures = {rule: _add_harm(values, raw[NONE]) for rule, values in raw.items()}
+    measures = {rule: measure_trial(trial, task, config.guidance.f_max) for rule, trial in trials.items()}
+    for rule, row in measures.items():
+        is_wrong = DT * trials[rule].is_wrong.sum() >= WRONG_S
+        for harm, name in HARMS.items():
+            row[harm] = row[name] - measures[NONE][name] if is_wrong else np.nan
     is_shown = pair.number < SHOWN_TRIALS
     return PairResult(pair.operator, measures, task if is_shown else None, trials if is_shown else {})
-
-
-def _add_harm(values: Mapping[str, float], alone: Mapping[str, float]) -> Row:
-    """Return measures with the time [s] and effort that the operator needs more than alone; None where no way was wrong."""
-    row: Row = {name: values[name] for name in values if name != 'wrong_s'}
-    is_wrong = values['wrong_s'] >= WRONG_S
-    row['wrong_way_s'] = values['completion_s'] - alone['completion_s'] if is_wrong else None
-    row['wrong_way_effort'] = values['effort'] - alone['effort'] if is_wrong else None
-    return row
 
 
 def summarise(results: Sequence[PairResult], seed: int) -> list[dict[str, Any]]:
@@ -295,10 +265,10 @@ def summarise(results: Sequence[PairResult], seed: int) -> list[dict[str, Any]]:
         rows = [each.measures for each in results if each.operator == operator]
         for rule in rows[0]:
             cell: dict[str, Any] = {'operator': operator, 'assistance': rule, 'trials': len(rows)}
-            for name in MEASURES:
-                values, alone = (np.array([row[key][name] for row in rows], dtype=float) for key in (rule, NONE))
+            for name in COLUMNS:
+                values, alone = (np.array([row[key][name] for row in rows]) for key in (rule, NONE))
                 cell[name], cell[f'{name}_interval'] = estimate_mean(values, seed)
-                if not name.startswith('wrong_way'):
+                if name not in HARMS:
                     cell[f'{name}_difference'], cell[f'{name}_difference_interval'] = estimate_mean(values - alone, seed)
             cells.append(cell)
     return cells
@@ -309,13 +279,7 @@ def estimate_mean(values: Array, seed: int) -> tuple[float | None, list[float] |
     finite = values[np.isfinite(values)]
     if not len(finite):
         return None, None
-    from scipy.stats import bootstrap  # not before: worker processes do without it
-
-    mean = float(finite.mean())
-    if len(finite) == 1:
-        return mean, [mean, mean]
-    options = {'n_resamples': RESAMPLES, 'method': 'percentile', 'random_state': np.random.default_rng(seed)}
-    return mean, [float(end) for end in bootstrap((finite,), np.mean, **options).confidence_interval]
+    return float(finite.mean()), compute_mean_interval(finite, np.arange(len(finite)), seed, RESAMPLES)
 
 
 def make_tables(cells: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:

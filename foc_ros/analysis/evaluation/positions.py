@@ -1,0 +1,274 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scores of predicted positions: their errors, the density of the true ones, and how many of these are inside of regions.
+
+The ellipse of a candidate says where the hand is if it follows this candidate. The whole prediction is the mixture of all
+candidates, each with its likelihood. Its smallest region of probability p is where the density f is above a level (Hyndman 1996,
+doi:10.2307/2684423). A position x lies within it if less than p of the probability is denser:
+
+    Pr(f(Y) > f(x)) < p,  Y distributed by the mixture.
+
+This is summed over the same points of every candidate: rings of equal probability, with points evenly spaced in angle.
+
+**The Singer model** of a manoeuvring target (Singer 1970, doi:10.1109/TAES.1970.310128) knows no scene. Per axis the state is
+(position, velocity, acceleration). The acceleration has the standard deviation sigma and decays with the time constant tau. It
+is driven by white noise, a' = -a / tau + w, of spectral density 2 sigma^2 / tau. A Kalman filter follows the recorded positions,
+and its state is propagated ahead. All settings are filtered together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.special import logsumexp
+
+from foc_ros.core.types import NANOSECONDS, Array
+
+from .baselines import compute_straight_costs, compute_straight_positions
+from .observations import Observation, ObservedRecording
+from .questions import ask_main
+from .scores import choose_held_out
+from .truth import HORIZONS, HORIZONS_S, TIMES_S
+
+LEVELS = (0.5, 0.9)
+"""Probabilities of the ellipses and regions."""
+FIRST_SPEED = 1.0
+"""Standard deviation of the velocity at the first sample, for the Singer model [m/s]."""
+TIMES = np.array(TIMES_S)
+EXACT = 1e-18
+"""Variance of a position that is known [m^2]: that of a nanometre."""
+RINGS, SPOKES = 25, 4
+"""Rings of a Gaussian, and points of a ring. A region is exact at 50 and 90 %, because the border lies between two rings."""
+GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""Angle from ring to ring [rad], so that no two have their points in the same directions."""
+NEGLIGIBLE = 1e-4
+"""Likelihood below which a candidate is left out."""
+Shares = dict[str, float | None]
+"""A value for each horizon, by its name; None where every recording has ended before."""
+
+
+def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str, Any]:
+    """Return average and final displacement errors [m] by predictor and horizon, and shares of true positions inside.
+
+    inside: the ellipse of the most likely candidate; inside_taken: of the candidate that was taken; inside_all: the smallest
+    region of all candidates. nlpd: the mean negative logarithm of the density [1/m^2] at the true position, under the mixture of
+    all candidates, and under the Singer model with the setting that is best for the other recordings. The average is over the
+    times up to the horizon; recordings that end before a horizon do not count.
+    """
+    observations = [each for recording in recordings for each in recording.observations]
+    leading, taken = [_find_leading(each) for each in observations], _find_taken(recordings)
+    covariances = [each.candidates.covariance for each in observations]
+    predicted = {
+        'most likely': [each.candidates.mean[row] for each, row in zip(observations, leading, strict=True)],
+        'likelihood-weighted': [np.tensordot(each.candidates.mixture, each.candidates.mean, 1) for each in observations],
+        'constant velocity': [_continue_velocity(each) for each in observations],
+        'straight minimum jerk': [_continue_minimum_jerk(each) for each in observations],
+    }
+    mixtures = [(each, each.candidates.mixture, covariance) for each, covariance in zip(observations, covariances, strict=True)]
+    densities = np.array([compute_log_densities(*each) for each in mixtures])
+    denser = np.array([compute_denser_shares(*each) for each in mixtures])
+    return {
+        'displacement_m': {name: _compute_errors(observations, np.array(each)) for name, each in predicted.items()},
+        'nlpd': {'foc': average(-densities), 'Singer Kalman': average(score_singer(recordings))},
+        'inside': {f'{level:g}': find_inside(observations, leading, covariances, level) for level in LEVELS},
+        'inside_taken': {f'{level:g}': find_inside(observations, taken, covariances, level) for level in LEVELS},
+        'inside_all': {f'{level:g}': average(np.where(np.isfinite(denser), denser < level, np.nan)) for level in LEVELS},
+    }
+
+
+def average(values: Array) -> Shares:
+    """Return the mean of values at the horizons (m, 3) over predictions, by horizon; nan does not count."""
+    columns = {f'{horizon:g}': column for horizon, column in zip(HORIZONS_S, values.T, strict=True)}
+    return {name: float(np.nanmean(each)) if np.isfinite(each).any() else None for name, each in columns.items()}
+
+
+def _compute_errors(observations: Sequence[Observation], positions: Array) -> dict[str, Shares]:
+    """Return the errors of positions (m, h, 2) [m]."""
+    true = np.array([each.truth.positions for each in observations])
+    distance = np.hypot(*(positions - true).transpose(2, 0, 1))
+    mean = np.cumsum(distance, axis=1) / np.arange(1, len(TIMES) + 1)
+    return {'average': average(mean[:, HORIZONS]), 'final': average(distance[:, HORIZONS])}
+
+
+def find_inside(observations: Sequence[Observation], rows: Sequence[int], covariances: Sequence[Array], level: float) -> Shares:
+    """Return the share of true positions inside the ellipses of a probability, by horizon.
+
+    rows (m,): the candidate of each observation; covariances: of its candidates (k, h, 2, 2) [m^2].
+    """
+    inside = []
+    for each, row, covariance in zip(observations, rows, covariances, strict=True):
+        offset = (each.truth.positions - each.candidates.mean[row])[HORIZONS]
+        scaled = np.linalg.solve(covariance[row, HORIZONS] + EXACT * np.eye(2), offset[..., None])[..., 0]
+        squared = (offset * scaled).sum(axis=-1)
+        # chi-square distribution of two degrees of freedom
+        inside.append(np.where(np.isfinite(squared), squared <= -2.0 * np.log(1.0 - level), np.nan))
+    return average(np.array(inside))
+
+
+def compute_log_densities(observation: Observation, shares: Array, covariance: Array) -> Array:
+    """Return the log-density (..., 3) of the true positions at the horizons [nat, metres], nan where the movement has ended.
+
+    shares (k,): weights of the candidates; covariance (..., k, h, 2, 2) [m^2]: of their positions.
+    """
+    counted = np.flatnonzero(shares > 0.0)
+    offset = (observation.truth.positions - observation.candidates.mean[counted])[:, HORIZONS]
+    rows, times = np.ix_(counted, HORIZONS)
+    return log_mixture_density(shares[counted], offset, covariance[..., rows, times, :, :] + EXACT * np.eye(2))
+
+
+def compute_denser_shares(observation: Observation, shares: Array, covariance: Array) -> Array:
+    """Return the probability (3,) of all that is denser than the true positions at the horizons; as `compute_log_densities`."""
+    mean, truth = observation.candidates.mean[:, HORIZONS], observation.truth.positions[HORIZONS]
+    return find_denser_share(shares, mean, covariance[:, HORIZONS] + EXACT * np.eye(2), truth)
+
+
+def find_denser_share(weight: Array, mean: Array, covariance: Array, position: Array) -> Array:
+    """Return the probability (h,) of all that is denser than a position, nan where the position is not known.
+
+    weight (k,) of normal distributions with mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2], positive definite;
+    position (h, 2) [m].
+    """
+    counted = weight > NEGLIGIBLE
+    weight, mean, covariance = weight[counted] / weight[counted].sum(), mean[counted], covariance[counted]
+    points = mean + np.einsum('khij,mj->mkhi', np.linalg.cholesky(covariance), POINTS)
+    level = log_mixture_density(weight, position[..., None, :, :] - mean, covariance)
+    is_above = log_mixture_density(weight, points[..., None, :, :] - mean, covariance) > level
+    return np.where(np.isfinite(level), (is_above.mean(axis=0) * weight[:, None]).sum(axis=0), np.nan)
+
+
+def log_mixture_density(weight: Array, offset: Array, covariance: Array) -> Array:
+    """Return the logarithm of the density (..., h) of a mixture of normal distributions with weights (k,).
+
+    offset (..., k, h, 2) [m]: from the mean of each; covariance (..., k, h, 2, 2) [m^2].
+    """
+    x, y, xx, yy, xy = *np.moveaxis(offset, -1, 0), covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
+    determinant = xx * yy - xy**2
+    distance = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
+    logs = np.log(weight)[:, None] - 0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi)
+    return np.asarray(logsumexp(logs, axis=-2))
+
+
+def _make_points() -> Array:
+    """Return points (m, 2) of equal weight that represent the standard normal distribution."""
+    radii = np.sqrt(-2.0 * np.log1p(-(np.arange(RINGS) + 0.5) / RINGS))
+    angles = GOLDEN * np.arange(RINGS)[:, None] + 2.0 * np.pi / SPOKES * np.arange(SPOKES)
+    return np.stack([radii[:, None] * np.cos(angles), radii[:, None] * np.sin(angles)], axis=-1).reshape(-1, 2)
+
+
+POINTS = _make_points()
+
+
+def _find_leading(observation: Observation) -> int:
+    """Return the row of the most likely candidate, as published."""
+    candidates, label = observation.candidates, observation.most_likely
+    return candidates.labels.index(label) if label else int(candidates.likelihood.argmax())
+
+
+def _find_taken(recordings: Sequence[ObservedRecording]) -> list[int]:
+    """Return the row of the likeliest candidate of the true answer; of the most likely candidate where none gives it."""
+    rows = []
+    for recording in recordings:
+        questions = {observation.stamp_ns: question for observation, question in ask_main(recording)}
+        for each in recording.observations:
+            question = questions.get(each.stamp_ns)
+            if question is not None and (is_true := question.given == question.truth).any():
+                rows.append(int(np.where(is_true, each.candidates.likelihood, -1.0).argmax()))
+            else:
+                rows.append(_find_leading(each))
+    return rows
+
+
+def _continue_velocity(observation: Observation) -> Array:
+    velocity = observation.hand[2:4] if observation.movement_age_s > 0.0 else np.zeros(2)
+    return np.asarray(observation.hand[:2] + TIMES[:, None] * velocity)
+
+
+def _continue_minimum_jerk(observation: Observation) -> Array:
+    return compute_straight_positions(observation, int(compute_straight_costs(observation).argmin()), TIMES)
+
+
+class SingerSetting(NamedTuple):
+    """Standard deviations of the acceleration [m/s^2] and of a measured position [m], decay time of the acceleration [s]."""
+
+    acceleration_stddev: float
+    position_stddev: float
+    decay_s: float
+
+
+SINGER_SETTINGS = tuple(
+    SingerSetting(*each) for each in product(np.geomspace(0.05, 6.4, 8).tolist(), (2e-4, 1e-3), (0.1, 0.3, 1.0))
+)
+"""The settings that are tried."""
+
+
+def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array, ahead_s: Array) -> tuple[Array, Array]:
+    """Forecast the positions some times (h,) [s] after each of some stamps (m,) [ns], which are among those of the samples.
+
+    stamps_ns (n,), rising, and positions (n, 2) [m] of the samples. Returns the mean (m, s, h, 2) [m] and the variance (m, s, h)
+    [m^2] per axis under each of the s `SINGER_SETTINGS`; each forecast uses the samples up to its stamp.
+    """
+    accelerations, noises, _ = np.array(SINGER_SETTINGS).T
+    state, covariance = np.zeros((len(SINGER_SETTINGS), 3, 2)), np.zeros((len(SINGER_SETTINGS), 3, 3))
+    state[:, 0], covariance[:, 0, 0] = positions[0], noises**2
+    covariance[:, 1, 1], covariance[:, 2, 2] = FIRST_SPEED**2, accelerations**2
+    wanted, means, variances, last_ns = set(at_ns.tolist()), [], [], int(stamps_ns[0])
+    ahead = [_discretise(float(each)) for each in ahead_s]
+    for stamp_ns, position in zip(stamps_ns.tolist(), positions, strict=True):
+        if stamp_ns > last_ns:
+            state, covariance = _propagate(state, covariance, _discretise((stamp_ns - last_ns) / NANOSECONDS))
+            gain = covariance[:, :, 0] / (covariance[:, 0, 0] + noises**2)[:, None]
+            state = state + gain[:, :, None] * (position - state[:, 0])[:, None]
+            kept = np.eye(3) - gain[:, :, None] * np.eye(3)[0]
+            # Joseph form: the covariance stays positive
+            covariance = kept @ covariance @ kept.swapaxes(1, 2) + noises[:, None, None] ** 2 * gain[:, :, None] * gain[:, None]
+            last_ns = stamp_ns
+        if stamp_ns in wanted:
+            wanted.remove(stamp_ns)
+            later = [_propagate(state, covariance, each) for each in ahead]
+            means.append(np.stack([each[:, 0] for each, _ in later], axis=1))
+            variances.append(np.stack([each[:, 0, 0] for _, each in later], axis=1))
+    return np.array(means), np.array(variances)
+
+
+def _propagate(state: Array, covariance: Array, model: tuple[Array, Array]) -> tuple[Array, Array]:
+    transition, added = model
+    return transition @ state, transition @ covariance @ transition.swapaxes(1, 2) + added
+
+
+@lru_cache(maxsize=4096)
+def _discretise(dt: float) -> tuple[Array, Array]:
+    """Return transition and added covariance (s, 3, 3) over dt [s] for each setting, by Van Loan (1978)."""
+    rate = np.zeros((len(SINGER_SETTINGS), 6, 6))
+    accelerations, _, decays = np.array(SINGER_SETTINGS).T
+    drift = np.zeros((len(SINGER_SETTINGS), 3, 3))
+    drift[:, 0, 1] = drift[:, 1, 2] = 1.0
+    drift[:, 2, 2] = -1.0 / decays
+    rate[:, :3, :3], rate[:, 3:, 3:] = -drift, drift.swapaxes(1, 2)
+    rate[:, 2, 5] = 2.0 * accelerations**2 / decays
+    grown = expm(rate * dt)
+    transition = grown[:, 3:, 3:].swapaxes(1, 2)
+    return transition, transition @ grown[:, :3, 3:]
+
+
+def score_singer(recordings: Sequence[ObservedRecording]) -> Array:
+    """Return the negative log-densities (m, 3) of the true positions [nat, metres], each with the setting best for the others."""
+    tables = [_tabulate_densities(each) for each in recordings]
+    table = np.array([-np.nansum(each, axis=(0, 2)) for each in tables])
+    chosen = choose_held_out(table, [each.name for each in recordings])
+    return np.concatenate([each[:, setting] for each, setting in zip(tables, chosen, strict=True)])
+
+
+def _tabulate_densities(recording: ObservedRecording) -> Array:
+    """Return the negative log-densities of the true positions (m, s, 3) [nat, metres] under each setting."""
+    path, observations = recording.path, recording.observations
+    stamps_ns = np.array([each.stamp_ns for each in observations])
+    mean, variance = forecast_singer(path.stamps_ns, path.positions, stamps_ns, np.array(HORIZONS_S))
+    true = np.array([each.truth.positions[HORIZONS] for each in observations])
+    squared = ((true[:, None] - mean) ** 2).sum(axis=-1)
+    return np.asarray(np.log(2.0 * np.pi * variance) + squared / (2.0 * variance))

@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the hand really did, by its recorded path, and through which gaps it could have gone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foc_ros.analysis.scenes import NO_GOAL
+from foc_ros.core.classes import compute_swept_angles
+from foc_ros.core.classes.rows import WALL, Rows, locate_rows
+from foc_ros.core.learning.movements import find_reached_goal
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Obstacles, Record
+
+TIMES_S = tuple(0.125 * step for step in range(1, 9))
+"""Times ahead at which predicted positions are compared with the true ones [s]."""
+HORIZONS_S = (0.25, 0.5, 1.0)
+"""Those of them that are reported."""
+HORIZONS = np.array([TIMES_S.index(horizon) for horizon in HORIZONS_S])
+"""Their indices."""
+RESOLUTION = 0.02
+"""Travel is counted in steps of this share of the extent of the path, so that noise at rest adds none."""
+
+Bools = NDArray[np.bool_]
+Sides = NDArray[np.int8]
+
+
+class RecordedPath:
+    """A recorded path, whose movement ends where it is nearest to the goal that it reached.
+
+    goal: row of the one that was reached, or `NO_GOAL`; None to find it. Attributes: stamps_ns (m,), positions (m, 2) [m], goals
+    (g, 2) [m]; goal: row of the goal reached, None where none was; end_ns: when the movement ends; travelled (m,): distance
+    travelled so far [m]; progress (m,): its share of the movement.
+    """
+
+    def __init__(self, stamps_ns: NDArray[np.int64], positions: Array, goals: Array, goal: int | None = None) -> None:
+        self.stamps_ns, self.positions, self.goals = stamps_ns, positions, goals
+        if goal == NO_GOAL:
+            self.goal, end = None, len(positions) - 1
+        else:
+            reached, end = find_reached_goal(positions, goals if goal is None else goals[[goal]])
+            self.goal = reached if goal is None else goal
+        self.end_ns = int(stamps_ns[end])
+        self.travelled = self._measure_travelled()
+        whole = self.travelled[end]
+        self.progress = np.minimum(self.travelled / whole, 1.0) if whole > 0.0 else np.zeros(len(positions))
+
+    def _measure_travelled(self) -> Array:
+        """Return the distance travelled up to each position (m,) [m], counted in steps of RESOLUTION."""
+        step, last = RESOLUTION * float(np.hypot(*np.ptp(self.positions, axis=0))), self.positions[0]
+        moved = np.zeros(len(self.positions))
+        for sample, position in enumerate(self.positions[1:], 1):
+            distance = float(np.hypot(*(position - last)))
+            if distance >= step:
+                moved[sample], last = distance, position
+        return np.cumsum(moved)
+
+    def interpolate(self, stamp_ns: int, seconds: Array) -> Array:
+        """Return the positions (h, 2) [m] some seconds (h,) after a stamp, nan beyond the end."""
+        times = (self.stamps_ns - stamp_ns) / NANOSECONDS
+        return np.column_stack([np.interp(seconds, times, axis, right=np.nan) for axis in self.positions.T])
+
+
+@dataclass(frozen=True, eq=False)
+class GroundTruth(Record):
+    """What the hand really did after one prediction.
+
+    sides (n,): LEFT or RIGHT, the side of each obstacle on which the rest of the path runs; is_ahead (n,): whether the row of the
+    obstacle is still to be passed; goal: row of the goal that was reached, None where none was, or where the goals were other
+    ones; positions (h, 2) [m]: at `TIMES_S`, nan beyond the end; progress in [0, 1]: share of the movement so far; approach in
+    [0, 1]: share of the distance from the last row, or the start, to the next one, nan where no row is to come; left_s: time to
+    the end of the movement [s].
+    """
+
+    sides: Sides
+    is_ahead: Bools
+    goal: int | None
+    positions: Array
+    progress: float
+    approach: float
+    left_s: float
+
+
+def find_ground_truth(
+    stamp_ns: int, path: RecordedPath, obstacles: Obstacles, row: Rows, direction: Array, goals: Array
+) -> GroundTruth:
+    """Return what the hand did after a stamp [ns].
+
+    obstacles, goals (g, 2) [m]: as they were at the stamp; row (n,) and direction (2,): of `find_rows` and `find_direction`.
+    """
+    now = int(np.searchsorted(path.stamps_ns, stamp_ns))
+    seconds = (path.stamps_ns[now:] - stamp_ns) / NANOSECONDS
+    centres = obstacles.centre + seconds[:, None, None] * obstacles.velocity
+    row_position, position = locate_rows(obstacles.centre @ direction, row), path.positions @ direction
+    return GroundTruth(
+        sides=find_sides(path.positions[now:], centres),
+        is_ahead=np.append(find_rows_ahead(row_position, position[now:]), False)[row],
+        goal=path.goal if np.array_equal(goals, path.goals) else None,
+        positions=path.interpolate(stamp_ns, np.array(TIMES_S)),
+        progress=float(path.progress[now]),
+        approach=_compute_approach(row_position, path, position, now),
+        left_s=(path.end_ns - stamp_ns) / NANOSECONDS,
+    )
+
+
+def find_rows_ahead(row_position: Array, position: Array) -> Bools:
+    """Tell which rows (r,), at row_position (r,) [m], the rest of a path, (m,) [m], still has to pass."""
+    is_before = position[:, None] < row_position
+    return np.asarray((is_before[:-1] & ~is_before[1:]).any(axis=0))
+
+
+def find_sides(path: Array, centres: Array) -> Sides:
+    """Return the sides (n,) of obstacles, at centres (m, n, 2) [m], on which a path (m, 2) [m] runs, by its swept angle."""
+    return np.where(compute_swept_angles(path, centres) < 0.0, LEFT, RIGHT).astype(np.int8)
+
+
+def _compute_approach(row_position: Array, path: RecordedPath, position: Array, now: int) -> float:
+    """Return the share of the distance from the last row, or the start, to the next one, that sample `now` has travelled."""
+    is_passed = find_rows_ahead(row_position, position)
+    passed = [int(np.flatnonzero(position < each)[-1]) + 1 for each in row_position[is_passed]]
+    following = min((each for each in passed if each > now), default=None)
+    if following is None:
+        return float('nan')
+    last = max((each for each in passed if each <= now), default=0)
+    distance = path.travelled[following] - path.travelled[last]
+    return float((path.travelled[now] - path.travelled[last]) / distance) if distance > 0.0 else 0.0
+
+
+def find_open_gaps(obstacles: Obstacles, row: Rows, direction: Array, hand_radius: float) -> tuple[Sides, ...]:
+    """Return for each row the sides (k, n) on which a path through one of its k open gaps passes its obstacles, 0 for all others.
+
+    A gap is open if it is wider than the hand, hand_radius [m]; the outer gaps of a row are those between it and the walls.
+    """
+    left = np.array([-direction[1], direction[0]])
+    distance = _measure_distances(obstacles)
+    found = []
+    for number in range(int(row.max(initial=WALL)) + 1):
+        members = np.flatnonzero(row == number)
+        members = members[np.argsort(obstacles.centre[members] @ left, kind='stable')]
+        right_end, left_end = (
+            distance[member, _find_walls_beside(obstacles, row, member, outwards)].min(initial=np.inf)
+            for member, outwards in ((members[0], -left), (members[-1], left))
+        )
+        is_open = np.array([right_end, *distance[members[:-1], members[1:]], left_end]) > 2.0 * hand_radius
+        sides = np.zeros((len(members) + 1, len(obstacles)), dtype=np.int8)
+        sides[:, members] = np.where(np.tri(len(members) + 1, len(members), -1), LEFT, RIGHT)
+        found.append(sides[is_open])
+    return tuple(found)
+
+
+def _find_walls_beside(obstacles: Obstacles, row: Rows, member: int, outwards: Array) -> NDArray[np.intp]:
+    """Return those walls whose nearest point is beside an obstacle, where a unit vector (2,) points, rather than ahead of it."""
+    walls = np.flatnonzero(row == WALL)
+    towards = -measure_offsets(obstacles.centre[member], obstacles.take(walls))[0][0]
+    is_beside: Bools = towards @ outwards >= np.abs(towards @ [outwards[1], -outwards[0]])
+    return walls[is_beside]
+
+
+def _measure_distances(obstacles: Obstacles) -> Array:
+    """Return the distances (n, n) [m] between obstacles; two convex polygons that are apart are nearest at a vertex of one."""
+    corners = obstacles.centre[:, None] + obstacles.vertices
+    nearest = measure_offsets(corners, obstacles)[1].reshape(*corners.shape[:2], len(obstacles)).min(axis=1)
+    distance: Array = np.minimum(nearest, nearest.T) - obstacles.radius[:, None] - obstacles.radius
+    return distance

@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters for which one replay of the recordings is enough: of the likelihood, and those that widen the covariance.
+
+The latter, process noise, scatter of the end point and spread of the duration, change nothing but covariances, so that all of
+them are tried on observations with motor noise alone, by the density of the true positions under the mixture of the candidates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import partial
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, make_ahead, make_plain, power_rule_shares
+from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, interpolate_steps
+from foc_ros.analysis.evaluation.positions import average, compute_denser_shares, compute_log_densities, find_inside
+from foc_ros.analysis.evaluation.questions import ask_main
+from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
+from foc_ros.analysis.evaluation.truth import HORIZONS
+from foc_ros.analysis.parallel import collect_all
+from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, flatten, replace_values
+from foc_ros.core.hand.duration import is_passing
+from foc_ros.core.plant.replanning import triple_integrator_goal_map, triple_integrator_process_covariance
+from foc_ros.core.types import Array
+
+from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
+
+RULES = (
+    *(make_plain(LikelihoodConfig(), beta) for beta in (0.5, 1.0, 2.0, 3.0, 6.0, 12.0)),
+    *(
+        make_ahead(LikelihoodConfig(), horizon, seconds, beta)
+        for horizon, seconds, beta in product((0.0, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0))
+    ),
+)
+"""The likelihoods of which each setting of the race gets its best. By a single one, settings that suit the others would lose."""
+LIKELIHOODS = {
+    'likelihood.beta': (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 10.0, 16.0),
+    'likelihood.planning_horizon_s': (0.0, 1.5, 2.5),
+    'likelihood.lookahead_s': (0.0, 0.25, 0.5, 1.0, 2.0),
+    'likelihood.weaving': (0.0, 1.0, 2.0, 4.0, 8.0),
+}
+"""Values that are tried, and the given ones; of the exponent also without a planning horizon."""
+MISSED = 0.1
+"""Share of predictions without the true class among their candidates above which there is a warning."""
+PROCESS_NOISE, ENDPOINT_STDDEV, SPREAD = 'foc.process_noise', 'foc.endpoint_stddev', 'duration.spread'
+WIDENINGS = {
+    PROCESS_NOISE: (0.0, *np.geomspace(0.01, 100.0, 33).tolist()),
+    ENDPOINT_STDDEV: (0.0, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3, 32e-3, 48e-3, 72e-3, 0.11, 0.16),
+    SPREAD: (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.9),
+}
+"""Values that are tried, and the given ones: process noises [m/s^2.5] from far below the jerk density of the filter to that of a
+hand in free motion; scatter of the end [m], of which Fitts' law expects 48 mm for a target of 0.2 m."""
+NO_WIDENING: Setting = dict.fromkeys(WIDENINGS, 0.0)
+FEW_WIDENINGS = tuple(product((0.0, *WIDENINGS[PROCESS_NOISE][1::4]), (0.0, 3e-3, 8e-3, 24e-3, 72e-3), (0.0, 0.2, 0.4)))
+"""Widenings whose best is good enough to compare predictions that differ in other parameters."""
+COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
+"""Time ahead and probability of the ellipses and regions whose coverage is reported."""
+FURTHEST = -30.0
+"""Least log-density that counts [nat], so that one unexpected position does not rule the rest."""
+
+
+def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> tuple[Findings, dict[str, Any]]:
+    """Return the parameters of the likelihood, from one replay of the recordings, and their scores.
+
+    Scores `ways`: mean log-likelihoods by how the setting was chosen, with at least three recordings also held out, by recording
+    and by the class taken. Empty where no class or goal is in question.
+    """
+    questions = [ask_main(each) for each in recordings]
+    if not any(questions):
+        reason = 'no recording has an obstacle to pass on one of two sides, or a second goal'
+        return Findings(undetermined=dict.fromkeys(LIKELIHOODS, reason)), {}
+    given = {name: float(getattr(config.likelihood, name.partition('.')[2])) for name in LIKELIHOODS}
+    settings = _list_likelihoods(given)
+    rules = [replace_values(config, each).likelihood for each in settings]
+    rule = Baseline('foc', partial(forecast_shares, power_rule_shares), tuple(rules))
+    rows = collect_all(partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], 'likelihood')
+    table = SettingTable(np.array(rows), settings)
+    found, columns = table.estimate(given, 'likelihood of the classes taken')
+    missed = float(np.mean([question.truth not in question.given for each in questions for _, question in each]))
+    if missed > MISSED:
+        words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
+        found.warnings.append(f'likelihood.beta: in {100 * missed:.0f} % of the predictions {words}')
+    uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
+    names = [each.name for each in recordings]
+    scores = {'uniform': float(np.mean(uniform))}
+    scores |= {how: table.score(each) for how, each in table.list_choices(given, columns, names).items()}
+    if is_cross_validated(recordings):
+        taken = [each[0][1].answers[each[0][1].truth] if each else name for each, name in zip(questions, names, strict=True)]
+        if len(set(taken)) > 1:
+            scores['without its way'] = table.score(table.choose_held_out(columns, taken))
+    return found, {'ways': scores}
+
+
+def _list_likelihoods(given: Setting) -> tuple[Setting, ...]:
+    """Return the settings of the likelihood that are tried, the given one first."""
+    ahead = list_settings({name: (given[name], *tried) for name, tried in LIKELIHOODS.items()})
+    betas = dict.fromkeys(each['likelihood.beta'] for each in ahead)
+    plain = [{**given, 'likelihood.beta': beta, 'likelihood.planning_horizon_s': WHOLE_WAY_S} for beta in betas]
+    return (*ahead, *plain)
+
+
+def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
+    questions = ask_main(recording)
+    return compute_log_likelihoods(questions, rule) / len(questions) if questions else np.full(len(rule.settings), np.nan)
+
+
+def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> tuple[Findings, dict[str, Any]]:
+    """Return the parameters that widen the covariance, from a replay with motor noise alone, and scores.
+
+    Scores: mean log-densities and coverage by how the widening was chosen, with at least three recordings also held out.
+    """
+    before = flatten(config)
+    given = {name: float(before[name]) for name in WIDENINGS}
+    settings = list_settings({name: (0.0, given[name], *tried) for name, tried in WIDENINGS.items()})
+    widenings, rows = [tuple(each.values()) for each in settings], []
+    for recording in recordings:
+        shares = [power_rule_shares(each, config.likelihood) for each in recording.observations]
+        pairs = zip(recording.observations, shares, strict=True)
+        densities = [compute_mean_densities(*pair, config, widenings) for pair in pairs]
+        known = [each for each in densities if each is not None]
+        rows.append(np.mean(known, axis=0) if known else np.full(len(settings), np.nan))
+    table = SettingTable(np.array(rows), settings)
+    found, columns = table.estimate(given, 'density of true positions')
+    chosen = {'motor noise alone': np.zeros(len(recordings), dtype=np.intp)}
+    chosen |= table.list_choices(given, columns, [each.name for each in recordings])
+    coverage = {name: compute_coverage(recordings, config, [widenings[each] for each in chosen[name]]) for name in chosen}
+    return found, {
+        'positions': {name: table.score(each) for name, each in chosen.items()},
+        **{kind: {name: each[kind] for name, each in coverage.items()} for kind in ('inside_90', 'inside_all_90')},
+    }
+
+
+def compute_mean_densities(
+    observation: Observation, shares: Array, config: Config, widenings: Iterable[Sequence[float]]
+) -> Array | None:
+    """Return the log-density of the true positions, the mean over the horizons, under each widening, (q,) [nat, metres].
+
+    shares (k,): of the candidates; config: of the replay; widenings: values of `WIDENINGS`. None where the movement ends before
+    the first horizon or has not begun, because a hand at rest shows how long it waits, not how it moves.
+    """
+    if observation.movement_age_s == 0.0 or not shares.any() or np.isnan(observation.truth.positions[HORIZONS[0], 0]):
+        return None
+    densities = compute_log_densities(observation, shares, widen_covariances(observation, widenings, config))
+    return np.asarray(np.nanmean(np.maximum(densities, FURTHEST), axis=1))
+
+
+def widen_covariances(observation: Observation, widenings: Iterable[Sequence[float]], config: Config) -> Array:
+    """Return the covariance (q, k, h, 2, 2) [m^2] of the candidates' positions at `TIMES_S` with each widening."""
+    candidates, late, squares = observation.candidates, observation.candidates.duration_sensitivity, np.array(widenings) ** 2
+    unit = np.array([_compute_unit_variances(float(time_s), config) for time_s in candidates.time_s])
+    both = np.tensordot(squares[:, :2], unit, (1, 1))
+    spread = np.multiply.outer(squares[:, 2], late[..., :, None] * late[..., None, :])
+    return np.asarray(candidates.covariance + both[..., None, None] * np.eye(2) + spread)
+
+
+def _compute_unit_variances(time_s: float, config: Config) -> Array:
+    """Return the variance of a position at `TIMES_S` by process noise and by scatter of the end, of 1 each, (2, h)."""
+    steps = config.foc.steps
+    kind = time_s / steps, steps, is_passing(config.duration)
+    jerk, end = triple_integrator_process_covariance(*kind), triple_integrator_goal_map(*kind) ** 2
+    return np.array([interpolate_steps(each[:, 0, 0], kind[0]) for each in (jerk, end)])
+
+
+def compute_coverage(
+    recordings: Sequence[ObservedRecording], config: Config, widenings: Sequence[Sequence[float]]
+) -> dict[str, float | None]:
+    """Return the shares of true positions of moving hands after 0.5 s inside 90 % ellipses and regions.
+
+    inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; widenings (n,): for
+    each recording, so that each can be judged by one that it did not influence.
+    """
+    moving = [
+        (each, widening)
+        for recording, widening in zip(recordings, widenings, strict=True)
+        for each in recording.observations
+        if each.movement_age_s > 0.0
+    ]
+    if not moving:
+        return {'inside_90': None, 'inside_all_90': None}
+    observations = [each for each, _ in moving]
+    shares = [power_rule_shares(each, config.likelihood) for each in observations]
+    covariances = [widen_covariances(each, [widening], config)[0] for each, widening in moving]
+    likeliest = [int(each.argmax()) for each in shares]
+    denser = np.array([compute_denser_shares(*each) for each in zip(observations, shares, covariances, strict=True)])
+    inside = np.where(np.isfinite(denser), denser < COVERAGE_LEVEL, np.nan)
+    return {
+        'inside_90': find_inside(observations, likeliest, covariances, COVERAGE_LEVEL)[COVERAGE_S],
+        'inside_all_90': average(inside)[COVERAGE_S],
+    }

@@ -1,0 +1,261 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of the predictor itself, each setting of which needs replays: a race of settings.
+
+A setting has two scores, means over the recordings. The score of classes is the log-likelihood of the homotopy class that was
+taken plus that of the gap taken in the next row, or without obstacles that of the goal. (Assistance acts on the next gap first,
+and less chance is in it than in choices that the operator has yet to make.) The score of positions is the log-density of the true
+ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates, by which settings are ranked that are alike in classes. Both are
+proper scores: no setting gains by claiming more or less than it knows. What needs no replay, the parameters of the likelihood and
+the widening of the covariance, is at its best for each setting. The race is successive halving (Jamieson and Talwalkar 2016,
+arXiv:1502.07943): all settings predict a few recordings, the better half of them twice as many, and so on. The given setting
+stays unless another one is better by more than chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from foc_ros.analysis.evaluation.baselines import Forecast, power_rule_shares
+from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
+from foc_ros.analysis.intervals import SEED, resample
+from foc_ros.analysis.parallel import collect
+from foc_ros.analysis.recordings import Recording
+from foc_ros.core.config import ARRIVALS, Config, flatten, replace_values
+from foc_ros.core.types import Array
+
+from . import Estimate, Findings, clip_to_bounds
+from .direct import CONSTANTS, RecordedHand, fit_other_models
+from .one_replay import FEW_WIDENINGS, NO_WIDENING, RULES, compute_mean_densities
+
+NOISES, DURATIONS = (0.06, 0.25, 2.0), (0.7, 1.4, 2.0)
+"""Factors tried beside 1."""
+ETAS = (0.7, 0.5, 0.95)
+FIRST = 6
+"""Recordings that all settings predict."""
+FINALISTS = 4
+"""Settings that predict all recordings, unless they are plainly worse."""
+MAX_RECORDINGS = 48
+"""Recordings in which settings are compared; more make no difference that counts."""
+PLAINLY_WORSE = 3.0
+"""Standard errors by which a setting behind the best is plainly worse."""
+ALIKE = 1.0
+"""Standard errors within which settings are alike in classes, so that positions decide (Breiman et al. 1984)."""
+CONFIDENT = 0.95
+"""Probability with which a setting is better than the given one, and share of the resamples with which a choice is sure."""
+WORSE_NAT = 0.05
+"""Loss of log-density of the true positions above which there is a warning."""
+Key = tuple[str, int]
+"""A prediction: recording and stamp [ns]."""
+
+
+def make_noise_settings(config: Config) -> list[Config]:
+    """Return the configuration, and it with other noise."""
+    return [config, *(_scale(config, {'foc.noise_x': 1.0, 'foc.noise_y': 1.0}, factor) for factor in NOISES)]
+
+
+def make_eta_settings(config: Config, may_be_lower: bool) -> list[Config]:
+    """Return the configuration, and it with other probabilities of avoiding; may_be_lower: than the given one."""
+    etas = [eta for eta in ETAS if may_be_lower or eta > config.foc.eta]
+    return list(dict.fromkeys([config, *(replace_values(config, {'foc.eta': eta}) for eta in etas)]))
+
+
+def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
+    """Return every combination of model, duration, arrival and whether accelerations fade, the given one first.
+
+    Where a goal that is passed is modelled as one where the hand stops, no duration is right, nor where an acceleration that
+    lasts is modelled as one that fades.
+    """
+    models = [config, *fit_other_models(hands, config)]
+    scaled = [_scale(each, CONSTANTS[each.duration.model], factor) for each, factor in product(models, (1.0, *DURATIONS))]
+    arrivals = dict.fromkeys([config.duration.arrival, *ARRIVALS])
+    fading_times = dict.fromkeys([config.estimator.acceleration_time_s, 0.0])
+    return [
+        replace_values(each, {'duration.arrival': arrival, 'estimator.acceleration_time_s': fading_s})
+        for each, arrival, fading_s in product(scaled, arrivals, fading_times)
+    ]
+
+
+def _scale(config: Config, powers: Mapping[str, float], factor: float) -> Config:
+    """Multiply each of the parameters by its power of a factor."""
+    before = flatten(config)
+    return replace_values(
+        config, {name: clip_to_bounds(name, factor**power * float(before[name])) for name, power in powers.items()}
+    )
+
+
+@dataclass(frozen=True)
+class ReplayScores:
+    """Log-likelihoods of predictions, of classes above uniform, each under all parameters that need no replay, (q,) [nat]."""
+
+    classes: dict[Key, Array] = field(default_factory=dict)
+    positions: dict[Key, Array] = field(default_factory=dict)
+
+
+@dataclass
+class Replays:
+    """Replays of recordings under settings, each made once; thinned: parameters of these replays alone."""
+
+    recordings: Mapping[str, Recording]
+    thinned: Mapping[str, object]
+    _known: dict[tuple[Config, str], ReplayScores] = field(default_factory=dict)
+
+    def score(self, settings: Sequence[Config], names: Sequence[str], description: str) -> Array:
+        """Return the scores of settings in named recordings, as of `compare_settings`; description: for the progress bar."""
+        missing = [key for key in product(settings, names) if key not in self._known]
+        items = [
+            (f'{name} {number}', (number, self.recordings[name], setting, self.thinned))
+            for number, (setting, name) in enumerate(missing)
+        ]
+        found = dict(collect(_score_replay, items, description)[0])
+        self._known |= {key: found.get(number, ReplayScores()) for number, key in enumerate(missing)}
+        return compare_settings([[self._known[setting, name] for name in names] for setting in settings], names)
+
+
+def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> tuple[int, ReplayScores]:
+    number, recording, config, thinned = item
+    config = replace_values(config, thinned)
+    return number, score_observations(observe(recording, replace_values(config, NO_WIDENING)), config)
+
+
+def score_observations(recording: ObservedRecording, config: Config) -> ReplayScores:
+    """Score the predictions of one setting in a recording."""
+    found = ReplayScores()
+    gaps = {observation.stamp_ns: question for observation, question in ask_all(recording, GAP)}
+    for observation, question in ask_main(recording):
+        questions = [question, *([gaps[observation.stamp_ns]] if observation.stamp_ns in gaps else [])]
+        shares = [power_rule_shares(observation, rule) for rule in RULES]
+        probabilities = [[Forecast.from_shares(each, about).true_probability(about) for each in shares] for about in questions]
+        uniform = [[1.0 / about.possible] for about in questions]
+        found.classes[recording.name, observation.stamp_ns] = np.log(np.divide(probabilities, uniform)).sum(axis=0)
+    for observation in recording.observations:
+        densities = compute_mean_densities(observation, observation.candidates.mixture, config, FEW_WIDENINGS)
+        if densities is not None:
+            found.positions[recording.name, observation.stamp_ns] = densities
+    return found
+
+
+def compare_settings(settings: Sequence[Sequence[ReplayScores]], names: Sequence[str]) -> Array:
+    """Return the scores of each setting in each recording, of classes and of positions, (2, s, n) [nat].
+
+    settings: by setting and recording. A prediction that a setting could not make counts as the worst of those that others made
+    in its place; of classes at most as a uniform guess.
+    """
+    classes = [_take_best([each.classes for each in parts]) for parts in settings]
+    positions = [_take_best([each.positions for each in parts]) for parts in settings]
+    return np.array([_average_by_recording(classes, 0.0, names), _average_by_recording(positions, np.inf, names)])
+
+
+def _take_best(parts: Sequence[Mapping[Key, Array]]) -> dict[Key, float]:
+    """Return the log-likelihoods under the parameters that are best for all predictions together."""
+    rows = {key: row for part in parts for key, row in part.items()}
+    best = int(np.sum(list(rows.values()), axis=0).argmax()) if rows else 0
+    return {key: float(row[best]) for key, row in rows.items()}
+
+
+def _average_by_recording(found: Sequence[Mapping[Key, float]], most: float, names: Sequence[str]) -> Array:
+    """Return the means (s, n) over the predictions of each recording; most: what a missing prediction counts at most."""
+    keys = sorted({key for each in found for key in each})
+    table = np.array([[each.get(key, np.nan) for key in keys] for each in found])
+    worst = np.minimum(np.nanmin(table, axis=0), most)
+    recording = np.array([names.index(name) for name, _ in keys], dtype=np.intp)
+    counts = np.maximum(np.bincount(recording, minlength=len(names)), 1)
+    return np.array([np.bincount(recording, np.where(np.isnan(row), worst, row), len(names)) / counts for row in table])
+
+
+def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[Config, Findings]:
+    """Return the best of some settings, of which the first is the given one, and what is new in it."""
+    finalists, scores, first_scores = race(kind, settings, replays)
+    best, given = rank(scores)[0], settings[0]
+    winners = resample(lambda rows: rank(scores[:, :, rows])[0], scores.shape[2]).astype(int)
+    if given in finalists and not is_better(scores[:, best], scores[:, finalists.index(given)]):
+        best = finalists.index(given)
+    found = _describe_choice(finalists[best], settings, [finalists[each] for each in winners])
+    positions = first_scores[1].mean(axis=1)
+    if (loss := float(positions[0] - positions[settings.index(finalists[best])])) > WORSE_NAT:
+        found.warnings.append(
+            f'{kind}: the setting that explains the classes best predicts positions worse: the mean log-density of the true ones '
+            f'falls by {loss:.2g} nat'
+        )
+    return finalists[best], found
+
+
+def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequence[Config]) -> Findings:
+    """Return what a chosen setting says of the parameters in which the settings differ; winners: the best of each resample."""
+    tried, drawn, after, found = (
+        [flatten(each) for each in settings],
+        [flatten(each) for each in winners],
+        flatten(chosen),
+        Findings(),
+    )
+    others = {name for model, names in CONSTANTS.items() for name in names if model != after['duration.model']}
+    for name, value in after.items():
+        before = tried[0][name]
+        if name in others or all(each[name] == before for each in tried):
+            continue
+        share = float(np.mean([each[name] == value for each in drawn]))
+        if value == before and share < CONFIDENT:
+            found.undetermined[name] = 'no other value tried is better by more than chance'
+        elif isinstance(value, str):
+            found.chosen |= {name: value} if value != before else {}
+        else:
+            # of another model of duration, a constant has no other values
+            values = [float(each[name]) for each in drawn if each['duration.model'] == after['duration.model']] or [float(value)]
+            found.estimates[name] = Estimate.from_resamples(name, float(value), values, 'predicted positions and classes')
+        if value != before and share < CONFIDENT:
+            found.warnings.append(f'{name}: {value} is the best, but only in {100 * share:.0f} % of the resamples')
+    return found
+
+
+def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array, Array]:
+    """Return the finalists, in the given order, with their scores as of `compare_settings`, and all scores of the first round."""
+    names = sample_names(list(replays.recordings))
+    left, count = list(settings), FIRST
+    first_scores = scores = replays.score(left, names[:count], f'{kind} {len(left)}')
+    while count < len(names) and len(left) > 1:
+        is_behind = find_behind(scores, PLAINLY_WORSE)
+        kept = {index for index in rank(scores)[: max(-(-len(left) // 2), FINALISTS)] if not is_behind[index]}
+        if left[0] == settings[0] and not is_behind[0]:
+            kept.add(0)
+        left, count = [left[index] for index in sorted(kept)], 2 * count
+        scores = replays.score(left, names[:count], f'{kind} {len(left)}')
+    return left, scores, first_scores
+
+
+def sample_names(names: Sequence[str]) -> list[str]:
+    """Return at most `MAX_RECORDINGS` names, of which every beginning is a fair sample, however the recordings were ordered."""
+    return [names[index] for index in np.random.default_rng(SEED).permutation(len(names))[:MAX_RECORDINGS]]
+
+
+def rank(scores: Array) -> list[int]:
+    """Return the settings from the best to the worst: those alike in classes by positions, then the others by classes."""
+    classes, positions = scores.mean(axis=2)
+    is_behind = find_behind(scores, ALIKE)
+    order: list[int] = np.lexsort((-classes, np.where(is_behind, 0.0, -positions), is_behind)).tolist()
+    return order
+
+
+def find_behind(scores: Array, errors: float) -> NDArray[np.bool_]:
+    """Tell which settings are behind the best in classes by more than some standard errors."""
+    classes = scores[0]
+    behind = classes[classes.mean(axis=1).argmax()] - classes
+    return np.asarray(behind.mean(axis=1) > errors * behind.std(axis=1) / np.sqrt(classes.shape[1]))
+
+
+def is_better(scores: Array, given: Array) -> bool:
+    """Return whether a setting is better than the given one, in classes or in positions, by more than chance (Student's t).
+
+    scores, given (2, n): of classes and of positions.
+    """
+    difference, n = scores - given, scores.shape[1]
+    if n < 2:
+        return False
+    error = difference.std(axis=1, ddof=1) / np.sqrt(n)
+    return bool((difference.mean(axis=1) > stdtrit(n - 1, CONFIDENT) * error).any())
