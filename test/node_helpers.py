@@ -95,10 +95,10 @@ class Bench:
 
     def deliver(self, name: str, *messages: Any) -> None:
         """Publish, and spin until the node has taken every message, and has published what it predicts from them."""
-        monitored = self.node._monitor._inputs
-        before = monitored[name].received if name in monitored else 0
+        entry = self.node._freshness.inputs[name]
+        wanted = entry.received + len(messages)
         self.send(name, *messages)
-        self.ros.spin_until(lambda: name in monitored and monitored[name].received >= before + len(messages), f'{name} is taken')
+        self.ros.spin_until(lambda: entry.received >= wanted, f'{name} is taken')
         self.ros.spin_until(lambda: not self.node.is_busy, 'the end of a prediction')
 
     def publish_scene(

@@ -7,9 +7,10 @@ from __future__ import annotations
 import pytest
 
 from foc_ros.core.config import Config, replace_values
+from foc_ros.core.pipeline import SampleStatus
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.topics import CLOUD, HAND, MARKERS
-from foc_ros.ros.health import Freshness
+from foc_ros.ros.freshness import Freshness
 
 CONFIG = replace_values(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
 NEVER = replace_values(Config(), {'estimator.hand_timeout_s': 0.0, 'scene.timeout_s': 0.0})
@@ -19,7 +20,7 @@ BOTH = ('cloud', 'markers')
 def build_freshness(**times: float) -> Freshness:
     made = Freshness()
     for role, time_s in times.items():
-        made.note_received(role, time_s)
+        made.note(role, SampleStatus.ACCEPTED, time_s)
     return made
 
 
@@ -44,7 +45,7 @@ def test_one_silent_input_stops_predictions(times: dict[str, float], words: str 
 
 def test_a_hand_whose_poses_are_refused_is_not_silent() -> None:
     freshness = build_freshness(hand_pose=8.0)
-    freshness.note_refused(9.9, 'hand_pose: stamps repeat')
+    freshness.note(HAND, SampleStatus.DUPLICATE, 9.9, 'hand_pose: stamps repeat')
     found = freshness.find_not_ready_reason(10.0, CONFIG, ())
     assert found == ('hand_refused', 'no hand_pose could be used for 2.0 s, the last: hand_pose: stamps repeat')
     found = freshness.find_not_ready_reason(12.0, CONFIG, ())
@@ -54,7 +55,7 @@ def test_a_hand_whose_poses_are_refused_is_not_silent() -> None:
 def test_a_source_that_is_received_again_is_not_silent() -> None:
     freshness = build_freshness(hand_pose=10.0, obstacles=1.0)
     assert freshness.find_not_ready_reason(10.0, CONFIG, ['cloud']) is not None
-    freshness.note_received(CLOUD, 10.0)
+    freshness.note(CLOUD, SampleStatus.ACCEPTED, 10.0)
     assert freshness.find_not_ready_reason(10.0, CONFIG, ['cloud']) is None
 
 

@@ -63,7 +63,7 @@ def begin(bench: Bench) -> list[Any]:
 
 def take(bench: Bench, poses: list[Any]) -> None:
     """Publish poses, and spin until the node has taken them."""
-    entry = bench.node._monitor._inputs['hand_pose']
+    entry = bench.node._freshness.inputs['hand_pose']
     wanted = entry.received + len(poses)
     bench.send('hand_pose', *poses)
     bench.ros.spin_until(lambda: entry.received >= wanted, 'the poses')

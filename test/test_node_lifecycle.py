@@ -132,11 +132,11 @@ def test_a_node_that_is_shut_down_stays_finalized(ros: Graph) -> None:
 
 
 def test_a_failed_configuration_is_logged_and_can_be_repeated(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    from foc_ros.ros import node
+    from foc_ros.ros import endpoints
 
     bench = Bench(ros, outputs=[], connected=False, parameters={'autostart': False})
     with monkeypatch.context() as patch:
-        patch.setattr(node, 'create_subscriptions', lambda *_: 1 / 0)
+        patch.setattr(endpoints, 'create_subscriptions', lambda *_: 1 / 0)
         assert not change(bench, 'configure')
     assert state_of(bench) == 'unconfigured'
     assert change(bench, 'configure')
