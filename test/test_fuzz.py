@@ -106,7 +106,7 @@ def bench() -> Iterator[Any]:
     from node_helpers import Bench
 
     with graph() as ros:
-        yield Bench(ros, parameters={'foc.steps': 10, 'rate_hz': 1000.0})
+        yield Bench(ros, foc__steps=10, rate_hz=1000.0)
 
 
 def test_any_messages_through_a_live_node(bench: Any) -> None:

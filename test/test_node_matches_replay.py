@@ -4,29 +4,30 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bag_helpers import CONFIG, TYPES, messages, write_bag, write_parameters
-from message_helpers import cloud, obstacle_table, pose_array
-from ros_helpers import Graph
+import ros_helpers
 
-from foc_ros.analysis.replay import Replay
-from foc_ros.core.config import Config, replace_values
-from foc_ros.io.bags import BagReader, Item
-from foc_ros.ros.messages.encode_prediction import encode_outputs
+ros_helpers.require_ros()
 
-ROOT = Path(__file__).parents[1]
+from bag_helpers import CONFIG, TYPES, messages, write_bag, write_parameters  # noqa: E402
+from message_helpers import cloud, obstacle_table, pose_array  # noqa: E402
+from process_helpers import Player, ended, parameters, running  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+
+from foc_ros.analysis.replay import Replay  # noqa: E402
+from foc_ros.core.config import Config, replace_values  # noqa: E402
+from foc_ros.io.bags import BagReader, Item  # noqa: E402
+from foc_ros.ros.messages.encode_prediction import encode_outputs  # noqa: E402
+
 SECONDS = 0.3
 LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
 NO_LIMITS = 'scene.timeout_s:=0.0', 'estimator.hand_timeout_s:=0.0', 'budget_s:=0.0'
+RELIABLE = [f'qos_overrides./{name}.subscription.reliability:=reliable' for name in ('hand_pose', 'obstacles')]
 EXACT = ('candidate', 'compromised', 'goal', 'way')
 
 
@@ -47,7 +48,6 @@ def messages_in_space() -> list[tuple[str, int, Any]]:
 
 
 CASES = {
-    'fixed': (CONFIG, lambda: messages(SECONDS)),
     'lv': (LV, lambda: messages(SECONDS)),
     'heights': (CONFIG, messages_in_space),
     '1 kHz': (CONFIG, lambda: messages(0.1, rate_hz=1000.0)),
@@ -55,78 +55,31 @@ CASES = {
 """Parameters, and the messages of a recording."""
 
 
-@contextmanager
-def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]:
-    """Run the node until the end of the block; it must still run then, and stop without an error."""
-    reliable = [f'qos_overrides./{name}.subscription.reliability:=reliable' for name in ('hand_pose', 'obstacles')]
-    command = [
-        sys.executable,
-        '-m',
-        'foc_ros',
-        'node',
-        '--ros-args',
-        '--params-file',
-        parameters,
-        *(word for each in (*reliable, *NO_LIMITS) for word in ('-p', each)),
-    ]
-    process = subprocess.Popen(
-        command, cwd=ROOT, env=ros.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
-    try:
-        yield process
-        assert process.poll() is None, process.communicate()[0]
-    finally:
-        process.terminate()
-        output = process.communicate(timeout=20)[0]
-    assert process.returncode == 0, output
-
-
-def play(ros: Graph, items: list[Item], due: set[int], parameters: str) -> tuple[list[Any], list[Any], dict[str, str]]:
-    """Publish the raw messages, the scene first; return the clouds and likelihoods that the node publishes, and its diagnostics.
+def play(ros: Graph, items: list[Item], due: set[int], file: str) -> Player:
+    """Publish the raw messages, the scene first, to a node with a parameter file; return what the player heard.
 
     due: log times of the poses that are due. The next message is sent after their predictions, so that a slow machine is slower
     and drops nothing.
     """
-    from diagnostic_msgs.msg import DiagnosticArray
-    from geometry_msgs.msg import PoseArray, PoseStamped
-    from sensor_msgs.msg import PointCloud2
-    from std_msgs.msg import Float64MultiArray
-
-    player = ros.node('player')
-    clouds = ros.collect(player, PointCloud2, '/foc/prediction')
-    likelihoods = ros.collect(player, Float64MultiArray, '/foc/likelihoods')
-    # subscriptions are announced in order: a node whose diagnostics are received knows the two subscriptions above
-    health = ros.collect(player, DiagnosticArray, '/diagnostics')
-    types = {'hand_pose': PoseStamped, 'obstacles': PointCloud2, 'goals': PoseArray}
-    publishers = {role: player.create_publisher(kind, role, 100) for role, kind in types.items()}
-    with node_process(ros, parameters) as process:
-
-        def wait(condition: Any, what: str) -> None:
-            ros.spin_until(lambda: process.poll() is not None or condition(), what)
-            assert process.poll() is None, process.communicate()[0]
-
-        def heard(count: int) -> bool:
-            return len(clouds) >= count <= len(likelihoods)
-
-        def values() -> dict[str, str]:
-            return {each.key: each.value for each in health[-1].status[0].values} if health else {}
-
-        def scene_known() -> bool:
-            return values().get('goals') == '1' and 'obstacles of cloud' in values()
-
-        wait(lambda: all(each.get_subscription_count() for each in publishers.values()), 'the subscriptions of the node')
+    player, arguments = Player(ros), ('--ros-args', '--params-file', file, *parameters(*RELIABLE, *NO_LIMITS))
+    command = [sys.executable, '-m', 'foc_ros', 'node']
+    with running(ros, *arguments, command=command) as process:
+        player.connect()
         first = next(place for place, item in enumerate(items) if item.role == 'hand_pose')
         for item in items[:first]:
-            publishers[item.role].publish(bytes(item.raw))
-        wait(scene_known, 'the node to know the scene')
+            player.publishers[item.role].publish(bytes(item.raw))
+        ros.spin_until(player.is_scene_known, 'the node to know the scene')
         for item in items[first:]:
-            publishers[item.role].publish(bytes(item.raw))
+            player.publishers[item.role].publish(bytes(item.raw))
             if item.role == 'hand_pose' and item.log_ns in due:
-                awaited = len(clouds) + 1
-                wait(partial(heard, awaited), f'prediction {awaited}')
+                wanted = len(player.predictions) + 1
+                heard = lambda wanted=wanted: len(player.predictions) >= wanted <= len(player.likelihoods)  # noqa: E731
+                ros.spin_until(heard, f'prediction {wanted}')
         poses = sum(item.role == 'hand_pose' for item in items)
-        wait(lambda: values().get('hand_pose refused') == f'0 of {poses}', 'every pose in the diagnostics')
-    return clouds, likelihoods, values()
+        ros.spin_until(lambda: player.figure('hand_pose refused') == f'0 of {poses}', 'every pose in the diagnostics')
+        code, errors = ended(process)
+    assert code == 0, errors
+    return player
 
 
 def replayed(bag: Path, config: Config) -> tuple[dict[int, dict[str, Any]], dict[str, int]]:
@@ -153,16 +106,14 @@ def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, cas
     with BagReader(bag) as reader:
         items = list(reader)
     expected, counts = replayed(bag, config)
-    clouds, likelihoods, health = play(ros, items, set(expected), write_parameters(tmp_path, config))
-    assert len(clouds) == len(likelihoods) == len(expected) > 3
-    assert health.get('count hand_skipped', '0') == str(counts.get('hand_skipped', 0))
+    player = play(ros, items, set(expected), write_parameters(tmp_path, config))
+    assert len(player.predictions) == len(player.likelihoods) == len(expected) > 3
+    assert (player.figure('count hand_skipped') or '0') == str(counts.get('hand_skipped', 0))
     assert max(len(table(each['prediction'])) for each in expected.values()) == 2 * (config.foc.steps + 1)
-    for answer, likelihood, both in zip(clouds, likelihoods, expected.values(), strict=True):
-        assert (answer.header.stamp.sec, answer.header.stamp.nanosec, answer.header.frame_id) == (
-            both['prediction'].header.stamp.sec,
-            both['prediction'].header.stamp.nanosec,
-            both['prediction'].header.frame_id,
-        )
+    for answer, likelihood, both in zip(player.predictions, player.likelihoods, expected.values(), strict=True):
+        header, wanted = answer.header, both['prediction'].header
+        assert (header.stamp.sec, header.stamp.nanosec) == (wanted.stamp.sec, wanted.stamp.nanosec)
+        assert header.frame_id == wanted.frame_id
         labels = [dimension.label for dimension in both['likelihoods'].layout.dim]
         assert [dimension.label for dimension in likelihood.layout.dim] == labels
         assert np.allclose(likelihood.data, both['likelihoods'].data, rtol=1e-9, atol=1e-9, equal_nan=True)

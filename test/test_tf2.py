@@ -47,7 +47,7 @@ def is_followed(ros: Graph, bench: Bench) -> Any:
 
 def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> None:
     """A hand and obstacles in the frame of a camera on a moving arm, each sent before the transform for its stamp."""
-    bench = begin(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 10.0})
+    bench = begin(ros, frame_id='world', frames__tolerance_s=10.0)
     broadcaster, rows = is_followed(ros, bench), obstacle_table([(0.2, 0.02, 0.0, 0.03)])
     broadcaster.sendTransform(transform('world', 'camera', 10 * SECOND - 1, (0.0, 0.0, 0.0)))
     for i, pose in enumerate(hand_path(40)):
@@ -68,8 +68,7 @@ def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> N
 
 def test_a_simulation_that_starts_again_forgets_its_transforms(ros: Graph) -> None:
     """In the second round the camera is elsewhere: the transforms of the first, newer by their stamps, are not used."""
-    parameters = {'frame_id': 'world', 'frames.tolerance_s': 10.0, 'use_sim_time': True}
-    bench = Bench(ros, parameters=parameters, outputs=[])
+    bench = Bench(ros, outputs=[], frame_id='world', frames__tolerance_s=10.0, use_sim_time=True)
     broadcaster, clock = is_followed(ros, bench), bench.player.create_publisher(Clock, '/clock', 10)
     ros.spin_until(lambda: clock.get_subscription_count() > 0, 'the clock')
     rows, node_clock = obstacle_table([(0.2, 0.0, 0.0, 0.03)]), bench.node.get_clock()

@@ -139,7 +139,7 @@ def test_boxes_are_turned(ros: Graph) -> None:
 )
 def test_boxes_that_cannot_be_turned_are_refused(ros: Graph, columns: list[Any], plane: str, words: str) -> None:
     message = cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)[: len(columns)]], columns), 10 * SECOND, 'camera')
-    bench = Bench(ros, parameters={'plane': plane, 'frame_id': 'world'})
+    bench = Bench(ros, plane=plane, frame_id='world')
     bench.deliver('obstacles', message)
     assert words in figures(bench.health())['last refusal']
 
@@ -226,10 +226,10 @@ def test_a_pose_that_is_skipped_neither_waits_for_a_transform_nor_gets_one() -> 
     held.move_camera(-1, 1.0)
     for i in range(3):
         held.transforms.add('hand_pose', HAND[i], 10 + i / 100)
-    assert held.release(3) == [] and held.transforms.holds('hand_pose'), 'the first one waits, and those behind it'
+    assert held.release(3) == [] and held.transforms.roles, 'the first one waits, and those behind it'
     held.move_camera(0, 1.0)
     assert [each.place(HAND[i].header)[0] for i, each in enumerate(held.release(3))] == ['world', 'camera']
-    assert held.transforms.holds('hand_pose'), 'the third one waits'
+    assert held.transforms.roles, 'the third one waits'
 
 
 def test_after_the_tolerance_the_newest_transform_is_taken_if_it_is_near_enough() -> None:
@@ -248,7 +248,7 @@ def test_after_the_tolerance_the_newest_transform_is_taken_if_it_is_near_enough(
 
 def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: None) -> None:
     """Obstacles and hand in the frame of a camera that moves: every message is taken with the transform for its stamp."""
-    bench = Bench(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 10.0})
+    bench = Bench(ros, frame_id='world', frames__tolerance_s=10.0)
     tf = bench.node._tf
     tf.set_transform(camera(1.0, 9 * SECOND), '')
     for i, pose in enumerate(HAND):
@@ -265,7 +265,7 @@ def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: 
 
 
 def test_without_a_transform_for_its_stamp_the_newest_one_is_taken_and_counted(ros: Graph, tf2: None) -> None:
-    bench = Bench(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 0.05})
+    bench = Bench(ros, frame_id='world', frames__tolerance_s=0.05)
     bench.node._tf.set_transform(camera(1.0, 10 * SECOND), '')
     for i, expected in ((4, '0 of 1'), (6, '1 of 2')):
         rows = obstacle_table([(0.2, 0.1, 0.0, 0.03)])

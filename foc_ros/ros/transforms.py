@@ -26,7 +26,7 @@ from foc_ros.io.topics import HAND, MARKERS
 
 from .messages.decode_objects import ADD
 from .messages.decode_poses import Place, check_hand_pose, decode_frame, decode_stamp, stay
-from .messages.plane import Transform
+from .messages.plane import NO_TRANSFORM, Transform
 
 MOST_HELD = 1000
 """Largest number of messages of one input that are held: 1 s of a hand at 1 kHz."""
@@ -77,10 +77,6 @@ class Transforms:
         """The inputs of which messages are held."""
         return [role for role, queue in self._held.items() if queue]
 
-    def holds(self, role: str) -> bool:
-        """Return whether messages of an input are held."""
-        return bool(self._held.get(role))
-
     def add(self, role: str, message: Any, now_s: float) -> None:
         """Append a message of an input that arrives at a time [s]."""
         self._held.setdefault(role, deque()).append((message, now_s))
@@ -118,8 +114,8 @@ class Transforms:
         headers = [each.header for each in message.markers if each.action == ADD] if role == MARKERS else [message.header]
         found: dict[tuple[str, int], Transform] = {}
         is_inexact = False
-        for given in map(_identify, headers):
-            if given[0] == frame_id or given in found:
+        for given in dict.fromkeys(map(_identify, headers)):
+            if given[0] == frame_id:
                 continue
             try:
                 found[given] = self._source.look_up(frame_id, *given)
@@ -169,11 +165,12 @@ class _Frame:
         old = bisect_right(self.stamps, self.stamps[-1] - KEPT_NS)
         del self.stamps[:old], self.poses[:old]
 
-    def find(self, name: str, stamp_ns: int) -> tuple[Rotation, Array]:
+    def find(self, name: str, stamp_ns: int) -> Transform:
         """Return the pose at a stamp; raise TransformUnavailableError outside the known stamps."""
         after = bisect_right(self.stamps, stamp_ns)
         if self.is_static or (after and self.stamps[after - 1] == stamp_ns):
-            return self.poses[after - 1]
+            rotation, position = self.poses[after - 1]
+            return Transform(rotation.as_matrix(), position)
         if not 0 < after < len(self.stamps):
             nearest_ns = self.stamps[min(after, len(self.stamps) - 1)]
             relation = 'after the newest' if after else 'before the oldest'
@@ -182,7 +179,7 @@ class _Frame:
         (earlier, start), (later, end) = self.poses[after - 1 : after + 1]
         share = (stamp_ns - self.stamps[after - 1]) / (self.stamps[after] - self.stamps[after - 1])
         turn = Slerp([0.0, 1.0], Rotation.concatenate([earlier, later]))
-        return turn(share), (1.0 - share) * start + share * end
+        return Transform(turn(share).as_matrix(), (1.0 - share) * start + share * end)
 
 
 class TransformTree:
@@ -219,10 +216,7 @@ class TransformTree:
         return left_out
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
-        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.
-
-        Raises TransformUnavailableError.
-        """
+        """Return a transform as `TransformSource.look_up` says."""
         up, down = self._list_ancestors(source), self._list_ancestors(target)
         common = next((name for name in up if name in down), None)
         if common is None:
@@ -232,10 +226,8 @@ class TransformTree:
         if not stamp_ns:
             frames = [self._frames[name] for name in (*chain, *back)]
             stamp_ns = min((frame.stamps[-1] for frame in frames if not frame.is_static), default=0)
-        rotation, position = self._compose(chain, stamp_ns)
-        inverse, offset = self._compose(back, stamp_ns)
-        inverse = inverse.inv()
-        return Transform((inverse * rotation).as_matrix(), inverse.apply(position - offset), stamp_ns)
+        pose = self._compose(back, stamp_ns).inverse().compose(self._compose(chain, stamp_ns))
+        return pose._replace(stamp_ns=stamp_ns)
 
     def _list_ancestors(self, name: str) -> list[str]:
         """Return a frame and the frames above it, its parent first."""
@@ -244,10 +236,9 @@ class TransformTree:
             names.append(frame.parent)
         return names
 
-    def _compose(self, chain: list[str], stamp_ns: int) -> tuple[Rotation, Array]:
+    def _compose(self, chain: list[str], stamp_ns: int) -> Transform:
         """Return the pose of the first frame of a chain in the parent of the last one."""
-        rotation, position = Rotation.identity(), np.zeros(3)
+        pose = NO_TRANSFORM
         for name in chain:
-            turn, shift = self._frames[name].find(name, stamp_ns)
-            rotation, position = turn * rotation, turn.apply(position) + shift
-        return rotation, position
+            pose = self._frames[name].find(name, stamp_ns).compose(pose)
+        return pose
