@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -15,16 +16,20 @@ import ros_helpers
 ros_helpers.require_ros()
 
 from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures, hand_path  # noqa: E402
+from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 
 from foc_ros.core.config import Config, replace_values  # noqa: E402
+from foc_ros.core.errors import MessageError  # noqa: E402
 from foc_ros.core.obstacles.geometry import measure_offsets  # noqa: E402
 from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
+from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud  # noqa: E402
 from foc_ros.ros.messages.decode_poses import decode_hand_sample  # noqa: E402
+from foc_ros.ros.messages.plane import Transform  # noqa: E402
 from foc_ros.ros.transforms import Transforms, TransformTree, TransformUnavailableError  # noqa: E402
 
+BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
 QUARTER = {'x': 0.0, 'y': 0.0, 'z': np.sqrt(0.5), 'w': np.sqrt(0.5)}
 
 
@@ -79,11 +84,6 @@ def tf2(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'tf2_ros', module)
 
 
-@pytest.fixture
-def no_tf2(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'tf2_ros', None)
-
-
 def seen(bench: Bench) -> np.ndarray:
     return bench.node.pipeline.scene.obstacles(10 * SECOND).centre
 
@@ -111,17 +111,10 @@ def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
     assert bench.node.intake.sample.height == 0.25
     assert {message.header.frame_id for message in bench.wait_for('prediction', 2)} == {'world'}
 
-
-BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
-
-
-@pytest.mark.usefixtures('tf2')
-def test_boxes_are_turned(ros: Graph) -> None:
-    bench = begin(ros, 1)
     bench.deliver('obstacles', cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)], BOX), 10 * SECOND, 'camera'))
     turned = {'z': np.sin(0.15), 'w': np.cos(0.15)}
     cube = marker(TYPES, (0.1, 0.0, 0.0), (0.2, 0.1, 0.05), type=1, frame_id='camera', turned=turned)
-    bench.deliver('obstacle_markers', marker_array(TYPES, cube))
+    bench.deliver('obstacle_markers', marker_array(TYPES, marker(TYPES, action=3, ns=''), cube))
     obstacles = bench.node.pipeline.scene.obstacles(10 * SECOND)
     np.testing.assert_allclose(obstacles.centre, [[0.7, 0.2], [1.0, 0.1]], atol=1e-12)
     expected = make_box_polygon((0.2, 0.1), 0.3 + np.pi / 2)
@@ -130,18 +123,27 @@ def test_boxes_are_turned(ros: Graph) -> None:
 
 
 @pytest.mark.usefixtures('tf2')
-@pytest.mark.parametrize(
-    ('columns', 'plane', 'words'),
-    [
-        (BOX[:-1], 'xy', 'fields: expected a field yaw, because the transform turns the boxes'),
-        (BOX, 'xz', 'fields[size_x]: expected boxes that the transform leaves in the task plane, got a tilt of 1'),
-    ],
-)
-def test_boxes_that_cannot_be_turned_are_refused(ros: Graph, columns: list[Any], plane: str, words: str) -> None:
-    message = cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)[: len(columns)]], columns), 10 * SECOND, 'camera')
-    bench = Bench(ros, plane=plane, frame_id='world')
-    bench.deliver('obstacles', message)
-    assert words in figures(bench.health())['last refusal']
+def test_what_cannot_be_transformed_is_refused_with_its_reason(ros: Graph) -> None:
+    bench = begin(ros, 1)
+    row, scene = (0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3), bench.node.pipeline.scene
+    for message, words in (
+        (
+            cloud(TYPES, obstacle_table([row[:-1]], BOX[:-1]), 10 * SECOND, 'camera'),
+            'fields: expected a field yaw, because the transform turns the boxes',
+        ),
+        (cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'camera', data=b'abc'), 'obstacles: data: expected 16 bytes'),
+        (
+            cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'),
+            "the working frame 'world', got 'moon'; no transform to world: moon and world are not connected",
+        ),
+    ):
+        bench.deliver('obstacles', message)
+        assert words in figures(bench.health())['last refusal']
+        assert bench.node.pipeline.scene is scene
+    turn = Transform(Rotation.from_euler('z', 90, degrees=True).as_matrix(), np.zeros(3))
+    words = 'fields[size_x]: expected boxes that the transform leaves in the task plane, got a tilt of 1'
+    with pytest.raises(MessageError, match=re.escape(words)):
+        decode_point_cloud(cloud(TYPES, obstacle_table([row], BOX)), 'xz', lambda _: ('world', turn))
 
 
 @pytest.mark.usefixtures('tf2')
@@ -156,27 +158,8 @@ def test_rows_that_are_not_finite_are_dropped_from_a_transformed_scene(ros: Grap
     assert figures(bench.health())['count obstacles_dropped_not_finite'] == '2'
 
 
-@pytest.mark.usefixtures('tf2')
-def test_a_frame_unknown_to_tf2_is_refused_with_both_names(ros: Graph) -> None:
-    bench = begin(ros, 1)
-    scene = bench.node.pipeline.scene
-    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'))
-    assert bench.node.pipeline.scene is scene
-    refusal = figures(bench.health())['last refusal']
-    assert "the working frame 'world', got 'moon'" in refusal
-    assert 'no transform to world: moon and world are not connected' in refusal
-
-
-@pytest.mark.usefixtures('tf2')
-def test_a_wrong_message_in_another_frame_is_refused_with_its_reason(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.move(hand_path(1))
-    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'camera', data=b'abc'))
-    assert 'obstacles: data: expected 16 bytes' in figures(bench.health())['last refusal']
-
-
-@pytest.mark.usefixtures('no_tf2')
-def test_without_tf2_other_frames_are_refused(ros: Graph) -> None:
+def test_without_tf2_other_frames_are_refused(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'tf2_ros', None)
     bench = begin(ros, 2)
     bench.wait_for('prediction', 1)
     bench.deliver('goals', pose_array(TYPES, GOALS, 'camera'))
