@@ -236,10 +236,7 @@ class TfListener:
         self._listener = tf2_ros.TransformListener(self, node)
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
-        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0, without waiting.
-
-        Raises TransformUnavailableError.
-        """
+        """Return a transform as `TransformSource.look_up` says, without waiting."""
         try:
             found = self._buffer.lookup_transform(target, source, Time(nanoseconds=stamp_ns))
         except self._unavailable as error:

@@ -16,7 +16,7 @@ from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
 from .messages.decode_objects import CollisionTable, MarkerTable, decode_detections
-from .messages.decode_point_cloud import decode_point_cloud
+from .messages.decode_point_cloud import DecodedCloud, decode_point_cloud
 from .messages.decode_poses import Place, decode_goal, decode_goals, decode_hand_sample, decode_stamp, stay
 from .transforms import Arrival
 
@@ -127,16 +127,18 @@ class Intake:
             self._set_markers(self._markers)
         return status
 
+    def _set_obstacles(self, source: str, role: str, decoded: DecodedCloud) -> SampleStatus:
+        """Pass the obstacles of a source to the pipeline, and count the parts of their message that were left out."""
+        status = self.pipeline.set_obstacles(source, decoded.obstacles, decoded.stamp_ns, decoded.frame_id)
+        return self._count_dropped(role, decoded.dropped, status)
+
     def _take_cloud(self, message: Any, place: Place) -> SampleStatus:
-        cloud = decode_point_cloud(message, self.pipeline.config.plane, place)
-        status = self.pipeline.set_obstacles('cloud', cloud.obstacles, cloud.stamp_ns, cloud.frame_id)
-        return self._count_dropped(topics.CLOUD, cloud.dropped, status)
+        return self._set_obstacles('cloud', topics.CLOUD, decode_point_cloud(message, self.pipeline.config.plane, place))
 
     def _take_detections(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config
         found = decode_detections(message, config.plane, config.scene.marker_radius_stddev, place)
-        status = self.pipeline.set_obstacles(topics.DETECTIONS, found.obstacles, found.stamp_ns, found.frame_id)
-        return self._count_dropped(topics.DETECTIONS, found.dropped, status)
+        return self._set_obstacles(topics.DETECTIONS, topics.DETECTIONS, found)
 
     def _take_collision_object(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config
@@ -144,10 +146,11 @@ class Intake:
         table = before.with_message(message, place)
         table = replace(table, stamp_ns=self._ignore_small_steps_back(before.stamp_ns, table.stamp_ns))
         obstacles = table.obstacles(config.plane, config.scene.marker_radius_stddev)
-        status = self.pipeline.set_obstacles(topics.COLLISION, obstacles, table.stamp_ns, table.frame_id)
+        found = DecodedCloud(obstacles, table.stamp_ns, table.frame_id, table.dropped)
+        status = self._set_obstacles(topics.COLLISION, topics.COLLISION, found)
         if status.is_taken:
             self._collisions = table
-        return self._count_dropped(topics.COLLISION, table.dropped, status)
+        return status
 
     def _ignore_small_steps_back(self, newest_ns: int, stamp_ns: int) -> int:
         """Return a stamp, or the newest one if that is at most `estimator.gap_s` after it."""

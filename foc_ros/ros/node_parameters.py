@@ -61,19 +61,19 @@ def declare_autostart(node: Any) -> bool:
 
 
 def _build_descriptor(parameter: Parameter) -> ParameterDescriptor:
-    bound, choices, ranges = parameter.bound, tuple(parameter.bound.choices), {}
-    if bound.low is not None and bound.high is not None:
-        if isinstance(parameter.default, int):
-            ranges['integer_range'] = [IntegerRange(from_value=int(bound.low), to_value=int(bound.high), step=1)]
-        else:
-            ranges['floating_point_range'] = [FloatingPointRange(from_value=float(bound.low), to_value=float(bound.high))]
-    return ParameterDescriptor(
+    bound, choices = parameter.bound, tuple(parameter.bound.choices)
+    descriptor = ParameterDescriptor(
         name=parameter.name,
         description=f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning,
         additional_constraints=f'one of {", ".join(choices)}' if choices else '',
         read_only=bound.read_only,
-        **ranges,
     )
+    if bound.low is not None and bound.high is not None:
+        if isinstance(parameter.default, int):
+            descriptor.integer_range = [IntegerRange(from_value=int(bound.low), to_value=int(bound.high), step=1)]
+        else:
+            descriptor.floating_point_range = [FloatingPointRange(from_value=float(bound.low), to_value=float(bound.high))]
+    return descriptor
 
 
 class LiveParameters:

@@ -42,17 +42,13 @@ class TransformSource(Protocol):
     """What knows transforms: tf2 in the node, a recording in a replay."""
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
-        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.
-
-        Raises TransformUnavailableError.
-        """
+        """Return a transform at a stamp [ns], the newest one for a stamp of 0. Raises TransformUnavailableError."""
 
 
 class Arrival(NamedTuple):
-    """A message that can be taken.
+    """A message that can be taken, when it arrived [s], and the frame and transform of its headers.
 
-    received_s: when it arrived [s]; place: gives the frame and the transform of its headers; error: why it is not in the working
-    frame, empty if it is; is_inexact: whether the newest transform was taken instead of that for its stamp.
+    error: why it is not in the working frame, empty if it is; is_inexact: whether the newest transform was taken for another.
     """
 
     message: Any

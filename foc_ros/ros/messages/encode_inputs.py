@@ -12,7 +12,7 @@ import numpy as np
 
 from foc_ros.core.types import Array
 
-from .types import MessageTypes, make_header
+from .types import MessageTypes, make_header, make_marker, make_vector
 
 _NAMES = ('x', 'y', 'z', 'radius', 'radius_stddev', 'id')
 _BOX_NAMES = ('size_x', 'size_y', 'yaw')
@@ -26,17 +26,12 @@ CUBE, GREY = 1, (0.45, 0.45, 0.5, 0.9)
 
 def encode_pose(types: MessageTypes, position: Iterable[float]) -> Any:
     """Encode a geometry_msgs/Pose without rotation."""
-    x, y, z = position
-    return types.make(
-        'geometry_msgs/msg/Pose',
-        position=types.make('geometry_msgs/msg/Point', x=x, y=y, z=z),
-        orientation=_no_rotation(types),
-    )
+    return types.make('geometry_msgs/msg/Pose', position=make_vector(types, 'Point', position), orientation=_no_rotation(types))
 
 
 @lru_cache(maxsize=8)
 def _no_rotation(types: MessageTypes) -> Any:
-    return types.make('geometry_msgs/msg/Quaternion', w=1.0)
+    return make_vector(types, 'Quaternion', (0.0, 0.0, 0.0, 1.0))
 
 
 def encode_hand_pose(types: MessageTypes, stamp_ns: int, frame_id: str, position: Iterable[float]) -> Any:
@@ -67,17 +62,9 @@ def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Se
 
 def encode_boxes(types: MessageTypes, stamp_ns: int, frame_id: str, boxes: Mapping[str, Sequence[float]]) -> Any:
     """Encode boxes by name, x, y, z of the centre and full lengths along these axes [m], as a MarkerArray of cubes."""
-    colour = types.make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', GREY, strict=True)))
+    header = make_header(types, stamp_ns, frame_id)
     markers = [
-        types.make(
-            'visualization_msgs/msg/Marker',
-            header=make_header(types, stamp_ns, frame_id),
-            ns=name,
-            type=CUBE,
-            pose=encode_pose(types, box[:3]),
-            scale=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', box[3:], strict=True))),
-            color=colour,
-        )
+        make_marker(types, name, 0, CUBE, GREY, box[3:], header=header, pose=encode_pose(types, box[:3]))
         for name, box in boxes.items()
     ]
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)

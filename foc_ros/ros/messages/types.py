@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import array
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -135,3 +135,24 @@ def make_stamp(types: MessageTypes, stamp_ns: int) -> Any:
 def make_header(types: MessageTypes, stamp_ns: int, frame_id: str) -> Any:
     """Return a std_msgs/Header."""
     return types.make('std_msgs/msg/Header', stamp=make_stamp(types, stamp_ns), frame_id=frame_id)
+
+
+def make_vector(types: MessageTypes, name: str, values: Iterable[Any]) -> Any:
+    """Return a message of numbers alone: a `Point`, `Vector3` or `Quaternion` of geometry_msgs, or the std_msgs `ColorRGBA`."""
+    package, fields = ('std_msgs', 'rgba') if name == 'ColorRGBA' else ('geometry_msgs', 'xyzw')
+    return types.make(f'{package}/msg/{name}', **dict(zip(fields, values, strict=False)))
+
+
+def make_marker(
+    types: MessageTypes, ns: str, identity: int, kind: int, colour: Iterable[float], scale: Iterable[float], **rest: Any
+) -> Any:
+    """Return a visualization_msgs/Marker; rest: its other fields."""
+    return types.make(
+        'visualization_msgs/msg/Marker',
+        ns=ns,
+        id=identity,
+        type=kind,
+        color=make_vector(types, 'ColorRGBA', colour),
+        scale=make_vector(types, 'Vector3', scale),
+        **rest,
+    )
