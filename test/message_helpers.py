@@ -95,3 +95,25 @@ def marker(
 
 def marker_array(types: MessageTypes, *markers: Any) -> Any:
     return types.make('visualization_msgs/msg/MarkerArray', markers=list(markers))
+
+
+def transform(
+    types: MessageTypes,
+    child: str,
+    translation: Sequence[float],
+    rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+    stamp_ns: int = 0,
+    parent: str = 'world',
+) -> Any:
+    """Return a geometry_msgs/TransformStamped; rotation: a quaternion (x, y, z, w)."""
+    moved = types.make(
+        'geometry_msgs/msg/Transform',
+        translation=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', translation, strict=True))),
+        rotation=types.make('geometry_msgs/msg/Quaternion', **dict(zip('xyzw', rotation, strict=True))),
+    )
+    return types.make(
+        'geometry_msgs/msg/TransformStamped',
+        header=make_header(types, stamp_ns, parent),
+        child_frame_id=child,
+        transform=moved,
+    )

@@ -15,7 +15,16 @@ import ros_helpers
 
 ros_helpers.require_ros()
 
-from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
+from message_helpers import (  # noqa: E402
+    SECOND,
+    cloud,
+    marker,
+    marker_array,
+    obstacle_table,
+    pose_array,
+    pose_stamped,
+    transform,
+)
 from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
@@ -30,7 +39,6 @@ from foc_ros.ros.messages.plane import Transform  # noqa: E402
 from foc_ros.ros.transforms import Transforms, TransformTree, TransformUnavailableError  # noqa: E402
 
 BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
-QUARTER = {'x': 0.0, 'y': 0.0, 'z': np.sqrt(0.5), 'w': np.sqrt(0.5)}
 
 
 class TransformException(Exception):
@@ -49,8 +57,8 @@ class Buffer(TransformTree):
             found = self.look_up(target, source, time.nanoseconds)
         except TransformUnavailableError as error:
             raise TransformException(str(error)) from None
-        rotation = Rotation.from_matrix(found.rotation).as_quat().tolist()
-        return transform(target, source, found.stamp_ns, *(name_axes(each) for each in (found.translation.tolist(), rotation)))
+        rotation = Rotation.from_matrix(found.rotation).as_quat()
+        return transform(TYPES, source, found.translation, rotation, found.stamp_ns, target)
 
     def set_transform(self, transform: Any, authority: str) -> None:
         self.add(SimpleNamespace(transforms=[transform]), is_static=False)
@@ -59,22 +67,9 @@ class Buffer(TransformTree):
         self.add(SimpleNamespace(transforms=[transform]), is_static=True)
 
 
-def name_axes(numbers: list[float]) -> Any:
-    return SimpleNamespace(**dict(zip('xyzw', numbers, strict=False)))
-
-
-def transform(parent: str, child: str, stamp_ns: int, translation: Any, rotation: Any) -> Any:
-    """Return a geometry_msgs/TransformStamped."""
-    return SimpleNamespace(
-        header=SimpleNamespace(stamp=pose_stamped(TYPES, (0, 0, 0), stamp_ns).header.stamp, frame_id=parent),
-        child_frame_id=child,
-        transform=SimpleNamespace(translation=translation, rotation=rotation),
-    )
-
-
 def camera(x: float, stamp_ns: int = 0) -> Any:
     """Return the transform of a camera at (x, 0, 0) in the world, rotated by 90 degrees to the left."""
-    return transform('world', 'camera', stamp_ns, SimpleNamespace(x=x, y=0.0, z=0.0), SimpleNamespace(**QUARTER))
+    return transform(TYPES, 'camera', (x, 0.0, 0.0), (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)), stamp_ns)
 
 
 @pytest.fixture
