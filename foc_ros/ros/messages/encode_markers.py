@@ -182,7 +182,8 @@ class _MarkerEncoder:
         return cast('list[list[float]]', lift(curve[rows], between[rows], self.plane).tolist())
 
     def _encode_point(self, point: Sequence[float]) -> Any:
-        return make_vector(self.types, 'Point', point)
+        x, y, z = point
+        return self.types.make('geometry_msgs/msg/Point', x=x, y=y, z=z)
 
 
 @lru_cache(maxsize=4)

@@ -137,10 +137,19 @@ def make_header(types: MessageTypes, stamp_ns: int, frame_id: str) -> Any:
     return types.make('std_msgs/msg/Header', stamp=make_stamp(types, stamp_ns), frame_id=frame_id)
 
 
+VECTORS = {
+    'Point': ('geometry_msgs/msg/Point', 'xyz'),
+    'Vector3': ('geometry_msgs/msg/Vector3', 'xyz'),
+    'Quaternion': ('geometry_msgs/msg/Quaternion', 'xyzw'),
+    'ColorRGBA': ('std_msgs/msg/ColorRGBA', 'rgba'),
+}
+"""Type and fields of messages of numbers alone."""
+
+
 def make_vector(types: MessageTypes, name: str, values: Iterable[Any]) -> Any:
-    """Return a message of numbers alone: a `Point`, `Vector3` or `Quaternion` of geometry_msgs, or the std_msgs `ColorRGBA`."""
-    package, fields = ('std_msgs', 'rgba') if name == 'ColorRGBA' else ('geometry_msgs', 'xyzw')
-    return types.make(f'{package}/msg/{name}', **dict(zip(fields, values, strict=False)))
+    """Return a message of numbers alone, one of `VECTORS`."""
+    kind, fields = VECTORS[name]
+    return types.make(kind, **dict(zip(fields, values, strict=True)))
 
 
 def make_marker(
