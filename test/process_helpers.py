@@ -55,14 +55,13 @@ def ended(process: subprocess.Popen[str], number: signal.Signals = signal.SIGTER
 class Player:
     """Publishes a scene and the hand, and keeps what it hears.
 
-    Attributes: predictions, likelihoods, diagnostics; sent: number of poses.
+    Attributes: predictions, diagnostics; sent: number of poses.
     """
 
     def __init__(self, ros: Graph, hand: str = 'hand_pose') -> None:
         from diagnostic_msgs.msg import DiagnosticArray
         from geometry_msgs.msg import PoseArray, PoseStamped
         from sensor_msgs.msg import PointCloud2
-        from std_msgs.msg import Float64MultiArray
 
         self.ros, self.sent = ros, 0
         node = ros.node('player')
@@ -70,8 +69,7 @@ class Player:
         topics = {'hand_pose': hand}
         self.publishers = {name: node.create_publisher(kind, topics.get(name, name), 1000) for name, kind in kinds.items()}
         self.predictions = ros.collect(node, PointCloud2, 'foc/prediction')
-        self.likelihoods = ros.collect(node, Float64MultiArray, 'foc/likelihoods')
-        # subscriptions are announced in order: a node whose diagnostics are received knows the two subscriptions above
+        # subscriptions are announced in order: a node whose diagnostics are received knows the subscription above
         self.diagnostics = ros.collect(node, DiagnosticArray, '/diagnostics')
 
     @property

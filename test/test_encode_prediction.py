@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from message_helpers import STORE, both_kinds, message_types
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
 
@@ -288,22 +286,3 @@ def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> No
         back = STORE.deserialize_cdr(raw, kind)
         twin = encode_outputs(three_ways(), OBSTACLES, 'xy', BAGS, [name])[name]
         assert bytes(STORE.serialize_cdr(back, kind)) == bytes(STORE.serialize_cdr(twin, kind))
-
-
-ways = st.lists(st.tuples(st.floats(0, 1), st.floats(-0.3, 0.3), st.floats(0, 1e6), st.sampled_from(list(Status))), max_size=5)
-
-
-@given(ways, st.sampled_from(['xy', 'xz', 'yz']), st.floats(-1e4, 1e4))
-def test_any_prediction_can_be_read_from_its_cloud(
-    rows: list[tuple[float, float, float, Status]], plane: str, height: float
-) -> None:
-    outcomes = [outcome(f'c{i}', p, bend, cost, status=status) for i, (p, bend, cost, status) in enumerate(rows)]
-    given_prediction = prediction(*outcomes, height=height)
-    table = columns(made('prediction', given_prediction, plane=plane))
-    solved = given_prediction.candidates_with_likelihood
-    assert set(table['candidate']) == set(range(len(solved)))
-    for index, each in enumerate(solved):
-        rows_ = table['candidate'] == index
-        xyz = np.stack([table[name][rows_] for name in 'xyz'], axis=-1)
-        np.testing.assert_allclose(xyz, lift(each.solution.path, height, plane), rtol=1e-6, atol=1e-9)
-    assert all(np.isfinite(column).all() for column in table.values())

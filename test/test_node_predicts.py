@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,8 +16,6 @@ from message_helpers import SECOND, cloud, obstacle_table, pose_array  # noqa: E
 from node_helpers import (  # noqa: E402
     GOALS,
     OK,
-    QUICK,
-    ROWS,
     TYPES,
     WARN,
     Bench,
@@ -28,48 +25,12 @@ from node_helpers import (  # noqa: E402
     list_labels,
     stamps,
 )
-from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from std_msgs.msg import Float64  # noqa: E402
 
-from foc_ros.core.classes.library import is_same_recording  # noqa: E402
-from foc_ros.core.config import Config, replace_values  # noqa: E402
-from foc_ros.core.pipeline import Pipeline  # noqa: E402
 from foc_ros.ros import health, node  # noqa: E402
 from foc_ros.ros.endpoints import MOST_GOAL_TOPICS  # noqa: E402
-from foc_ros.ros.intake import Intake  # noqa: E402
 from foc_ros.ros.messages.encode_prediction import encode_outputs  # noqa: E402
-
-
-def sent(message: Any) -> Any:
-    """Return the message after serialisation, with its float32 fields rounded."""
-    return deserialize_message(serialize_message(message), type(message))
-
-
-def test_every_due_hand_pose_gets_the_prediction_of_the_pipeline(ros: Graph) -> None:
-    """And the node learns the movement that the pipeline learns."""
-    bench, poses = begin(ros, experience__learning='online'), hand_path(141)
-    intake = Intake(Pipeline(replace_values(Config(), QUICK | {'experience.learning': 'online'})))
-    pipeline = intake.pipeline
-    intake.take('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
-    intake.take('goals', pose_array(TYPES, GOALS))
-    expected = []
-    for pose in poses:
-        bench.move([pose])
-        intake.take('hand_pose', pose)
-        prediction = pipeline.predict() if pipeline.is_due else None
-        if prediction is not None:
-            expected.append(encode_outputs(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES))
-    assert stamps(bench.wait_for('prediction', 71)) == stamps(poses)[::2]
-    assert len(expected) == 71
-    assert any(message['prediction'].width for message in expected)
-    for name in ('prediction', 'path', 'markers'):
-        assert bench.wait_for(name, 71)[:20] == [sent(message[name]) for message in expected[:20]]
-    for received, message in zip(bench.wait_for('likelihoods', 71), expected, strict=True):
-        assert received.layout == sent(message['likelihoods']).layout
-        assert np.array_equal(received.data, message['likelihoods'].data, equal_nan=True)  # of shares without a candidate
-    (live,), (learnt,) = (each.learnt.movements.finish().learnt for each in (bench.node.pipeline, pipeline))
-    assert is_same_recording(live, learnt)
 
 
 def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros: Graph) -> None:

@@ -98,19 +98,6 @@ def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_p
     assert not are_equal(whole, predict(tmp_path / 'whole', replace_values(CONFIG, {'estimator.min_interval_s': 0.0}))[0])
 
 
-def test_a_hand_at_250_hz_with_jitter_is_unaffected(tmp_path: Path) -> None:
-    random, items = np.random.default_rng(4), []
-    for topic, stamp_ns, message in messages(0.2, rate_hz=250.0):
-        if topic == '/hand_pose':
-            stamp_ns += int(random.uniform(-0.2, 0.2) * MS)
-            message.header.stamp = pose_stamped(TYPES, (0, 0, 0), stamp_ns).header.stamp
-        items.append((topic, stamp_ns, message))
-    bag = write_bag(tmp_path / 'jitter', items)
-    (found, counts), (expected, _) = predict(bag, CONFIG), predict(bag, replace_values(CONFIG, {'estimator.min_interval_s': 0.0}))
-    assert 'hand_skipped' not in counts
-    assert found and are_equal(found, expected)
-
-
 def estimate(step_ms: int, seed: int) -> tuple[float, float]:
     """Return the errors (root mean square) of position and velocity of a reach with 1 mm of noise [m, m/s]."""
     times = np.arange(-300, 1000) * 1e-3
