@@ -202,7 +202,7 @@ class FocNode(LifecycleNode):
             return  # the executor still held messages when the node was cleaned up
         if role == COMMAND:
             if self._state == 'active':
-                self._guidance.blend_command(*messages, self._types)
+                self._guidance.blend_command(messages[0], self._types)
             return
         waiting = [] if role == MARKERS else endpoints.take_queued(self._inputs[role])
         now_s = monotonic()
