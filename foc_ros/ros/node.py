@@ -44,7 +44,8 @@ from .health import THROTTLE_S, Monitor
 from .intake import Intake
 from .messages.encode_prediction import OUTPUTS, encode_outputs
 from .messages.types import RclpyTypes
-from .node_parameters import LiveParameters, declare_autostart, declare_parameters
+from .node_parameters import LiveParameters, declare_parameters
+from .parameters import AUTOSTART
 from .transforms import Arrival, Transforms
 from .worker import Computation, Worker
 
@@ -66,7 +67,6 @@ class FocNode(LifecycleNode):
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
         self._live_parameters = LiveParameters(self, declare_parameters(self, Config()), self._reconfigure)
         self._library = load_library(self._live_parameters.config.homotopy.library)
-        autostart = declare_autostart(self)
         self._types = RclpyTypes()
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
         self._loggers = {role: self.get_logger().get_child(role) for role in endpoints.INPUTS}
@@ -89,7 +89,7 @@ class FocNode(LifecycleNode):
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_timer(1.0, self._publish_health, clock=steady)
         endpoints.answer_refused_transitions(self._service_change_state, self.get_logger())  # rclpy has no public way to it
-        if autostart and (self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS):
+        if self.get_parameter(AUTOSTART).value and (self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS):
             raise FocError(self._start_error)
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
