@@ -33,10 +33,9 @@ both_kinds = pytest.mark.parametrize('types', ['rclpy', 'rosbags'], indirect=Tru
 
 def pose(types: MessageTypes, position: Sequence[float], turned: Mapping[str, float] = {'w': 1.0}) -> Any:
     """Return a pose; turned: its quaternion by axis."""
-    point = dict(zip('xyz', position, strict=True))
     return types.make(
         'geometry_msgs/msg/Pose',
-        position=types.make('geometry_msgs/msg/Point', **point),
+        position=types.fill('geometry_msgs/msg/Point', position),
         orientation=types.make('geometry_msgs/msg/Quaternion', **{'w': 0.0} | dict(turned)),
     )
 
@@ -87,7 +86,7 @@ def marker(
         'visualization_msgs/msg/Marker',
         header=head,
         pose=pose(types, position, turned),
-        scale=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
+        scale=types.fill('geometry_msgs/msg/Vector3', scale),
         lifetime=types.make('builtin_interfaces/msg/Duration', sec=seconds, nanosec=nanoseconds),
         **values,
     )
@@ -106,14 +105,6 @@ def transform(
     parent: str = 'world',
 ) -> Any:
     """Return a geometry_msgs/TransformStamped; rotation: a quaternion (x, y, z, w)."""
-    moved = types.make(
-        'geometry_msgs/msg/Transform',
-        translation=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', translation, strict=True))),
-        rotation=types.make('geometry_msgs/msg/Quaternion', **dict(zip('xyzw', rotation, strict=True))),
-    )
-    return types.make(
-        'geometry_msgs/msg/TransformStamped',
-        header=make_header(types, stamp_ns, parent),
-        child_frame_id=child,
-        transform=moved,
-    )
+    shift, turn = types.fill('geometry_msgs/msg/Vector3', translation), types.fill('geometry_msgs/msg/Quaternion', rotation)
+    moved = types.fill('geometry_msgs/msg/Transform', (shift, turn))
+    return types.fill('geometry_msgs/msg/TransformStamped', (make_header(types, stamp_ns, parent), child, moved))

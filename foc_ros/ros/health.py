@@ -46,15 +46,10 @@ class Health(NamedTuple):
 
     def encode(self, node_name: str, stamp_ns: int, types: MessageTypes) -> Any:
         """Return a diagnostic_msgs/DiagnosticArray with one status; node_name: the node's full name, such as '/foc'."""
-        status = types.make(
-            'diagnostic_msgs/msg/DiagnosticStatus',
-            level=self.level,
-            name=f'{node_name[1:]}: prediction',
-            message=self.message,
-            hardware_id=node_name,
-            values=[types.make('diagnostic_msgs/msg/KeyValue', key=key, value=value) for key, value in self.values.items()],
-        )
-        return types.make('diagnostic_msgs/msg/DiagnosticArray', header=make_header(types, stamp_ns, ''), status=[status])
+        values = [types.fill('diagnostic_msgs/msg/KeyValue', item) for item in self.values.items()]
+        parts = self.level, f'{node_name[1:]}: prediction', self.message, node_name, values
+        status = types.fill('diagnostic_msgs/msg/DiagnosticStatus', parts)
+        return types.fill('diagnostic_msgs/msg/DiagnosticArray', (make_header(types, stamp_ns, ''), [status]))
 
 
 class Monitor:

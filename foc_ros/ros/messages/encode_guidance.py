@@ -12,9 +12,9 @@ import numpy as np
 
 from foc_ros.core.guidance.guide import GuidanceOutput
 
-from .encode_inputs import encode_hand_pose, encode_pose
+from .encode_inputs import encode_array, encode_hand_pose, encode_pose
 from .plane import lift, project
-from .types import MessageTypes, make_header, make_marker, make_vector
+from .types import MessageTypes, make_header, make_marker
 
 ARROW, SPHERE = 0, 2
 METRES_PER_NEWTON = 0.02
@@ -43,7 +43,7 @@ def encode_wrench(output: GuidanceOutput, place: Place, types: MessageTypes) -> 
 def encode_force(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/Wrench without torque and without a stamp, as drivers of haptic devices take it."""
     return types.make(
-        'geometry_msgs/msg/Wrench', force=make_vector(types, 'Vector3', lift(output.force, 0.0, place.plane).tolist())
+        'geometry_msgs/msg/Wrench', force=types.fill('geometry_msgs/msg/Vector3', lift(output.force, 0.0, place.plane).tolist())
     )
 
 
@@ -56,19 +56,14 @@ def encode_reference(output: GuidanceOutput, place: Place, types: MessageTypes) 
 def encode_stiffness(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the stiffness [N/m] as a std_msgs/Float64MultiArray of 3 x 3."""
     axes = lift(np.eye(2), 0.0, place.plane)
-    dimensions = [
-        types.make('std_msgs/msg/MultiArrayDimension', label=label, size=3, stride=stride)
-        for label, stride in (('row', 9), ('column', 3))
-    ]
-    layout = types.make('std_msgs/msg/MultiArrayLayout', dim=dimensions)
-    return types.make('std_msgs/msg/Float64MultiArray', layout=layout, data=(axes.T @ output.stiffness @ axes).ravel())
+    return encode_array(types, axes.T @ output.stiffness @ axes, (('row', 3, 9), ('column', 3, 3)))
 
 
 def blend_twist(output: GuidanceOutput, command: Any, plane: str, types: MessageTypes) -> Any:
     """Return a geometry_msgs/TwistStamped command with the part in the plane blended; the rest of it is kept."""
     linear = command.twist.linear
     velocity, across = project([linear.x, linear.y, linear.z], plane)
-    blended = make_vector(types, 'Vector3', lift(output.blend_command(velocity), across, plane).tolist())
+    blended = types.fill('geometry_msgs/msg/Vector3', lift(output.blend_command(velocity), across, plane).tolist())
     twist = types.make('geometry_msgs/msg/Twist', linear=blended, angular=command.twist.angular)
     return types.make('geometry_msgs/msg/TwistStamped', header=command.header, twist=twist)
 
@@ -79,7 +74,7 @@ def encode_guidance_markers(output: GuidanceOutput, place: Place, types: Message
     end = start + METRES_PER_NEWTON * lift(output.force, 0.0, place.plane)
     reference = encode_reference(output, place, types)
     shared = {'header': reference.header, 'lifetime': types.make('builtin_interfaces/msg/Duration', sec=1)}
-    points = [make_vector(types, 'Point', each.tolist()) for each in (start, end)]
+    points = [types.fill('geometry_msgs/msg/Point', each.tolist()) for each in (start, end)]
     arrow = {'pose': encode_pose(types, (0.0, 0.0, 0.0)), 'points': points}
     return [
         make_marker(types, 'guidance', 0, ARROW, COLOUR, ARROW_SCALE, **arrow, **shared),

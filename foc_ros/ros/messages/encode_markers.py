@@ -27,7 +27,7 @@ from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
 
 from .plane import lift
 from .ranking import describe_candidate, find_drawn_curve, order_candidates
-from .types import MessageTypes, make_header, make_marker, make_vector
+from .types import MessageTypes, make_header, make_marker
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
 DELETE_ALL = 3
@@ -165,7 +165,7 @@ class _MarkerEncoder:
         **rest: Any,
     ) -> Any:
         turn = _compute_rotation(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
-        orientation = make_vector(self.types, 'Quaternion', turn)
+        orientation = self.types.fill('geometry_msgs/msg/Quaternion', turn)
         pose = self.types.make('geometry_msgs/msg/Pose', position=self._encode_point(centre), orientation=orientation)
         return make_marker(self.types, name, identity, kind, colour, scale, pose=pose, **self._shared_fields, **rest)
 
