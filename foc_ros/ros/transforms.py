@@ -10,10 +10,11 @@ their order. Node and replay share this: times are those of the steady clock in 
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_right, insort
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -142,40 +143,39 @@ def _identify(header: Any) -> tuple[str, int]:
     return decode_frame(header), decode_stamp(header)
 
 
+_STAMP = itemgetter(0)
+
+
 @dataclass
 class _Frame:
-    """A frame with its parent and its poses in it, rotation and position (3,) [m], by stamp [ns]; a static one has one pose."""
+    """A frame with its parent and its poses in it: stamp [ns], rotation, position (3,) [m] of each; a static one has one pose."""
 
     parent: str
     is_static: bool
-    stamps: list[int] = field(default_factory=list)
-    poses: list[tuple[Rotation, Array]] = field(default_factory=list)
+    poses: list[tuple[int, Rotation, Array]] = field(default_factory=list)
 
     def add(self, stamp_ns: int, rotation: Rotation, position: Array) -> None:
         """Keep a pose, and forget those that are too old."""
-        if self.is_static or (self.stamps and stamp_ns < self.stamps[-1] - KEPT_NS):
-            self.stamps, self.poses = [], []
-        place = bisect_right(self.stamps, stamp_ns)
-        self.stamps.insert(place, stamp_ns)
-        self.poses.insert(place, (rotation, position))
-        old = bisect_right(self.stamps, self.stamps[-1] - KEPT_NS)
-        del self.stamps[:old], self.poses[:old]
+        if self.is_static or (self.poses and stamp_ns < self.poses[-1][0] - KEPT_NS):
+            self.poses = []
+        insort(self.poses, (stamp_ns, rotation, position), key=_STAMP)
+        del self.poses[: bisect_right(self.poses, self.poses[-1][0] - KEPT_NS, key=_STAMP)]
 
     def find(self, name: str, stamp_ns: int) -> Transform:
         """Return the pose at a stamp; raise TransformUnavailableError outside the known stamps."""
-        after = bisect_right(self.stamps, stamp_ns)
-        if self.is_static or (after and self.stamps[after - 1] == stamp_ns):
-            rotation, position = self.poses[after - 1]
+        after = bisect_right(self.poses, stamp_ns, key=_STAMP)
+        if self.is_static or (after and self.poses[after - 1][0] == stamp_ns):
+            _, rotation, position = self.poses[after - 1]
             return Transform(rotation.as_matrix(), position)
-        if not 0 < after < len(self.stamps):
-            nearest_ns = self.stamps[min(after, len(self.stamps) - 1)]
+        if not 0 < after < len(self.poses):
+            nearest_ns = self.poses[min(after, len(self.poses) - 1)][0]
             relation = 'after the newest' if after else 'before the oldest'
             distance = f'{abs(stamp_ns - nearest_ns) / NANOSECONDS:.3g} s'
             raise TransformUnavailableError(f'the stamp is {distance} {relation} transform from {name} to {self.parent}')
-        (earlier, start), (later, end) = self.poses[after - 1 : after + 1]
-        share = (stamp_ns - self.stamps[after - 1]) / (self.stamps[after] - self.stamps[after - 1])
-        turn = Slerp([0.0, 1.0], Rotation.concatenate([earlier, later]))
-        return Transform(turn(share).as_matrix(), (1.0 - share) * start + share * end)
+        (begin_ns, earlier, start), (end_ns, later, end) = self.poses[after - 1 : after + 1]
+        share = (stamp_ns - begin_ns) / (end_ns - begin_ns)
+        turn = Slerp([0.0, 1.0], Rotation.concatenate([earlier, later]))(share)
+        return Transform(turn.as_matrix(), (1.0 - share) * start + share * end)
 
 
 class TransformTree:
@@ -221,7 +221,7 @@ class TransformTree:
         chain, back = up[: up.index(common)], down[: down.index(common)]
         if not stamp_ns:
             frames = [self._frames[name] for name in (*chain, *back)]
-            stamp_ns = min((frame.stamps[-1] for frame in frames if not frame.is_static), default=0)
+            stamp_ns = min((frame.poses[-1][0] for frame in frames if not frame.is_static), default=0)
         pose = self._compose(back, stamp_ns).inverse().compose(self._compose(chain, stamp_ns))
         return pose._replace(stamp_ns=stamp_ns)
 
