@@ -3,6 +3,7 @@
 """Heights in messages: those of obstacles, and those of predictions, in every task plane."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -103,6 +104,7 @@ def test_a_transform_moves_heights_and_must_not_tilt_them() -> None:
         decode_point_cloud(message, 'xy', lambda _: ('world', make_transform(0.1, 0.0)))
 
 
+@cache
 def predict_in(plane: str) -> Prediction:
     """Return the last prediction for a hand that goes down between a high, a low and a tall obstacle."""
     intake = Intake(Pipeline(replace_values(CONFIG, {'plane': plane})))
