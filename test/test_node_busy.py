@@ -37,6 +37,9 @@ class Gate:
     def open(self) -> None:
         self._open.set()
 
+    def close(self) -> None:
+        self._open.clear()
+
 
 @pytest.fixture
 def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
@@ -123,7 +126,7 @@ def test_the_budget_is_the_deadline_of_a_live_prediction_and_so_is_the_end_of_th
     assert gate.deadlines[0].left_s < 0.05
     end(bench, gate)
     assert figures(bench.health())['count predictions'] == '1'
-    gate._open.clear()
+    gate.close()
     bench.send('hand_pose', *poses[:4])
     ros.spin_until(lambda: bench.node.is_busy, 'another prediction')
     ros.nodes.remove(bench.node)
