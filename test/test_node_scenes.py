@@ -20,7 +20,7 @@ import ros_helpers
 ros_helpers.require_ros()
 
 from bag_helpers import write_bag, write_parameters  # noqa: E402
-from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
+from message_helpers import SECOND, marker, marker_array, pose_array, pose_stamped  # noqa: E402
 from node_helpers import (  # noqa: E402
     CROWD,
     GOALS,
@@ -116,18 +116,14 @@ def test_a_fault_is_reported_as_long_as_it_lasts(ros: Graph) -> None:
     assert (status.level, status.message) == (OK, 'predicting')
 
 
-@pytest.mark.parametrize('topic', ['obstacles', 'obstacle_markers'])
-def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros: Graph, topic: str) -> None:
-    """Three messages of many obstacles for each pose: every pose is received, and predictions continue."""
-    if topic == 'obstacles':
-        flood = cloud(TYPES, obstacle_table(CROWD), 10 * SECOND)
-    else:
-        kept = enumerate(CROWD[:400])
-        flood = marker_array(TYPES, *[marker(TYPES, row[:3], (0.008,) * 3, id=i, stamp_ns=10 * SECOND) for i, row in kept])
+def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros: Graph) -> None:
+    """Three messages of many markers for each pose: every pose is received, and predictions continue."""
+    kept = enumerate(CROWD[:400])
+    flood = marker_array(TYPES, *[marker(TYPES, row[:3], (0.008,) * 3, id=i, stamp_ns=10 * SECOND) for i, row in kept])
     bench, poses = begin(ros), hand_path(10)
     for pose in poses:
         for _ in range(3):
-            bench.publishers[topic].publish(flood)
+            bench.publishers['obstacle_markers'].publish(flood)
         bench.deliver('hand_pose', pose)
     assert len(bench.wait_for('prediction', 5)) == 5
     status = bench.health()
