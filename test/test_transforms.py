@@ -33,6 +33,8 @@ from foc_ros.core.config import Config, replace_values  # noqa: E402
 from foc_ros.core.errors import MessageError  # noqa: E402
 from foc_ros.core.obstacles.geometry import measure_offsets  # noqa: E402
 from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
+from foc_ros.core.pipeline import Pipeline  # noqa: E402
+from foc_ros.ros.intake import Intake  # noqa: E402
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud  # noqa: E402
 from foc_ros.ros.messages.decode_poses import decode_hand_sample  # noqa: E402
 from foc_ros.ros.messages.plane import Transform  # noqa: E402
@@ -170,14 +172,15 @@ class Held:
 
     def __init__(self, tolerance_s: float) -> None:
         self.tree = TransformTree()
-        self.transforms = Transforms(self.tree)
-        self.config = replace_values(Config(), {'frames.tolerance_s': tolerance_s})
+        config = replace_values(Config(), {'frames.tolerance_s': tolerance_s, 'frame_id': 'world'})
+        self.intake = Intake(Pipeline(config))
+        self.transforms = Transforms(self.tree, self.intake)
 
     def move_camera(self, tick: float, x: float) -> None:
         self.tree.add(SimpleNamespace(transforms=[camera(x, round((10 + tick / 100) * SECOND))]), is_static=False)
 
     def release(self, tick: float) -> list[Any]:
-        return list(self.transforms.release('hand_pose', 'world', self.config, 10 + tick / 100))
+        return list(self.transforms.release('hand_pose', 10 + tick / 100))
 
 
 def test_messages_are_held_in_order_until_their_transform_arrives() -> None:
@@ -197,10 +200,9 @@ def test_messages_are_held_in_order_until_their_transform_arrives() -> None:
     assert held.transforms.roles == []
 
 
-def test_a_pose_that_is_skipped_neither_waits_for_a_transform_nor_gets_one() -> None:
+def test_a_pose_that_is_skipped_neither_waits_for_a_transform_nor_gets_one(monkeypatch: pytest.MonkeyPatch) -> None:
     held = Held(0.1)
-    skipped = {10 * SECOND + SECOND // 100}
-    held.transforms = Transforms(held.tree, skipped.__contains__)
+    monkeypatch.setattr(held.intake, 'is_skipped', {10 * SECOND + SECOND // 100}.__contains__)
     held.move_camera(-1, 1.0)
     for i in range(3):
         held.transforms.add('hand_pose', HAND[i], 10 + i / 100)

@@ -8,7 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from foc_ros.core.errors import LostHandError, MessageError
 from foc_ros.core.pipeline import Pipeline, SampleStatus
@@ -18,12 +18,24 @@ from foc_ros.io import topics
 from .messages.decode_objects import CollisionTable, MarkerTable, decode_detections
 from .messages.decode_point_cloud import DecodedCloud, decode_point_cloud
 from .messages.decode_poses import Place, decode_goal, decode_goals, decode_hand_sample, decode_stamp, stay
-from .transforms import Arrival
 
 DROPPED = '_dropped_'
 """Between input and reason in the name of a count of parts of messages that were left out."""
 STILL_S = 1.0
 """Time with the same position after which this is told [s]: a tracker repeats its last pose, or a simulated hand rests."""
+
+
+class Arrival(NamedTuple):
+    """A message that can be taken, when it arrived [s], and the frame and transform of its headers.
+
+    error: why it is not in the working frame, empty if it is; is_inexact: whether the newest transform was taken for another.
+    """
+
+    message: Any
+    received_s: float
+    place: Place = stay
+    error: str = ''
+    is_inexact: bool = False
 
 
 class Intake:
@@ -59,27 +71,24 @@ class Intake:
         """How often each kind of refusal, drop, restart or failure occurred here and in the pipeline, by name."""
         return {**self.pipeline.counts, **self._counts}
 
+    def take(self, role: str, message: Any) -> SampleStatus | None:
+        """Take one message that is in its frame, as `take_arrival` does."""
+        return self.take_arrival(role, Arrival(message, 0.0))
+
     def take_arrival(self, role: str, arrival: Arrival) -> SampleStatus | None:
-        """Take one message whose transform is known, or is not needed or missing; None if it cannot be decoded."""
+        """Take one message, or the error of its decoding; None if it cannot be decoded."""
         if arrival.is_inexact:
             self._counts[f'transform_newest_{role}'] += 1
-        return self.take(role, arrival.message, arrival.place, arrival.error)
-
-    def take(self, role: str, message: Any, place: Place = stay, transform_error: str = '') -> SampleStatus | None:
-        """Take one message, or the error of its decoding; None if it cannot be decoded.
-
-        place: gives its frame and the transform to there; transform_error: why that is not the working frame.
-        """
         refused_before = self.pipeline.refused
         try:
-            if isinstance(message, MessageError):
-                raise message
-            status = self._handlers[role](message, place)
+            if isinstance(arrival.message, MessageError):
+                raise arrival.message
+            status = self._handlers[role](arrival.message, arrival.place)
         except MessageError as error:
             self.refuse(role, error)
             return None
         if self.pipeline.refused > refused_before:
-            self.last_refusal = '; '.join(filter(None, [self.pipeline.last_refusal, transform_error]))
+            self.last_refusal = '; '.join(filter(None, [self.pipeline.last_refusal, arrival.error]))
         return status
 
     def refuse(self, role: str, error: MessageError) -> None:

@@ -41,12 +41,12 @@ from . import endpoints
 from .freshness import SOURCE_TOPICS, Freshness
 from .guidance import GuidanceTopics
 from .health import THROTTLE_S, Monitor
-from .intake import Intake
+from .intake import Arrival, Intake
 from .messages.encode_prediction import OUTPUTS, encode_outputs
 from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_parameters
 from .parameters import AUTOSTART
-from .transforms import Arrival, Transforms
+from .transforms import Transforms
 from .worker import Computation, Worker
 
 RETRY_S = 0.01
@@ -172,7 +172,7 @@ class FocNode(LifecycleNode):
         self.pipeline = Pipeline(self._live_parameters.config, self._library)
         self.intake, self._freshness = Intake(self.pipeline), Freshness()
         self._monitor = Monitor(self.intake, self._freshness, monotonic())
-        self._transforms = Transforms(self._tf, self.intake.is_skipped)
+        self._transforms = Transforms(self._tf, self.intake)
 
     def _destroy_topics(self) -> None:
         self._guidance.destroy()
@@ -222,7 +222,7 @@ class FocNode(LifecycleNode):
 
     def _take_released(self, role: str) -> None:
         """Take the messages of an input that are not held, and predict if a hand pose was used and a prediction is due."""
-        arrivals = self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, monotonic())
+        arrivals = self._transforms.release(role, monotonic())
         is_taken = False
         for each in reversed(list(arrivals)) if role in COMPLETE else arrivals:
             is_taken = self._take(role, each) or is_taken

@@ -12,19 +12,19 @@ from __future__ import annotations
 
 from bisect import bisect_right, insort
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from operator import itemgetter
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from foc_ros.core.config import Config
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.topics import HAND, MARKERS
 
+from .intake import Arrival, Intake
 from .messages.decode_objects import ADD
 from .messages.decode_poses import Place, check_hand_pose, decode_frame, decode_stamp, stay
 from .messages.plane import NO_TRANSFORM, Transform
@@ -46,27 +46,14 @@ class TransformSource(Protocol):
         """Return a transform at a stamp [ns], the newest one for a stamp of 0. Raises TransformUnavailableError."""
 
 
-class Arrival(NamedTuple):
-    """A message that can be taken, when it arrived [s], and the frame and transform of its headers.
-
-    error: why it is not in the working frame, empty if it is; is_inexact: whether the newest transform was taken for another.
-    """
-
-    message: Any
-    received_s: float
-    place: Place = stay
-    error: str = ''
-    is_inexact: bool = False
-
-
 class Transforms:
     """Queues of messages, one for each input.
 
-    source: None if there is none; is_skipped: whether a hand pose of a stamp [ns] will be skipped, so that it needs no transform.
+    source: None if there is none; intake: that takes the messages. A hand pose that it will skip needs no transform.
     """
 
-    def __init__(self, source: TransformSource | None, is_skipped: Callable[[int], bool] = lambda _: False) -> None:
-        self._source, self._is_skipped = source, is_skipped
+    def __init__(self, source: TransformSource | None, intake: Intake) -> None:
+        self._source, self._intake = source, intake
         self._held: dict[str, deque[tuple[Any, float]]] = {}
 
     @property
@@ -78,31 +65,32 @@ class Transforms:
         """Append a message of an input that arrives at a time [s]."""
         self._held.setdefault(role, deque()).append((message, now_s))
 
-    def release(self, role: str, frame_id: str | None, config: Config, now_s: float) -> Iterator[Arrival]:
+    def release(self, role: str, now_s: float) -> Iterator[Arrival]:
         """Yield the messages of an input that need not be held any longer at a time [s], in the order of their arrival.
 
-        Each has to be taken before the next one is asked for: it decides whether the next one is skipped. frame_id: the working
-        frame; while it is unknown, None, messages are not transformed.
+        Each has to be taken before the next one is asked for: it decides whether the next one is skipped. While the working frame
+        is unknown, messages are not transformed.
         """
-        queue = self._held.get(role, ())
+        queue, pipeline = self._held.get(role, ()), self._intake.pipeline
         while queue:
             message, received_s = queue[0]
-            is_overdue = now_s - received_s >= config.frames.tolerance_s or len(queue) > MOST_HELD
+            is_overdue = now_s - received_s >= pipeline.config.frames.tolerance_s or len(queue) > MOST_HELD
             try:
-                place, is_inexact = self._find_place(role, message, frame_id, config, is_overdue)
+                place, is_inexact = self._find_place(role, message, is_overdue)
                 arrival = Arrival(message, received_s, place, is_inexact=is_inexact)
             except TransformUnavailableError as error:
                 if not is_overdue:
                     break
-                arrival = Arrival(message, received_s, error=f'no transform to {frame_id}: {error}')
+                arrival = Arrival(message, received_s, error=f'no transform to {pipeline.frame_id}: {error}')
             except Exception:  # the message is not checked yet, and will be refused
                 arrival = Arrival(message, received_s)
             queue.popleft()
             yield arrival
 
-    def _find_place(self, role: str, message: Any, frame_id: str | None, config: Config, is_overdue: bool) -> tuple[Place, bool]:
+    def _find_place(self, role: str, message: Any, is_overdue: bool) -> tuple[Place, bool]:
         """Return the transforms for the headers of a message, and whether the newest one was taken for one of them."""
-        is_unneeded = role == HAND and self._is_skipped(decode_stamp(message.header))
+        frame_id = self._intake.pipeline.frame_id
+        is_unneeded = role == HAND and self._intake.is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
             return stay, False
         if role == HAND:
@@ -119,7 +107,7 @@ class Transforms:
             except TransformUnavailableError as reason:
                 if not is_overdue:
                     raise
-                found[given], is_inexact = self._find_newest(frame_id, *given, config.frames.tolerance_s, reason), True
+                found[given], is_inexact = self._find_newest(frame_id, *given, reason), True
 
         def place(header: Any) -> tuple[str, Transform]:
             transform = found.get(_identify(header))
@@ -127,9 +115,10 @@ class Transforms:
 
         return place, is_inexact
 
-    def _find_newest(self, target: str, source: str, stamp_ns: int, tolerance_s: float, reason: Exception) -> Transform:
-        """Return the newest transform instead of that for a stamp [ns], if its stamp differs by the tolerance [s] at most."""
+    def _find_newest(self, target: str, source: str, stamp_ns: int, reason: Exception) -> Transform:
+        """Return the newest transform instead of that for a stamp [ns], if its stamp differs by the tolerance at most."""
         assert self._source is not None
+        tolerance_s = self._intake.pipeline.config.frames.tolerance_s
         newest = self._source.look_up(target, source, 0)
         late_s = (stamp_ns - newest.stamp_ns) / NANOSECONDS
         if abs(late_s) > tolerance_s:
