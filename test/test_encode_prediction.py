@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from message_helpers import STORE, both_kinds, message_types
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
+from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import FocError
 from foc_ros.core.obstacles.geometry import measure_offsets
@@ -176,11 +177,6 @@ def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
     assert [each.scale.x for each in by_name['obstacle_deviation']] == pytest.approx([0.07, 0.04])
 
 
-def rotated(quaternion: Any, vector: np.ndarray) -> np.ndarray:
-    axis = np.array([quaternion.x, quaternion.y, quaternion.z])
-    return vector + 2 * np.cross(axis, np.cross(axis, vector) + quaternion.w * vector)
-
-
 def test_few_steps_are_drawn_as_a_smooth_curve_through_them() -> None:
     """The markers of a path with constant jerk lie on the cubic, which the positions of the steps alone do not determine."""
     times = DT * np.arange(STEPS + 1)
@@ -226,19 +222,13 @@ def test_motor_noise_and_total_uncertainty_are_told_apart(plane: str) -> None:
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
 def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
-    markers = [
-        each for each in made('markers', three_ways(), plane=plane).markers if each.ns in ('motor_noise', 'total_uncertainty')
-    ]
-    assert markers
-    for each in markers:
-        drawn = sum(
-            (size / 2) ** 2 * np.outer(axis, axis)
-            for size, axis in (
-                (each.scale.x, rotated(each.pose.orientation, np.array([1.0, 0, 0]))),
-                (each.scale.y, rotated(each.pose.orientation, np.array([0, 1.0, 0]))),
-            )
-        )
-        lifted = lift(np.eye(2), 0.0, plane)
+    names, lifted = ('motor_noise', 'total_uncertainty'), lift(np.eye(2), 0.0, plane)
+    ellipses = [each for each in made('markers', three_ways(), plane=plane).markers if each.ns in names]
+    assert ellipses
+    for each in ellipses:
+        turn = each.pose.orientation
+        axes = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()[:, :2]
+        drawn = axes @ np.diag([each.scale.x / 2, each.scale.y / 2]) ** 2 @ axes.T
         np.testing.assert_allclose(drawn, lifted.T @ [[4e-6, 1e-6], [1e-6, 9e-6]] @ lifted, atol=1e-12)
 
 
