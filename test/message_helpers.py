@@ -33,10 +33,9 @@ both_kinds = pytest.mark.parametrize('types', ['rclpy', 'rosbags'], indirect=Tru
 
 def pose(types: MessageTypes, position: Sequence[float], turned: Mapping[str, float] = {'w': 1.0}) -> Any:
     """Return a pose; turned: its quaternion by axis."""
-    point = dict(zip('xyz', position, strict=True))
     return types.make(
         'geometry_msgs/msg/Pose',
-        position=types.make('geometry_msgs/msg/Point', **point),
+        position=types.fill('geometry_msgs/msg/Point', position),
         orientation=types.make('geometry_msgs/msg/Quaternion', **{'w': 0.0} | dict(turned)),
     )
 
@@ -87,7 +86,7 @@ def marker(
         'visualization_msgs/msg/Marker',
         header=head,
         pose=pose(types, position, turned),
-        scale=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
+        scale=types.fill('geometry_msgs/msg/Vector3', scale),
         lifetime=types.make('builtin_interfaces/msg/Duration', sec=seconds, nanosec=nanoseconds),
         **values,
     )
@@ -95,3 +94,17 @@ def marker(
 
 def marker_array(types: MessageTypes, *markers: Any) -> Any:
     return types.make('visualization_msgs/msg/MarkerArray', markers=list(markers))
+
+
+def transform(
+    types: MessageTypes,
+    child: str,
+    translation: Sequence[float],
+    rotation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+    stamp_ns: int = 0,
+    parent: str = 'world',
+) -> Any:
+    """Return a geometry_msgs/TransformStamped; rotation: a quaternion (x, y, z, w)."""
+    shift, turn = types.fill('geometry_msgs/msg/Vector3', translation), types.fill('geometry_msgs/msg/Quaternion', rotation)
+    moved = types.fill('geometry_msgs/msg/Transform', (shift, turn))
+    return types.fill('geometry_msgs/msg/TransformStamped', (make_header(types, stamp_ns, parent), child, moved))

@@ -11,10 +11,12 @@ import numpy as np
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
 from ros_helpers import Graph
 
-from foc_ros.ros.messages.encode_prediction import OTHER, UNKNOWN
-from foc_ros.ros.messages.types import RclpyTypes
+from foc_ros.ros.messages.encode_prediction import OTHER, OUTPUTS, UNKNOWN
+from foc_ros.ros.messages.types import RclpyTypes, find_message_class
 
 TYPES = RclpyTypes()
+OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
+"""Levels of diagnostics."""
 ROWS = [(0.15, 0.02, 0.0, 0.03)]
 CROWD = [(0.01 * (i % 100) - 0.35, 0.05 + 0.01 * (i // 100), 0.0, 0.004) for i in range(10_000)]
 GOALS = [(0.3, 0.0, 0.0)]
@@ -28,6 +30,13 @@ QUICK = {
 """Parameters for quick predictions, without time limits that a slow machine would exceed."""
 RELIABLE = {f'qos_overrides./{name}.subscription.reliability': 'reliable' for name in ('hand_pose', 'obstacles')}
 """Reliable inputs, so that a test can wait until all of them are received."""
+INPUTS = {
+    'hand_pose': 'geometry_msgs/msg/PoseStamped',
+    'obstacles': 'sensor_msgs/msg/PointCloud2',
+    'obstacle_markers': 'visualization_msgs/msg/MarkerArray',
+    'goals': 'geometry_msgs/msg/PoseArray',
+    'goal_pose': 'geometry_msgs/msg/PoseStamped',
+}
 
 
 def hand_path(count: int, rate_hz: float = 100.0, start_s: float = 10.0) -> list[Any]:
@@ -37,41 +46,38 @@ def hand_path(count: int, rate_hz: float = 100.0, start_s: float = 10.0) -> list
 
 
 class Bench:
-    """`node`: the FocNode; `player`: publishes its inputs; `received`: its outputs by name, `health`: its diagnostics."""
+    """`node`: the FocNode; `player`: publishes its inputs; `received`: its outputs by name, `diagnostics`: all that were heard.
+
+    Unless `ticking`, the node's timers are stopped, since they would publish in between; `health` publishes the diagnostics.
+    """
 
     def __init__(
-        self, ros: Graph, outputs: Iterable[str] = ('prediction', 'likelihoods', 'path', 'markers'), **options: Any
+        self,
+        ros: Graph,
+        outputs: Iterable[str] = ('prediction', 'likelihoods', 'path', 'markers'),
+        *,
+        ticking: bool = False,
+        connected: bool = True,
+        **parameters: Any,
     ) -> None:
-        from diagnostic_msgs.msg import DiagnosticArray
-        from geometry_msgs.msg import PoseArray, PoseStamped
         from rclpy.parameter import Parameter
-        from sensor_msgs.msg import PointCloud2
-        from visualization_msgs.msg import MarkerArray
 
-        from foc_ros.ros.messages.encode_prediction import OUTPUTS
-        from foc_ros.ros.messages.types import find_message_class
         from foc_ros.ros.node import FocNode
 
-        parameters = QUICK | RELIABLE | options.pop('parameters', {})
-        ticking, connected = options.pop('ticking', False), options.pop('connected', True)
-        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-        namespace = options.get('namespace', '')
+        namespace = parameters.pop('namespace', '')
+        given = QUICK | RELIABLE | {name.replace('__', '.'): value for name, value in parameters.items()}
+        overrides = [Parameter(name, value=value) for name, value in given.items()]
         self.ros = ros
-        self.node = ros.add(FocNode(context=ros.context, parameter_overrides=overrides, **options))
+        self.node = ros.add(FocNode(context=ros.context, parameter_overrides=overrides, namespace=namespace))
         if not ticking:
             for timer in self.node.timers:
                 timer.cancel()
         self.player = ros.node(f'player{namespace.replace("/", "_")}', namespace=namespace)
-        inputs = {
-            'hand_pose': PoseStamped,
-            'obstacles': PointCloud2,
-            'obstacle_markers': MarkerArray,
-            'goals': PoseArray,
-            'goal_pose': PoseStamped,
+        self.publishers = {
+            name: self.player.create_publisher(find_message_class(kind), name, 1000) for name, kind in INPUTS.items()
         }
-        self.publishers = {name: self.player.create_publisher(kind, name, 1000) for name, kind in inputs.items()}
         self.received = {name: ros.collect(self.player, find_message_class(OUTPUTS[name][0]), f'foc/{name}') for name in outputs}
-        self.diagnostics = ros.collect(self.player, DiagnosticArray, '/diagnostics')
+        self.diagnostics = ros.collect(self.player, find_message_class('diagnostic_msgs/msg/DiagnosticArray'), '/diagnostics')
         if connected:
             self.connect()
 
@@ -82,8 +88,8 @@ class Bench:
     def _connected(self) -> bool:
         if set(self.received) - set(self.node._outputs):
             return False
-        heard = all(publisher.get_subscription_count() for publisher in self.publishers.values())
-        return heard and all(self.node._outputs[name].get_subscription_count() for name in self.received)
+        ends = [*self.publishers.values(), *(self.node._outputs[name] for name in self.received)]
+        return all(each.get_subscription_count() for each in ends)
 
     def send(self, name: str, *messages: Any) -> None:
         """Publish, and return when the node has every message in its queue, before it takes any."""
@@ -93,17 +99,22 @@ class Bench:
             self.publishers[name].publish(message)
         assert self.publishers[name].wait_for_all_acked(Duration(seconds=20)), f'{name} was not received'
 
+    def take(self, name: str, *messages: Any) -> None:
+        """Publish, and spin until the node has taken every message."""
+        entry = self.node._freshness.inputs[name]
+        wanted = entry.received + len(messages)
+        self.send(name, *messages)
+        self.ros.spin_until(lambda: entry.received >= wanted, f'{name} is taken')
+
     def deliver(self, name: str, *messages: Any) -> None:
         """Publish, and spin until the node has taken every message, and has published what it predicts from them."""
-        monitored = self.node._monitor._inputs
-        before = monitored[name].received if name in monitored else 0
-        self.send(name, *messages)
-        self.ros.spin_until(lambda: name in monitored and monitored[name].received >= before + len(messages), f'{name} is taken')
+        self.take(name, *messages)
         self.ros.spin_until(lambda: not self.node.is_busy, 'the end of a prediction')
 
     def publish_scene(
         self, rows: Sequence[tuple[float, ...]] = ROWS, goals: Sequence[Sequence[float]] = GOALS, stamp_s: float = 10.0
     ) -> None:
+        """Publish obstacles and goals."""
         self.deliver('obstacles', cloud(TYPES, obstacle_table(rows), round(stamp_s * SECOND)))
         self.deliver('goals', pose_array(TYPES, goals))
 
@@ -113,11 +124,12 @@ class Bench:
             self.deliver('hand_pose', pose)
 
     def wait_for(self, name: str, count: int) -> list[Any]:
+        """Return the messages of an output when there are so many."""
         self.ros.spin_until(lambda: len(self.received[name]) >= count, f'{count} messages of {name}')
         return self.received[name]
 
     def health(self) -> Any:
-        """Return the status since the last one; the node's own timer is stopped, because it would publish in between."""
+        """Return the status since the last one."""
         before = len(self._statuses())
         self.node._publish_health()
         self.ros.spin_until(lambda: len(self._statuses()) > before, 'diagnostics')
@@ -126,6 +138,38 @@ class Bench:
     def _statuses(self) -> list[Any]:
         own = self.node.get_fully_qualified_name()
         return [array.status[0] for array in self.diagnostics if array.status[0].hardware_id == own]
+
+    def call(self, kind: Any, name: str, **fields: Any) -> Any:
+        """Return the response of a service of the node."""
+        return self.ros.call(self.player, kind, f'foc/{name}', kind.Request(**fields))
+
+    def change(self, *transitions: str | int) -> bool:
+        """Ask for transitions of the managed node, by label or number, until one is refused; return whether none was."""
+        from lifecycle_msgs.msg import Transition
+        from lifecycle_msgs.srv import ChangeState
+
+        asked = [Transition(**{'label' if isinstance(each, str) else 'id': each}) for each in transitions]
+        return all(self.call(ChangeState, 'change_state', transition=each).success for each in asked)
+
+    @property
+    def state(self) -> str:
+        """The state of the managed node."""
+        from lifecycle_msgs.srv import GetState
+
+        return str(self.call(GetState, 'get_state').current_state.label)
+
+    def set(self, **values: Any) -> Any:
+        """Set parameters together, and return the result."""
+        from rcl_interfaces.srv import SetParametersAtomically
+
+        return self.call(SetParametersAtomically, 'set_parameters_atomically', parameters=list_parameters(**values)).result
+
+
+def list_parameters(**values: Any) -> list[Any]:
+    """Return parameters as messages; the names have `__` in place of a dot."""
+    from rclpy.parameter import Parameter
+
+    return [Parameter(name.replace('__', '.'), value=value).to_parameter_msg() for name, value in values.items()]
 
 
 def begin(ros: Graph, poses: int = 0, **options: Any) -> Bench:
@@ -142,4 +186,10 @@ def list_labels(table: Any) -> list[str]:
 
 
 def figures(status: Any) -> dict[str, str]:
+    """Return the values of diagnostics by name."""
     return {entry.key: entry.value for entry in status.values}
+
+
+def stamps(messages: Iterable[Any]) -> list[int]:
+    """Return the stamps of messages [ns]."""
+    return [message.header.stamp.sec * SECOND + message.header.stamp.nanosec for message in messages]

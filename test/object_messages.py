@@ -67,7 +67,7 @@ def detection(
 ) -> Any:
     """Return a Detection3D."""
     make = OBJECT_TYPES.make
-    length = make('geometry_msgs/msg/Vector3', **dict(zip('xyz', size, strict=True)))
+    length = OBJECT_TYPES.fill('geometry_msgs/msg/Vector3', size)
     box = make('vision_msgs/msg/BoundingBox3D', center=pose(OBJECT_TYPES, place, turned or {'w': 1.0}), size=length)
     return make('vision_msgs/msg/Detection3D', header=make_header(OBJECT_TYPES, 0, frame_id), bbox=box, id=name)
 

@@ -12,9 +12,8 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import pytest
@@ -125,16 +124,10 @@ class Graph:
         self.context.try_shutdown()
         self.context.destroy()
 
-    def __enter__(self) -> Graph:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
-
 
 @contextmanager
 def graph(args: list[str] | None = None) -> Iterator[Graph]:
     """Return a graph in a free domain; args: ROS arguments such as ['--ros-args', '-p', 'rate_hz:=20.0']."""
     require_ros()
-    with reserve_domain() as domain, Graph(domain, args) as made:
+    with reserve_domain() as domain, closing(Graph(domain, args)) as made:
         yield made

@@ -197,10 +197,10 @@ def test_the_node_names_the_package_that_is_missing_for_a_published_topic(role: 
         pytest.skip(f'optional message package {package} is installed')
     node, said = Bench(ros).node, []
     node._loggers[role] = SimpleNamespace(error=lambda text, **_: said.append(text))
-    node._report_missing_packages()
+    node._publish_health()
     assert said == [] and role not in node._inputs
     node.create_publisher(String, role, 1)
-    node._report_missing_packages()
+    node._publish_health()
     assert said == [f'{role} is published, but cannot be received: the package {package} is not installed']
 
 

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from message_helpers import STORE, both_kinds, message_types
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
+from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import FocError
 from foc_ros.core.obstacles.geometry import measure_offsets
@@ -178,11 +177,6 @@ def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
     assert [each.scale.x for each in by_name['obstacle_deviation']] == pytest.approx([0.07, 0.04])
 
 
-def rotated(quaternion: Any, vector: np.ndarray) -> np.ndarray:
-    axis = np.array([quaternion.x, quaternion.y, quaternion.z])
-    return vector + 2 * np.cross(axis, np.cross(axis, vector) + quaternion.w * vector)
-
-
 def test_few_steps_are_drawn_as_a_smooth_curve_through_them() -> None:
     """The markers of a path with constant jerk lie on the cubic, which the positions of the steps alone do not determine."""
     times = DT * np.arange(STEPS + 1)
@@ -228,19 +222,13 @@ def test_motor_noise_and_total_uncertainty_are_told_apart(plane: str) -> None:
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
 def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
-    markers = [
-        each for each in made('markers', three_ways(), plane=plane).markers if each.ns in ('motor_noise', 'total_uncertainty')
-    ]
-    assert markers
-    for each in markers:
-        drawn = sum(
-            (size / 2) ** 2 * np.outer(axis, axis)
-            for size, axis in (
-                (each.scale.x, rotated(each.pose.orientation, np.array([1.0, 0, 0]))),
-                (each.scale.y, rotated(each.pose.orientation, np.array([0, 1.0, 0]))),
-            )
-        )
-        lifted = lift(np.eye(2), 0.0, plane)
+    names, lifted = ('motor_noise', 'total_uncertainty'), lift(np.eye(2), 0.0, plane)
+    ellipses = [each for each in made('markers', three_ways(), plane=plane).markers if each.ns in names]
+    assert ellipses
+    for each in ellipses:
+        turn = each.pose.orientation
+        axes = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()[:, :2]
+        drawn = axes @ np.diag([each.scale.x / 2, each.scale.y / 2]) ** 2 @ axes.T
         np.testing.assert_allclose(drawn, lifted.T @ [[4e-6, 1e-6], [1e-6, 9e-6]] @ lifted, atol=1e-12)
 
 
@@ -288,22 +276,3 @@ def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> No
         back = STORE.deserialize_cdr(raw, kind)
         twin = encode_outputs(three_ways(), OBSTACLES, 'xy', BAGS, [name])[name]
         assert bytes(STORE.serialize_cdr(back, kind)) == bytes(STORE.serialize_cdr(twin, kind))
-
-
-ways = st.lists(st.tuples(st.floats(0, 1), st.floats(-0.3, 0.3), st.floats(0, 1e6), st.sampled_from(list(Status))), max_size=5)
-
-
-@given(ways, st.sampled_from(['xy', 'xz', 'yz']), st.floats(-1e4, 1e4))
-def test_any_prediction_can_be_read_from_its_cloud(
-    rows: list[tuple[float, float, float, Status]], plane: str, height: float
-) -> None:
-    outcomes = [outcome(f'c{i}', p, bend, cost, status=status) for i, (p, bend, cost, status) in enumerate(rows)]
-    given_prediction = prediction(*outcomes, height=height)
-    table = columns(made('prediction', given_prediction, plane=plane))
-    solved = given_prediction.candidates_with_likelihood
-    assert set(table['candidate']) == set(range(len(solved)))
-    for index, each in enumerate(solved):
-        rows_ = table['candidate'] == index
-        xyz = np.stack([table[name][rows_] for name in 'xyz'], axis=-1)
-        np.testing.assert_allclose(xyz, lift(each.solution.path, height, plane), rtol=1e-6, atol=1e-9)
-    assert all(np.isfinite(column).all() for column in table.values())

@@ -106,7 +106,7 @@ def bench() -> Iterator[Any]:
     from node_helpers import Bench
 
     with graph() as ros:
-        yield Bench(ros, parameters={'foc.steps': 10, 'rate_hz': 1000.0})
+        yield Bench(ros, foc__steps=10, rate_hz=1000.0)
 
 
 def test_any_messages_through_a_live_node(bench: Any) -> None:
@@ -116,14 +116,14 @@ def test_any_messages_through_a_live_node(bench: Any) -> None:
     @given(st.lists(inputs(LIVE_TYPES), min_size=LENGTH, max_size=LENGTH))
     def play(messages: list[tuple[str, Any]]) -> None:
         for role, message in messages:
-            before = int(bench.node._monitor._counts['predictions'])
+            before = int(bench.node._monitor.counts['predictions'])
             bench.deliver(role, message)
-            made = int(bench.node._monitor._counts['predictions']) - before
+            made = int(bench.node._monitor.counts['predictions']) - before
             assert made <= (role == topics.HAND), f'{made} predictions from {role}'
         for name, received in bench.received.items():
             assert all(is_finite(name, each) for each in received)
             received.clear()
-        assert not bench.node._monitor._counts['internal_errors'], bench.node._monitor._error
+        assert not bench.node._monitor.counts['internal_errors'], bench.node._monitor._error
 
     play()
     assert bench.health().level in (b'\x00', b'\x01')

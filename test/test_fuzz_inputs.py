@@ -95,7 +95,7 @@ def change_records(file: Path, source: random.Random) -> None:
     database.close()
 
 
-def check_recording(folder: Path, number: int, capsys: pytest.CaptureFixture[str], parameters: str) -> None:
+def check_recording(folder: Path, number: int, capsys: pytest.CaptureFixture[str]) -> None:
     source = random.Random(number)
     file = write_recording(folder / str(number), source)
     if source.random() < 0.5:
@@ -106,7 +106,7 @@ def check_recording(folder: Path, number: int, capsys: pytest.CaptureFixture[str
         change_records(file, source)
     begin = time.process_time()
     path = source.choice((file, file.parent))
-    code = main(['replay', str(path), '--json', '--params', parameters])
+    code = main(['replay', str(path), '--json', '--params', write_parameters(folder)])
     assert time.process_time() - begin < LONGEST_S
     out, err = capsys.readouterr()
     assert code in (0, 2, 3) and (code == 0 or err) and 'Traceback' not in err
@@ -140,23 +140,17 @@ def check_tables(folder: Path, number: int, capsys: pytest.CaptureFixture[str]) 
         assert read is not None and int(read[1]) == sum(bool(line.strip()) for line in given), number
 
 
-def test_damaged_recordings_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for number in range(FEW):
-        check_recording(tmp_path, number, capsys, write_parameters(tmp_path))
+CHECKS = {'recordings': check_recording, 'tables': check_tables}
 
 
-def test_damaged_tables_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize('kind', CHECKS)
+def test_damaged_inputs_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str) -> None:
     for number in range(FEW):
-        check_tables(tmp_path, number, capsys)
+        CHECKS[kind](tmp_path, number, capsys)
 
 
 @pytest.mark.parametrize('batch', range(BATCHES))
-def test_many_damaged_recordings_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], batch: int) -> None:
+@pytest.mark.parametrize('kind', CHECKS)
+def test_many_damaged_inputs_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, batch: int) -> None:
     for number in range(FEW + BATCH * batch, FEW + BATCH * (batch + 1)):
-        check_recording(tmp_path, number, capsys, write_parameters(tmp_path))
-
-
-@pytest.mark.parametrize('batch', range(BATCHES))
-def test_many_damaged_tables_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], batch: int) -> None:
-    for number in range(FEW + BATCH * batch, FEW + BATCH * (batch + 1)):
-        check_tables(tmp_path, number, capsys)
+        CHECKS[kind](tmp_path, number, capsys)

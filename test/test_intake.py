@@ -66,20 +66,17 @@ def test_markers_of_publishers_with_different_delays_are_all_used(intake: Intake
     assert intake.pipeline.scene.sources['markers'].stamp_ns == SECOND
 
 
-def test_deleting_all_markers_is_an_empty_scene(intake: Intake) -> None:
-    move(intake, 1.0)
-    show(intake, marker(TYPES))
-    assert show(intake, marker(TYPES, action=3, ns='', frame_id='')) is SampleStatus.ACCEPTED
-    assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
-
-
 def test_a_table_that_never_held_a_marker_is_no_source(intake: Intake) -> None:
+    """One that did, and holds none any more, is an empty scene."""
     move(intake, 1.0)
-    for message in ((), (marker(TYPES, action=3, ns='', frame_id=''),)):
+    nothing = marker(TYPES, action=3, ns='', frame_id='')
+    for message in ((), (nothing,)):
         assert show(intake, *message) is SampleStatus.ACCEPTED
         assert intake.pipeline.scene.sources == {}
     show(intake, marker(TYPES))
-    assert 'markers' in intake.pipeline.scene.sources
+    assert seen(intake) == ('a/0',)
+    assert show(intake, nothing) is SampleStatus.ACCEPTED
+    assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
 
 
 def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake: Intake) -> None:
@@ -113,6 +110,12 @@ def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:
         ('hand_pose', pose_stamped(TYPES, (np.nan, 0, 0)), 'hand_lost', 'hand_pose: pose.position.x: expected a finite'),
         ('goals', pose_array(TYPES, [(0, 0, 0), (0, np.inf, 0)]), 'goals_invalid', 'goals: poses[1].position.y: expected a'),
         ('goal_pose', pose_stamped(TYPES, (0, 1e9, 0)), 'goal_pose_invalid', 'goal_pose: pose.position.y: expected'),
+        (
+            'goals',
+            pose_array(TYPES, [(0.3, 0.0, np.inf)]),
+            'goals_invalid',
+            'goals: poses[0].position.z: expected a finite number',
+        ),
         ('obstacles', cloud(TYPES, obstacle_table([(0, 0, 0, -1)])), 'obstacles_invalid', 'obstacles: radius[0]: expected a'),
         (
             'obstacle_markers',
@@ -151,12 +154,7 @@ def test_a_refusal_of_the_pipeline_is_reported(intake: Intake) -> None:
     assert move(intake, 1.1, 'camera') is SampleStatus.WRONG_FRAME
     assert intake.counts == {'hand_duplicate': 1, 'hand_wrong_frame': 1}
     assert intake.last_refusal == intake.pipeline.last_refusal and 'camera' in intake.last_refusal
-
-
-def test_a_restart_does_not_replace_the_last_refusal(intake: Intake) -> None:
-    move(intake, 1.0)
-    move(intake, 1.1, 'camera')
     assert intake.take('goals', pose_array(TYPES, [(np.nan, 0.0, 0.0)])) is None
     told = intake.last_refusal
     assert move(intake, 60.0) is SampleStatus.RESTARTED_GAP
-    assert intake.last_refusal == told and 'poses[0]' in told
+    assert intake.last_refusal == told and 'poses[0]' in told, 'a restart is no refusal'

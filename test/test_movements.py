@@ -22,6 +22,7 @@ from foc_ros.core.learning.recordings import PRIOR_COUNT
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.bags import BagReader
+from foc_ros.ros.freshness import Freshness
 from foc_ros.ros.health import Monitor
 from foc_ros.ros.intake import Intake
 
@@ -152,5 +153,5 @@ def test_recording_replay_and_pipeline_learn_the_same(tmp_path: Path) -> None:
 def test_the_diagnostics_count_movements() -> None:
     intake = Intake(Pipeline(CONFIG))
     follow(intake.pipeline, reach(ABOVE), reach(0.7 * BELOW), np.zeros((2, 2)))
-    health = Monitor(0.0).report(1.0, intake, 'active', None, 0.0, [])
+    health = Monitor(intake, Freshness(), 0.0).report(1.0, 'active', None, 0.0, [])
     assert any('1 movements recorded, 1 refused' in value for value in health.values.values())

@@ -13,19 +13,13 @@ import ros_helpers
 
 ros_helpers.require_ros()
 
-from lifecycle_msgs.msg import Transition  # noqa: E402
-from lifecycle_msgs.srv import ChangeState  # noqa: E402
-from message_helpers import cloud, marker, marker_array, obstacle_table, pose_array  # noqa: E402
-from node_helpers import GOALS, ROWS, TYPES, Bench, figures, hand_path, list_labels  # noqa: E402
+from node_helpers import OK, WARN, Bench, begin, figures, hand_path, list_labels, stamps  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
-from test_node_faults import set_on  # noqa: E402
 
 from foc_ros.core import pipeline as computation  # noqa: E402
 from foc_ros.core.deadline import Deadline  # noqa: E402
 from foc_ros.ros import health  # noqa: E402
-
-OK, WARN = b'\x00', b'\x01'
 
 
 class Gate:
@@ -43,6 +37,9 @@ class Gate:
     def open(self) -> None:
         self._open.set()
 
+    def close(self) -> None:
+        self._open.clear()
+
 
 @pytest.fixture
 def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
@@ -52,21 +49,12 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
     made.open()
 
 
-def begin(bench: Bench) -> list[Any]:
-    """Let the node begin a prediction; return the poses after the one from which it predicts."""
-    bench.publish_scene()
-    first, *others = hand_path(20)
+def begin_to_predict(ros: Graph, **options: Any) -> tuple[Bench, list[Any]]:
+    """Return a bench whose node computes a prediction, and the poses after the one from which it does."""
+    bench, (first, *others) = begin(ros, **options), hand_path(20)
     bench.send('hand_pose', first)
-    bench.ros.spin_until(lambda: bench.node.is_busy, 'the begin of a prediction')
-    return others
-
-
-def take(bench: Bench, poses: list[Any]) -> None:
-    """Publish poses, and spin until the node has taken them."""
-    entry = bench.node._monitor._inputs['hand_pose']
-    wanted = entry.received + len(poses)
-    bench.send('hand_pose', *poses)
-    bench.ros.spin_until(lambda: entry.received >= wanted, 'the poses')
+    ros.spin_until(lambda: bench.node.is_busy, 'the begin of a prediction')
+    return bench, others
 
 
 def end(bench: Bench, gate: Gate) -> None:
@@ -77,39 +65,22 @@ def end(bench: Bench, gate: Gate) -> None:
 
 def test_services_and_diagnostics_answer_during_a_prediction(ros: Graph, gate: Gate, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(health, 'BUSY_S', 0.0)
-    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 60.0})
-    poses = begin(bench)
-    assert ros.call(bench.player, SetBool, 'foc/engage', SetBool.Request(data=True)).success
-    take(bench, poses)
+    bench, poses = begin_to_predict(ros, estimator__hand_timeout_s=60.0)
+    assert bench.call(SetBool, 'engage', data=True).success
+    bench.take('hand_pose', *poses)
     status = bench.health()
     assert bench.node.is_busy and not bench.received['prediction']
-    assert status.level == WARN
-    assert status.message.startswith('busy: a prediction has been computed for ')
+    assert status.level == WARN and status.message.startswith('busy: a prediction has been computed for ')
     assert figures(status)['hand_pose refused'] == f'0 of {len(poses) + 1}'
     end(bench, gate)
-    stamps = [each.header.stamp for each in bench.wait_for('prediction', 2)]
-    assert stamps == [hand_path(1)[0].header.stamp, poses[-1].header.stamp], 'the next one is made from the newest pose'
-
-
-def test_poses_in_the_queue_are_no_silence(ros: Graph) -> None:
-    """Whatever kept the node from taking its messages, its diagnostics do not blame the hand."""
-    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.3})
-    bench.publish_scene()
-    first, second = hand_path(2)
-    bench.move([first])
-    ros.spin_for(0.4)
-    assert 'hand_pose silent' in bench.health().message
-    bench.send('hand_pose', second)
-    bench.node._publish_health()
-    ros.spin_until(lambda: len(bench.diagnostics) > 1, 'diagnostics')
-    assert 'silent' not in bench.diagnostics[-1].status[0].message
+    expected = stamps([hand_path(1)[0], poses[-1]])
+    assert stamps(bench.wait_for('prediction', 2)) == expected, 'the next one is made from the newest pose'
 
 
 def test_a_prediction_that_is_too_old_at_its_end_is_withheld(ros: Graph, gate: Gate) -> None:
-    bench = Bench(ros, parameters={'estimator.hand_timeout_s': 0.3})
-    poses = begin(bench)
+    bench, poses = begin_to_predict(ros, estimator__hand_timeout_s=0.3)
     ros.spin_for(0.4)
-    take(bench, poses[:1])
+    bench.take('hand_pose', poses[0])
     end(bench, gate)
     status = bench.health()
     assert not bench.received['prediction']
@@ -121,26 +92,18 @@ def test_a_prediction_that_is_too_old_at_its_end_is_withheld(ros: Graph, gate: G
     assert bench.health().level == OK
 
 
-def change(bench: Bench, *labels: str) -> None:
-    for label in labels:
-        request = ChangeState.Request(transition=Transition(label=label))
-        assert bench.ros.call(bench.player, ChangeState, 'foc/change_state', request).success
-
-
 INTERRUPTIONS = {
-    'reset': lambda bench: bench.ros.call(bench.player, Trigger, 'foc/reset', Trigger.Request()),
-    'clutch': lambda bench: bench.ros.call(bench.player, SetBool, 'foc/engage', SetBool.Request(data=False)),
-    'deactivation': lambda bench: change(bench, 'deactivate'),
-    'deactivation and activation': lambda bench: change(bench, 'deactivate', 'activate'),
-    'cleaning up': lambda bench: change(bench, 'deactivate', 'cleanup', 'configure', 'activate'),
-    'shutdown': lambda bench: change(bench, 'shutdown'),
+    'reset': lambda bench: bench.call(Trigger, 'reset'),
+    'clutch': lambda bench: bench.call(SetBool, 'engage', data=False),
+    'deactivation and activation': lambda bench: bench.change('deactivate', 'activate'),
+    'cleaning up': lambda bench: bench.change('deactivate', 'cleanup', 'configure', 'activate'),
+    'shutdown': lambda bench: bench.change('shutdown'),
 }
 
 
 @pytest.mark.parametrize('name', INTERRUPTIONS)
 def test_nothing_that_was_computed_before_is_published_after(ros: Graph, gate: Gate, name: str) -> None:
-    bench = Bench(ros)
-    begin(bench)
+    bench, _ = begin_to_predict(ros)
     INTERRUPTIONS[name](bench)
     assert gate.deadlines[0].has_passed, 'the computation is asked to end'
     end(bench, gate)
@@ -149,56 +112,26 @@ def test_nothing_that_was_computed_before_is_published_after(ros: Graph, gate: G
 
 
 def test_new_parameters_hold_from_the_next_prediction_on(ros: Graph, gate: Gate) -> None:
-    bench = Bench(ros)
-    poses = begin(bench)
-    take(bench, poses[:1])
-    assert set_on(bench, homotopy__max_candidates=1).successful
+    bench, poses = begin_to_predict(ros)
+    bench.take('hand_pose', poses[0])
+    assert bench.set(homotopy__max_candidates=1).successful
     end(bench, gate)
     (table,) = bench.wait_for('likelihoods', 1)
     assert len(list_labels(table)) == 1
-    assert bench.received['prediction'][0].header.stamp == poses[0].header.stamp
+    assert stamps(bench.received['prediction']) == stamps(poses[:1])
 
 
-def test_the_budget_is_the_deadline_of_a_live_prediction(ros: Graph, gate: Gate) -> None:
-    bench = Bench(ros, parameters={'budget_s': 0.05})
-    begin(bench)
+def test_the_budget_is_the_deadline_of_a_live_prediction_and_so_is_the_end_of_the_node(ros: Graph, gate: Gate) -> None:
+    bench, poses = begin_to_predict(ros, budget_s=0.05)
     assert gate.deadlines[0].left_s < 0.05
     end(bench, gate)
     assert figures(bench.health())['count predictions'] == '1'
-
-
-def test_a_node_that_is_destroyed_ends_its_prediction(ros: Graph, gate: Gate) -> None:
-    bench = Bench(ros)
-    begin(bench)
+    gate.close()
+    bench.send('hand_pose', *poses[:4])
+    ros.spin_until(lambda: bench.node.is_busy, 'another prediction')
     ros.nodes.remove(bench.node)
     ros.executor.remove_node(bench.node)
     bench.node.destroy_node()
-    assert gate.deadlines[0].has_passed
-    assert bench.node.is_busy_after(0.01)
+    assert gate.deadlines[-1].has_passed and bench.node.is_busy_after(0.01)
     gate.open()
     assert not bench.node.is_busy_after(20.0)
-
-
-def test_an_empty_marker_array_that_was_sent_once_does_not_block(ros: Graph) -> None:
-    bench = Bench(ros, parameters={'scene.timeout_s': 1.0})
-    bench.deliver('obstacle_markers', marker_array(TYPES))
-    ros.spin_for(1.1)
-    bench.deliver('goals', pose_array(TYPES, GOALS))
-    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 0))
-    bench.move(hand_path(1))
-    bench.wait_for('prediction', 1)
-
-
-def test_reset_removes_silent_sources(ros: Graph) -> None:
-    bench, poses = Bench(ros, parameters={'scene.timeout_s': 1.0}), hand_path(4)
-    bench.deliver('obstacle_markers', marker_array(TYPES, marker(TYPES, (0.15, 0.2, 0.0), stamp_ns=0)))
-    bench.deliver('goals', pose_array(TYPES, GOALS))
-    ros.spin_for(1.1)
-    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 0))
-    bench.move(poses[:2])
-    assert 'obstacle_markers silent for' in bench.health().message
-    answer = ros.call(bench.player, Trigger, 'foc/reset', Trigger.Request())
-    assert answer.message.startswith('the movement is forgotten, the scene is kept')
-    assert set(bench.node.pipeline.scene.sources) == {'cloud'}
-    bench.move(poses[2:])
-    bench.wait_for('prediction', 1)

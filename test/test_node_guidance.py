@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,10 +14,13 @@ import ros_helpers
 
 ros_helpers.require_ros()
 
+from geometry_msgs.msg import PoseStamped, TwistStamped, Wrench, WrenchStamped  # noqa: E402
 from message_helpers import SECOND, pose_stamped  # noqa: E402
 from node_helpers import TYPES, Bench, figures  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
+from std_msgs.msg import Float64MultiArray  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
 
 from foc_ros.core import pipeline as pipelines  # noqa: E402
 from foc_ros.ros import guidance  # noqa: E402
@@ -33,27 +37,23 @@ def bow(tick: int) -> tuple[float, float, float]:
 
 
 class Guided(Bench):
-    """A bench with the outputs of guidance; `wrenches`: with the time at which each arrived [s]."""
+    """A bench with the outputs of guidance, and a scene; `wrenches`: with the time at which each arrived [s]."""
 
-    def __init__(self, ros: Graph, **parameters: object) -> None:
-        from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
-        from std_msgs.msg import Float64MultiArray
-
-        super().__init__(ros, outputs=('prediction', 'markers'), parameters=GUIDED | parameters)
+    def __init__(self, ros: Graph, **parameters: Any) -> None:
+        super().__init__(ros, outputs=('prediction', 'markers'), **GUIDED | parameters)
         self.tick = 0
-        self.wrenches: list[tuple[float, object]] = []
+        self.wrenches: list[tuple[float, Any]] = []
         keep = lambda message: self.wrenches.append((time.monotonic(), message))  # noqa: E731
         self.player.create_subscription(WrenchStamped, 'foc/guidance/wrench', keep, 1000)
-        self.references = ros.collect(self.player, PoseStamped, 'foc/guidance/reference')
-        self.stiffness = ros.collect(self.player, Float64MultiArray, 'foc/guidance/stiffness')
-        self.twists = ros.collect(self.player, TwistStamped, 'foc/guidance/twist')
+        kinds = {'reference': PoseStamped, 'stiffness': Float64MultiArray, 'twist': TwistStamped, 'wrench_unstamped': Wrench}
+        self.guided = {name: ros.collect(self.player, kind, f'foc/guidance/{name}') for name, kind in kinds.items()}
         self.commands = self.player.create_publisher(TwistStamped, 'command_twist', 10)
-        publishers = self.node._guidance.publishers.values()
-        ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers), 'the outputs of guidance')
-        ros.spin_until(lambda: bool(self.commands.get_subscription_count()), 'the command')
+        ends = *self.node._guidance.publishers.values(), self.commands
+        ros.spin_until(lambda: all(each.get_subscription_count() for each in ends), 'the topics of guidance')
+        self.publish_scene()
 
     @property
-    def forces(self):
+    def forces(self) -> np.ndarray:
         return np.array([[each.wrench.force.x, each.wrench.force.y, each.wrench.force.z] for _, each in self.wrenches])
 
     def drive(self, count: int) -> None:
@@ -74,31 +74,28 @@ class Guided(Bench):
             assert time.monotonic() < deadline, f'waited 20 s for: {what}'
             self.drive(5)
 
-    def command(self, x: float, y: float, frame_id: str = 'world') -> None:
-        from geometry_msgs.msg import TwistStamped
+    def feel_force(self) -> None:
+        """Move the hand on until it feels a new force."""
+        count = len(self.wrenches)
+        self.drive_until(lambda: len(self.wrenches) > count and bool(self.forces[count:].any()), 'a force')
 
+    def answer(self, x: float, y: float, frame_id: str = 'world') -> Any:
+        """Return what the node makes of an operator's velocity command."""
         message = TwistStamped()
         message.header.frame_id = frame_id
         message.twist.linear.x, message.twist.linear.y, message.twist.linear.z = x, y, 0.01
         message.twist.angular.z = 0.5
+        self.guided['twist'].clear()
         self.commands.publish(message)
+        self.ros.spin_until(lambda: bool(self.guided['twist']), 'a command')
+        return self.guided['twist'][-1].twist
 
 
-def begin(ros: Graph, **parameters: object) -> Guided:
+def begin(ros: Graph, **parameters: Any) -> Guided:
     bench = Guided(ros, **parameters)
-    bench.publish_scene()
     bench.drive(60)
-    bench.drive_until(lambda: bool(bench.wrenches) and bench.forces.any(), 'a force')
+    bench.feel_force()
     return bench
-
-
-def test_a_node_that_is_a_predictor_only_publishes_no_guidance(ros: Graph) -> None:
-    bench = Guided(ros, **{'guidance.enabled': False})
-    bench.publish_scene()
-    bench.drive(30)
-    bench.wait_for('prediction', 1)
-    assert not bench.wrenches
-    assert figures(bench.health())['guidance'] == 'disabled'
 
 
 def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,11 +107,13 @@ def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pyte
 
     monkeypatch.setattr(guidance.GuidanceLoop, 'update', count)
     bench = Guided(ros, **{'guidance.enabled': False})
-    bench.publish_scene()
+    assert 'guidance/wrench_unstamped' not in bench.node._guidance.publishers
     bench.drive(60)
-    assert not updates
+    bench.wait_for('prediction', 1)
+    assert not updates and not bench.wrenches
+    assert figures(bench.health())['guidance'] == 'disabled'
     bench.node.set_parameters([Parameter('guidance.enabled', value=True)])
-    bench.drive_until(lambda: bool(bench.wrenches) and bench.forces.any(), 'a force')
+    bench.feel_force()
     assert updates
     bench.node.set_parameters([Parameter('guidance.enabled', value=False)])
     ros.spin_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
@@ -125,15 +124,17 @@ def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pyte
 
 
 def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
-    bench = begin(ros)
+    bench = begin(ros, **{'guidance.unstamped': True})
     bench.drive(40)
     wrench = bench.wrenches[-1][1]
     assert wrench.header.frame_id == bench.received['prediction'][-1].header.frame_id
     assert not bench.forces[:, 2].any()
-    matrix = np.array(bench.stiffness[-1].data).reshape(3, 3)
+    unstamped = {(each.force.x, each.force.y, each.force.z) for each in bench.guided['wrench_unstamped']}
+    assert len(unstamped & set(map(tuple, bench.forces))) > 3 and np.isfinite(list(unstamped)).all()
+    matrix = np.array(bench.guided['stiffness'][-1].data).reshape(3, 3)
     assert matrix == pytest.approx(matrix.T) and not matrix[2].any()
-    assert [each.size for each in bench.stiffness[-1].layout.dim] == [3, 3]
-    assert bench.references[-1].pose.position.z == pytest.approx(0.1)
+    assert [each.size for each in bench.guided['stiffness'][-1].layout.dim] == [3, 3]
+    assert bench.guided['reference'][-1].pose.position.z == pytest.approx(0.1)
     markers = [each for each in bench.received['markers'][-1].markers if each.ns == 'guidance']
     assert [each.type for each in markers] == [markers[0].ARROW, markers[0].SPHERE]
     values = figures(bench.health())
@@ -143,8 +144,6 @@ def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
 
 
 def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros: Graph) -> None:
-    from std_srvs.srv import SetBool
-
     bench = begin(ros)
     bench.node._engage(SetBool.Request(data=False), SetBool.Response())
     # how long that takes is measured by scripts/stress.py rates
@@ -156,6 +155,11 @@ def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros: Graph) -> N
     assert figures(bench.health())['guidance'] in ('released', 'stale')
     bench.node._engage(SetBool.Request(data=True), SetBool.Response())
     bench.drive_until(lambda: len(bench.wrenches) > count, 'guidance')
+    bench.feel_force()
+    bench.node.trigger_deactivate()
+    ros.spin_until(lambda: not bench.forces[-1].any(), 'the force is zero')
+    bench.node.trigger_cleanup()
+    assert bench.node._guidance.loop._thread is None, 'the thread has ended'
 
 
 def test_a_silent_hand_is_released(ros: Graph) -> None:
@@ -166,66 +170,48 @@ def test_a_silent_hand_is_released(ros: Graph) -> None:
     assert not bench.forces[-1].any()
 
 
-def test_deactivation_releases_the_hand_and_clean_up_ends_the_thread(ros: Graph) -> None:
-    bench = begin(ros)
-    bench.node.trigger_deactivate()
-    ros.spin_until(lambda: not bench.forces[-1].any(), 'the force is zero')
-    bench.node.trigger_cleanup()
-    assert bench.node._guidance.loop._thread is None
-
-
 def test_commands_are_blended_and_pass_unchanged_without_guidance(ros: Graph) -> None:
     bench = begin(ros)
 
-    def answer(x: float, y: float, **rest: str):
-        bench.twists.clear()
-        bench.command(x, y, **rest)
-        ros.spin_until(lambda: bool(bench.twists), 'a command')
-        return bench.twists[-1].twist
-
     def is_blended() -> bool:
         """Whether guidance turns a command now; it never makes it faster, nor changes what is not in the plane."""
-        twist = answer(0.0, 0.1)
+        twist = bench.answer(0.0, 0.1)
         assert np.hypot(twist.linear.x, twist.linear.y) <= 0.1 + 1e-9
         assert (twist.linear.z, twist.angular.z) == (0.01, 0.5)
         return twist.linear.x > 0.001
 
     # a hand that was silent on a busy machine, or is at a fork, is not guided for a moment
     bench.drive_until(is_blended, 'a command that is blended')
-    assert answer(0.0, 0.1, frame_id='elsewhere').linear.x == 0.0
+    assert bench.answer(0.0, 0.1, 'elsewhere').linear.x == 0.0
     ros.spin_until(lambda: not bench.forces[-1].any(), 'the hand is released')
     ros.spin_for(0.3)
-    assert answer(0.0, 0.1).linear.x == 0.0
+    assert bench.answer(0.0, 0.1).linear.x == 0.0
 
 
-def test_a_slow_prediction_does_not_delay_guidance(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_neither_a_slow_prediction_nor_an_error_stops_guidance(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
     """The prediction keeps the global lock for 30 ms; there are more forces than predictions."""
-    run = pipelines.PredictionTask.run
+    run, guide, failures = pipelines.PredictionTask.run, guidance.guide, list[Exception]()
 
-    def run_slowly(task: pipelines.PredictionTask):
+    def run_slowly(task: pipelines.PredictionTask) -> Any:
         end = time.monotonic() + LOAD_S
         while time.monotonic() < end:
             sum(range(100))
         return run(task)
 
+    def fail_once(*arguments: object) -> Any:
+        if failures:
+            raise failures.pop()
+        return guide(*arguments)
+
     monkeypatch.setattr(pipelines.PredictionTask, 'run', run_slowly)
+    monkeypatch.setattr(guidance, 'guide', fail_once)
     bench = begin(ros, **{'guidance.rate_hz': 50.0})
     bench.wrenches.clear()
     bench.received['prediction'].clear()
     bench.drive(100)
     bench.wait_for('prediction', 1)
     assert len(bench.wrenches) > len(bench.received['prediction'])
-
-
-def test_an_error_of_guidance_is_reported_and_guidance_goes_on(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    bench, guide, failures = begin(ros), guidance.guide, [ValueError('for this test')]
-
-    def fail_once(*arguments: object):
-        if failures:
-            raise failures.pop()
-        return guide(*arguments)
-
-    monkeypatch.setattr(guidance, 'guide', fail_once)
+    failures.append(ValueError('for this test'))
     bench.drive_until(lambda: not failures, 'an update')
     assert int(figures(bench.health())['count internal_errors']) == 1
     bench.wrenches.clear()

@@ -1,33 +1,35 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The node in its own process publishes the predictions of a replay when a bag's raw messages are sent over DDS."""
+"""The node publishes the predictions of a replay, to the last bit, when a bag's raw messages are sent over DDS."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bag_helpers import CONFIG, TYPES, messages, write_bag, write_parameters
-from message_helpers import cloud, obstacle_table, pose_array
-from ros_helpers import Graph
+import ros_helpers
 
-from foc_ros.analysis.replay import Replay
-from foc_ros.core.config import Config, replace_values
-from foc_ros.io.bags import BagReader, Item
-from foc_ros.ros.messages.encode_prediction import encode_outputs
+ros_helpers.require_ros()
 
-ROOT = Path(__file__).parents[1]
+from bag_helpers import CONFIG, messages, write_bag  # noqa: E402
+from bag_helpers import TYPES as BAG_TYPES  # noqa: E402
+from message_helpers import cloud, obstacle_table, pose_array  # noqa: E402
+from node_helpers import TYPES, Bench, figures  # noqa: E402
+from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+
+from foc_ros.analysis.replay import Replay  # noqa: E402
+from foc_ros.core.classes.library import is_same_recording  # noqa: E402
+from foc_ros.core.config import Config, flatten, replace_values  # noqa: E402
+from foc_ros.io.bags import BagReader  # noqa: E402
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs  # noqa: E402
+
 SECONDS = 0.3
 LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
-NO_LIMITS = 'scene.timeout_s:=0.0', 'estimator.hand_timeout_s:=0.0', 'budget_s:=0.0'
-EXACT = ('candidate', 'compromised', 'goal', 'way')
+LEARNING = {'experience.learning': 'online', 'foc.steps': 20, 'homotopy.max_candidates': 2}
+NO_LIMITS = {'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0, 'budget_s': 0.0}
 
 
 def messages_in_space() -> list[tuple[str, int, Any]]:
@@ -37,9 +39,9 @@ def messages_in_space() -> list[tuple[str, int, Any]]:
     found = []
     for topic, stamp_ns, message in messages(SECONDS):
         if topic == '/obstacles':
-            message = cloud(TYPES, scene, stamp_ns)
+            message = cloud(BAG_TYPES, scene, stamp_ns)
         elif topic == '/goals':
-            message = pose_array(TYPES, [(0.3, 0.0, 0.2)])
+            message = pose_array(BAG_TYPES, [(0.3, 0.0, 0.2)])
         else:
             message.pose.position.z = 0.4 - 0.5 * message.pose.position.x
         found.append((topic, stamp_ns, message))
@@ -47,140 +49,56 @@ def messages_in_space() -> list[tuple[str, int, Any]]:
 
 
 CASES = {
-    'fixed': (CONFIG, lambda: messages(SECONDS)),
     'lv': (LV, lambda: messages(SECONDS)),
     'heights': (CONFIG, messages_in_space),
     '1 kHz': (CONFIG, lambda: messages(0.1, rate_hz=1000.0)),
+    'learning': (replace_values(Config(), LEARNING), lambda: messages(1.0)),
 }
 """Parameters, and the messages of a recording."""
 
 
-@contextmanager
-def node_process(ros: Graph, parameters: str) -> Iterator[subprocess.Popen[str]]:
-    """Run the node until the end of the block; it must still run then, and stop without an error."""
-    reliable = [f'qos_overrides./{name}.subscription.reliability:=reliable' for name in ('hand_pose', 'obstacles')]
-    command = [
-        sys.executable,
-        '-m',
-        'foc_ros',
-        'node',
-        '--ros-args',
-        '--params-file',
-        parameters,
-        *(word for each in (*reliable, *NO_LIMITS) for word in ('-p', each)),
-    ]
-    process = subprocess.Popen(
-        command, cwd=ROOT, env=ros.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
-    try:
-        yield process
-        assert process.poll() is None, process.communicate()[0]
-    finally:
-        process.terminate()
-        output = process.communicate(timeout=20)[0]
-    assert process.returncode == 0, output
-
-
-def play(ros: Graph, items: list[Item], due: set[int], parameters: str) -> tuple[list[Any], list[Any], dict[str, str]]:
-    """Publish the raw messages, the scene first; return the clouds and likelihoods that the node publishes, and its diagnostics.
-
-    due: log times of the poses that are due. The next message is sent after their predictions, so that a slow machine is slower
-    and drops nothing.
-    """
-    from diagnostic_msgs.msg import DiagnosticArray
-    from geometry_msgs.msg import PoseArray, PoseStamped
-    from sensor_msgs.msg import PointCloud2
-    from std_msgs.msg import Float64MultiArray
-
-    player = ros.node('player')
-    clouds = ros.collect(player, PointCloud2, '/foc/prediction')
-    likelihoods = ros.collect(player, Float64MultiArray, '/foc/likelihoods')
-    # subscriptions are announced in order: a node whose diagnostics are received knows the two subscriptions above
-    health = ros.collect(player, DiagnosticArray, '/diagnostics')
-    types = {'hand_pose': PoseStamped, 'obstacles': PointCloud2, 'goals': PoseArray}
-    publishers = {role: player.create_publisher(kind, role, 100) for role, kind in types.items()}
-    with node_process(ros, parameters) as process:
-
-        def wait(condition: Any, what: str) -> None:
-            ros.spin_until(lambda: process.poll() is not None or condition(), what)
-            assert process.poll() is None, process.communicate()[0]
-
-        def heard(count: int) -> bool:
-            return len(clouds) >= count <= len(likelihoods)
-
-        def values() -> dict[str, str]:
-            return {each.key: each.value for each in health[-1].status[0].values} if health else {}
-
-        def scene_known() -> bool:
-            return values().get('goals') == '1' and 'obstacles of cloud' in values()
-
-        wait(lambda: all(each.get_subscription_count() for each in publishers.values()), 'the subscriptions of the node')
-        first = next(place for place, item in enumerate(items) if item.role == 'hand_pose')
-        for item in items[:first]:
-            publishers[item.role].publish(bytes(item.raw))
-        wait(scene_known, 'the node to know the scene')
-        for item in items[first:]:
-            publishers[item.role].publish(bytes(item.raw))
-            if item.role == 'hand_pose' and item.log_ns in due:
-                awaited = len(clouds) + 1
-                wait(partial(heard, awaited), f'prediction {awaited}')
-        poses = sum(item.role == 'hand_pose' for item in items)
-        wait(lambda: values().get('hand_pose refused') == f'0 of {poses}', 'every pose in the diagnostics')
-    return clouds, likelihoods, values()
-
-
-def replayed(bag: Path, config: Config) -> tuple[dict[int, dict[str, Any]], dict[str, int]]:
-    """Return the messages of each prediction of a replay, by the log time of its pose, and the counts."""
-    replay = Replay(config)
-    with BagReader(bag) as reader:
-        found = {
-            step.item.log_ns: encode_outputs(step.prediction, step.scene.obstacles(step.prediction.stamp_ns), 'xy', TYPES)
-            for step in replay.steps(reader)
-            if step.prediction is not None
-        }
-    return found, replay.intake.counts
-
-
-def table(cloud: Any) -> np.ndarray:
-    kind = np.dtype([(field.name, {7: '<f4', 6: '<u4'}[field.datatype]) for field in cloud.fields])
-    return np.frombuffer(bytes(cloud.data), dtype=kind)
+def sent(message: Any) -> Any:
+    """Return the message after serialisation, with its float32 fields rounded."""
+    return deserialize_message(serialize_message(message), type(message))
 
 
 @pytest.mark.parametrize('case', CASES)
 def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, case: str) -> None:
     config, make_messages = CASES[case]
-    bag = write_bag(tmp_path / 'reach', make_messages())
-    with BagReader(bag) as reader:
-        items = list(reader)
-    expected, counts = replayed(bag, config)
-    clouds, likelihoods, health = play(ros, items, set(expected), write_parameters(tmp_path, config))
-    assert len(clouds) == len(likelihoods) == len(expected) > 3
-    assert health.get('count hand_skipped', '0') == str(counts.get('hand_skipped', 0))
-    assert max(len(table(each['prediction'])) for each in expected.values()) == 2 * (config.foc.steps + 1)
-    for answer, likelihood, both in zip(clouds, likelihoods, expected.values(), strict=True):
-        assert (answer.header.stamp.sec, answer.header.stamp.nanosec, answer.header.frame_id) == (
-            both['prediction'].header.stamp.sec,
-            both['prediction'].header.stamp.nanosec,
-            both['prediction'].header.frame_id,
-        )
-        labels = [dimension.label for dimension in both['likelihoods'].layout.dim]
-        assert [dimension.label for dimension in likelihood.layout.dim] == labels
-        assert np.allclose(likelihood.data, both['likelihoods'].data, rtol=1e-9, atol=1e-9, equal_nan=True)
-        live, computed = table(answer), table(both['prediction'])
-        assert live.dtype == computed.dtype
-        for name in live.dtype.names or ():
-            rtol, atol = (0.0, 0.0) if name in EXACT else (1e-4, 1e-6 if name in ('x', 'y', 'z', 't', 'likelihood') else 1e-9)
-            assert np.allclose(live[name], computed[name], rtol=rtol, atol=atol), name
+    config = replace_values(config, NO_LIMITS)
+    bench, replay, expected = Bench(ros, **flatten(config)), Replay(config), []
+    with BagReader(write_bag(tmp_path / 'reach', make_messages())) as reader:
+        for step in replay.steps(reader):
+            bench.deliver(step.item.role, bytes(step.item.raw))
+            if step.prediction is not None:
+                obstacles = step.scene.obstacles(step.prediction.stamp_ns)
+                expected.append(encode_outputs(step.prediction, obstacles, 'xy', TYPES))
+    count = len(expected)
+    assert count > 3
+    assert max(each['prediction'].width for each in expected) == 2 * (config.foc.steps + 1)
+    for name in ('prediction', 'path', 'markers'):
+        assert bench.wait_for(name, count) == [sent(each[name]) for each in expected]
+    for received, each in zip(bench.wait_for('likelihoods', count), expected, strict=True):
+        assert received.layout == sent(each['likelihoods']).layout
+        assert np.array_equal(received.data, each['likelihoods'].data, equal_nan=True)  # of shares without a candidate
+    skipped = figures(bench.health()).get('count hand_skipped', '0')
+    assert skipped == str(replay.intake.counts.get('hand_skipped', 0))
+    assert (skipped != '0') == (case == '1 kHz')
+    live, learnt = (each.learnt.movements.finish().learnt for each in (bench.node.pipeline, replay.pipeline))
+    assert (len(live) > 0) == (case == 'learning')
+    assert all(is_same_recording(*each) for each in zip(live, learnt, strict=True))
 
 
 def test_the_case_with_heights_has_heights(tmp_path: Path) -> None:
     """The low obstacle, number 0, is cleared, and the height and its variance change along the path."""
     bag = write_bag(tmp_path / 'reach', messages_in_space())
-    found, _ = replayed(bag, CONFIG)
-    flat, _ = replayed(bag, replace_values(CONFIG, {'predict_height': False}))
-    for answers, is_named in ((found, False), (flat, True)):
-        labels = [each['likelihoods'].layout.dim[0].label for each in answers.values()]
-        assert labels and all(('+0' in label or '-0' in label) == is_named for label in labels)
-    for each in found.values():
-        rows = table(each['prediction'])
-        assert np.ptp(rows['z']) > 0.1 and np.ptp(rows['vz']) > 0.1 and np.ptp(rows['zz']) > 1e-5
+    for is_named, config in ((False, CONFIG), (True, replace_values(CONFIG, {'predict_height': False}))):
+        with BagReader(bag) as reader:
+            made = [step.prediction for step in Replay(config).steps(reader) if step.prediction is not None]
+        assert made
+        for each in made:
+            answer = encode_outputs(each, each.obstacles, 'xy', TYPES)
+            label = answer['likelihoods'].layout.dim[0].label
+            assert ('+0' in label or '-0' in label) == is_named
+            rows = np.frombuffer(bytes(answer['prediction'].data), CLOUD_ROW)
+            assert is_named or (np.ptp(rows['z']) > 0.1 and np.ptp(rows['vz']) > 0.1 and np.ptp(rows['zz']) > 1e-5)

@@ -1,35 +1,34 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The node as a process: it starts or prints the reason why not, and stops without an error on a signal."""
+"""The node as a process, as `ros2` tools use it: it starts or prints the reason why not, answers, and stops without an error."""
 
 from __future__ import annotations
 
-import itertools
 import os
 import signal
-import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import ros_helpers
 
 ros_helpers.require_ros()
 
-from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import GOALS, ROWS, TYPES, figures  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from lifecycle_msgs.msg import Transition, TransitionEvent  # noqa: E402
+from lifecycle_msgs.srv import ChangeState, GetState  # noqa: E402
+from process_helpers import MODULE, ROOT, Player, ended, predict_once, running  # noqa: E402
+from rcl_interfaces.msg import Parameter, ParameterValue  # noqa: E402
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters  # noqa: E402
+from ros_helpers import Graph, graph  # noqa: E402
 
+from foc_ros.core.config import list_parameters  # noqa: E402
 from foc_ros.ros.isolated_node import reserve_domain  # noqa: E402
 from foc_ros.ros.main import main  # noqa: E402
-
-ROOT = Path(__file__).parents[1]
+from foc_ros.ros.messages.encode_prediction import OUTPUTS  # noqa: E402
+from foc_ros.ros.messages.types import find_message_class  # noqa: E402
 
 
 def entry_point(name: str) -> str:
@@ -42,129 +41,65 @@ def entry_point(name: str) -> str:
         return str(Path(sys.executable).with_name(name))
 
 
-LAUNCHES = {
-    'module': [sys.executable, '-m', 'foc_ros.ros.main'],
-    'command': [sys.executable, '-m', 'foc_ros', 'node'],
-    'entry point': [entry_point('foc_node')],
-}
-
-
-@contextmanager
-def running(ros: Graph, launch: str | list[str], *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """Run a node as a process; launch: the key of a command, or the command itself."""
-    command = [*(LAUNCHES[launch] if isinstance(launch, str) else launch), *arguments]
-    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
-    with subprocess.Popen(command, cwd=ROOT, env=ros.environment, **pipes) as process:
-        try:
-            yield process
-        finally:
-            # a process that is killed remains in the graph for 20 s, and the next test in this domain would take it for its own
-            process.terminate()
-            try:
-                process.wait(10)
-            except subprocess.TimeoutExpired:
-                process.kill()
-
-
-def ended(process: subprocess.Popen[str], number: signal.Signals) -> tuple[int, str]:
-    """Send a signal; return the exit code and the text on standard error."""
-    process.send_signal(number)
-    _, errors = process.communicate(timeout=30)
-    return process.returncode, errors
-
-
-@dataclass
-class Player:
-    """What a player of a scene has published and heard: the number of hand poses, the predictions and the diagnostics."""
-
-    sent: int = 0
-    predictions: list[Any] = field(default_factory=list)
-    statuses: list[Any] = field(default_factory=list)
-
-    def figure(self, name: str) -> str | None:
-        """Return a value of the newest diagnostics."""
-        return figures(self.statuses[-1].status[0]).get(name) if self.statuses else None
-
-    def has_heard(self, level: bytes, message: str) -> bool:
-        """Return whether one of the diagnostics had this level and message."""
-        return (level, message) in [(each.status[0].level, each.status[0].message) for each in self.statuses]
-
-
-def feed(ros: Graph, is_enough: Callable[[Player], bool], what: str, hand: str = 'hand_pose') -> Player:
-    """Publish a scene at 10 Hz and, once the node has it, hand poses at 100 Hz by their stamps, until the player has enough.
-
-    The hand moves to and fro before the obstacle, so that it can be predicted for as long as that takes. what: is awaited;
-    hand: topic of its poses.
-    """
-    from diagnostic_msgs.msg import DiagnosticArray
-    from geometry_msgs.msg import PoseArray, PoseStamped
-    from sensor_msgs.msg import PointCloud2
-
-    node, player = ros.node('player'), Player()
-    topics = {hand: PoseStamped, 'obstacles': PointCloud2, 'goals': PoseArray}
-    publishers = {name: node.create_publisher(kind, name, 10) for name, kind in topics.items()}
-    player.predictions = ros.collect(node, PointCloud2, 'foc/prediction')
-    player.statuses = ros.collect(node, DiagnosticArray, '/diagnostics')
-    ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers.values()), 'the node', 30.0)
-    ticks = itertools.count()
-
-    def play_and_check() -> bool:
-        tick = next(ticks)
-        stamp_ns = 10 * SECOND + tick * SECOND // 100
-        if tick % 10 == 0:
-            publishers['obstacles'].publish(cloud(TYPES, obstacle_table(ROWS), stamp_ns))
-            publishers['goals'].publish(pose_array(TYPES, GOALS))
-        if player.sent or player.figure('obstacles of cloud') == '1' == player.figure('goals'):
-            position = (0.05 * np.sin(0.02 * player.sent), 0.0, 0.1)
-            publishers[hand].publish(pose_stamped(TYPES, position, stamp_ns))
-            player.sent += 1
-        ros.spin_for(0.01)
-        return is_enough(player)
-
-    ros.spin_until(play_and_check, what, 40.0)
-    return player
+@pytest.fixture(scope='module')
+def client() -> Iterator[Any]:
+    """Yield a plain node beside the process of a node, for the tests that change nothing or set it back."""
+    with graph() as created, running(created) as process:
+        made = created.node('client')
+        created.spin_until(lambda: 'foc' in made.get_node_names(), 'the node', 30.0)
+        made.ask = lambda kind, name, request: created.call(made, kind, f'foc/{name}', request)
+        made.graph = created
+        yield made
+        assert ended(process)[0] == 0
 
 
 @pytest.mark.parametrize(
-    ('launch', 'number'), [('module', signal.SIGTERM), ('command', signal.SIGINT), ('entry point', signal.SIGTERM)]
+    ('command', 'number'),
+    [
+        (MODULE, signal.SIGTERM),
+        ([sys.executable, '-m', 'foc_ros', 'node'], signal.SIGINT),
+        ([entry_point('foc_node')], signal.SIGTERM),
+    ],
+    ids=['module', 'command', 'entry point'],
 )
-def test_a_working_node_stops_without_an_error(ros: Graph, launch: str, number: signal.Signals) -> None:
-    with running(ros, launch) as process:
-        feed(ros, lambda player: bool(player.predictions), 'a prediction')
+def test_a_working_node_stops_without_an_error(ros: Graph, command: list[str], number: signal.Signals) -> None:
+    with running(ros, command=command) as process:
+        predict_once(ros)
         code, errors = ended(process, number)
     assert code == 0, errors
     assert 'Traceback' not in errors
 
 
-def test_a_node_works_with_an_rclpy_that_has_only_its_plain_executor(
-    ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_node_works_with_an_rclpy_that_has_only_its_plain_executor(ros: Graph, tmp_path: Path) -> None:
     (tmp_path / 'sitecustomize.py').write_text("import sys\nsys.modules['rclpy.experimental.events_executor'] = None\n")
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path), prepend=os.pathsep)
-    with running(ros, 'module') as process:
-        feed(ros, lambda player: bool(player.predictions), 'a prediction')
-        assert ended(process, signal.SIGTERM)[0] == 0
+    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', str(ROOT))])
+    with running(ros, PYTHONPATH=path) as process:
+        predict_once(ros)
+        assert ended(process)[0] == 0
 
 
-def test_a_node_says_what_it_waits_for_and_when_it_predicts(ros: Graph) -> None:
-    with running(ros, 'module', '--ros-args', '-r', 'hand_pose:=MTMR/measured_cp') as process:
-        feed(ros, lambda player: bool(player.predictions), 'a prediction', hand='MTMR/measured_cp')
-        code, errors = ended(process, signal.SIGTERM)
+def test_a_node_says_what_it_does_and_leaves_no_files_and_no_trace_in_the_graph(ros: Graph, tmp_path: Path) -> None:
+    watcher, remapped = ros.node('watcher'), ('--ros-args', '-r', 'hand_pose:=MTMR/measured_cp')
+    path = os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')])
+    with running(ros, *remapped, cwd=tmp_path, ROS_LOG_DIR=str(tmp_path / 'log'), PYTHONPATH=path) as process:
+        predict_once(ros, 'MTMR/measured_cp')
+        code, errors = ended(process)
     assert code == 0
     lines = [line.partition('[foc]: ')[2] for line in errors.splitlines() if line.startswith('[INFO]')]
     assert lines[-2:] == [
         'ready, waiting for /MTMR/measured_cp; /obstacles or /obstacle_markers; /goals or /goal_pose',
         'predicting in frame world, plane xy',
     ]
+    ros.spin_until(lambda: 'foc' not in watcher.get_node_names(), 'the end of the node in the graph', 30.0)
+    assert [each.name for each in tmp_path.iterdir()] == ['log']
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph, number: signal.Signals) -> None:
+def test_a_starting_node_stops_without_an_error_at_any_moment(ros: Graph) -> None:
     watcher = ros.node('watcher')
-    with running(ros, 'module') as process:
+    with running(ros) as process:
         ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
-        process.send_signal(signal.SIGTERM)
-        code, errors = ended(process, number)  # a second one has no effect
+        process.send_signal(signal.SIGINT)
+        code, errors = ended(process, signal.SIGTERM)  # a second one has no effect
     assert code == 0
     assert [line for line in errors.splitlines() if not line.startswith('[INFO]')] == []
 
@@ -197,39 +132,70 @@ def test_a_node_that_cannot_start_prints_the_reason_in_one_line(
     for number, handler in handlers.items():
         signal.signal(number, handler)
     errors = capfd.readouterr().err
-    lines = [line for line in errors.splitlines() if line.startswith('foc_node: ')]
-    assert len(lines) == 1
+    assert len([line for line in errors.splitlines() if line.startswith('foc_node: ')]) == 1
     assert words in errors
     assert 'Traceback' not in errors
 
 
-def test_a_request_that_rclpy_cannot_handle_does_not_end_the_node(ros: Graph) -> None:
-    from rcl_interfaces.msg import Parameter, ParameterValue
-    from rcl_interfaces.srv import GetParameters, SetParameters
-
-    client_node = ros.node('client')
-    with running(ros, 'module') as process:
-        client = client_node.create_client(SetParameters, 'foc/set_parameters')
-        ros.spin_until(client.service_is_ready, 'the node', 30.0)
-        client.call_async(SetParameters.Request(parameters=[Parameter(name='rate_hz', value=ParameterValue(type=99))]))
-        ros.spin_for(0.2)
-        answer = ros.call(client_node, GetParameters, 'foc/get_parameters', GetParameters.Request(names=['rate_hz']))
-        assert answer.values[0].double_value == 50.0
-        assert process.poll() is None
-        code, _ = ended(process, signal.SIGTERM)
-    assert code == 0
+def test_a_request_that_rclpy_cannot_handle_does_not_end_the_node(client: Any) -> None:
+    impossible = client.create_client(SetParameters, 'foc/set_parameters')
+    client.graph.spin_until(impossible.service_is_ready, 'the service')
+    impossible.call_async(SetParameters.Request(parameters=[Parameter(name='rate_hz', value=ParameterValue(type=99))]))
+    client.graph.spin_for(0.2)
+    answer = client.ask(GetParameters, 'get_parameters', GetParameters.Request(names=['rate_hz']))
+    assert answer.values[0].double_value == 50.0
 
 
-def test_a_stopped_node_leaves_no_files_and_no_trace_in_the_graph(ros: Graph, tmp_path: Path) -> None:
-    watcher = ros.node('watcher')
-    command = [sys.executable, '-m', 'foc_ros.ros.main']
-    environment = ros.environment | {'ROS_LOG_DIR': str(tmp_path / 'log'), 'PYTHONPATH': str(ROOT)}
-    with subprocess.Popen(command, cwd=tmp_path, env=environment) as process:
-        ros.spin_until(lambda: 'foc' in watcher.get_node_names(), 'the node', 30.0)
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(30) == 0
-    deadline = time.monotonic() + 30
-    while 'foc' in watcher.get_node_names():
-        assert time.monotonic() < deadline
-        ros.executor.spin_once(timeout_sec=0.05)
-    assert [each.name for each in tmp_path.iterdir()] == ['log']
+def test_every_parameter_is_listed_described_read_and_set(client: Any) -> None:
+    known = {parameter.name: parameter for parameter in list_parameters()}
+    listed = client.ask(ListParameters, 'list_parameters', ListParameters.Request()).result.names
+    assert {*known, 'autostart', 'use_sim_time', 'qos_overrides./obstacles.subscription.durability'} <= set(listed)
+    answer = client.ask(DescribeParameters, 'describe_parameters', DescribeParameters.Request(names=listed))
+    described = {each.name: each for each in answer.descriptors}
+    for name, parameter in known.items():
+        bound, descriptor = parameter.bound, described[name]
+        assert descriptor.description and descriptor.read_only == bound.read_only
+        ranges = [*descriptor.floating_point_range, *descriptor.integer_range]
+        assert [(each.from_value, each.to_value) for each in ranges] == [(bound.low, bound.high)] * (bound.low is not None)
+    values = client.ask(GetParameters, 'get_parameters', GetParameters.Request(names=listed)).values
+    assert len(values) == len(listed) and all(value.type for value in values)
+    again = [Parameter(name=name, value=value) for name, value in zip(listed, values, strict=True)]
+    results = client.ask(SetParameters, 'set_parameters', SetParameters.Request(parameters=again)).results
+    for name, result in zip(listed, results, strict=True):
+        read_only = described[name].read_only
+        assert result.successful != read_only, f'{name}: {result.reason}'
+        assert not read_only or 'read-only' in result.reason
+
+
+def test_the_state_is_changed_and_every_topic_is_received(client: Any) -> None:
+    kinds = {f'foc/{name}': find_message_class(kind) for name, (kind, _) in OUTPUTS.items()}
+    kinds |= {'/diagnostics': DiagnosticArray, 'foc/transition_event': TransitionEvent}
+    received = {name: client.graph.collect(client, kind, name) for name, kind in kinds.items()}
+
+    def change(label: str) -> str:
+        assert client.ask(ChangeState, 'change_state', ChangeState.Request(transition=Transition(label=label))).success
+        return str(client.ask(GetState, 'get_state', GetState.Request()).current_state.label)
+
+    assert [change(each) for each in ('deactivate', 'cleanup', 'configure', 'activate')] == [
+        'inactive',
+        'unconfigured',
+        'inactive',
+        'active',
+    ]
+    Player(client.graph).play_until(lambda: all(received.values()), f'a message on each of {", ".join(kinds)}')
+
+
+def test_a_node_that_is_killed_and_started_again(ros: Graph) -> None:
+    with running(ros) as process:
+        predict_once(ros)
+        process.send_signal(signal.SIGKILL)
+        assert process.wait(30) == -signal.SIGKILL
+    first = ros.nodes.pop()
+    ros.executor.remove_node(first)
+    first.destroy_node()
+    with running(ros, '--ros-args', '-p', 'rate_hz:=10.0', '-p', 'foc.steps:=20') as process:
+        player = Player(ros)
+        fine = b'\x00', 'predicting'
+        heard = lambda: fine in [(each.level, each.message) for each in player.statuses]  # noqa: E731
+        player.play_until(heard, 'a second of predictions without a fault')
+        assert ended(process)[0] == 0

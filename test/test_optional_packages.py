@@ -7,11 +7,11 @@ from __future__ import annotations
 import ast
 import os
 import re
+import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import Any
 
 import pytest
 import ros_helpers
@@ -125,13 +125,13 @@ foc_ros.Guidance(foc_ros.Config())
 def test_the_node_predicts_without_them(ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """Started as by `ros2 run` and `ros2 launch`, by a file in `lib/foc_ros`."""
     ros_helpers.require_ros()
-    from test_node_process import ended, feed, running
+    from process_helpers import ended, predict_once, running
 
     (tmp_path / 'sitecustomize.py').write_text(BLOCK)
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join([str(tmp_path), str(ROOT)]), prepend=os.pathsep)
     command = [sys.executable, str(ROOT / 'scripts' / 'ros2_run' / name)]
-    with running(ros, command) as process:
-        heard: Any = feed(ros, lambda player: bool(player.predictions), 'a prediction')
-        code, errors = ended(process, 2)
+    with running(ros, command=command) as process:
+        player = predict_once(ros)
+        code, errors = ended(process, signal.SIGINT)
     assert code == 0, errors
-    assert heard.predictions[0].width > 0
+    assert player.predictions[0].width > 0

@@ -9,6 +9,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -21,16 +22,20 @@ GUIDED = Config().with_values({'guidance.enabled': True, 'guidance.realtime_prio
 
 def run_in_thread(function: Callable[[], Any]) -> Any:
     """Return what a function returns in a thread of its own."""
-    found: list[Any] = []
-    thread = threading.Thread(target=lambda: found.append(function()))
-    thread.start()
-    thread.join(10.0)
-    return found[0]
+    with ThreadPoolExecutor(1) as threads:
+        return threads.submit(function).result(10.0)
 
 
 def get_policy() -> tuple[int, int]:
     """Return policy and priority of this thread."""
     return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getparam(0).sched_priority
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.001)
 
 
 def make_loop(warn: Callable[[str], None] = lambda _: None) -> GuidanceLoop:
@@ -76,10 +81,7 @@ def test_the_thread_of_guidance_has_it_while_guidance_is_enabled(monkeypatch: py
     loop = make_loop()
 
     def wait_for(*priorities: int) -> None:
-        end = time.monotonic() + 10.0
-        while asked != [('guidance', each) for each in priorities]:
-            assert time.monotonic() < end, f'asked for {asked}, not for {priorities}'
-            time.sleep(0.001)
+        wait_until(lambda: asked == [('guidance', each) for each in priorities])
 
     loop.start()
     try:
@@ -103,10 +105,7 @@ def test_a_late_update_leaves_the_processor_to_others(monkeypatch: pytest.Monkey
     monkeypatch.setattr(GuidanceLoop, 'update', update_slowly)
     loop = make_loop()
     loop.start()
-    end = time.monotonic() + 10.0
-    while len(updates) < 5 and time.monotonic() < end:
-        time.sleep(0.001)
+    wait_until(lambda: len(updates) >= 5)
     loop.stop()
-    assert len(updates) >= 5
     pauses = [began - ended for (_, ended), (began, _) in itertools.pairwise(updates)]
     assert min(pauses) > 0.09 / GUIDED.guidance.rate_hz

@@ -18,24 +18,13 @@ from scipy.spatial.transform import Rotation
 ros_helpers.require_ros()
 tf2_ros = pytest.importorskip('tf2_ros', reason='optional message package: tf2_ros', exc_type=ImportError)
 
-from geometry_msgs.msg import TransformStamped  # noqa: E402
-from message_helpers import SECOND, cloud, obstacle_table  # noqa: E402
+from message_helpers import SECOND, cloud, obstacle_table, transform  # noqa: E402
 from node_helpers import TYPES, Bench, begin, figures, hand_path  # noqa: E402
 from rclpy.time import Time  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 
 from foc_ros.ros.transforms import TransformTree, TransformUnavailableError  # noqa: E402
-
-
-def transform(parent: str, child: str, stamp_ns: int, position: Any, quaternion: Any = (0.0, 0.0, 0.0, 1.0)) -> Any:
-    message = TransformStamped(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = parent, Time(nanoseconds=stamp_ns).to_msg()
-    for axis, value in zip('xyz', position, strict=True):
-        setattr(message.transform.translation, axis, float(value))
-    for axis, value in zip('xyzw', quaternion, strict=True):
-        setattr(message.transform.rotation, axis, float(value))
-    return message
 
 
 def is_followed(ros: Graph, bench: Bench) -> Any:
@@ -47,9 +36,9 @@ def is_followed(ros: Graph, bench: Bench) -> Any:
 
 def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> None:
     """A hand and obstacles in the frame of a camera on a moving arm, each sent before the transform for its stamp."""
-    bench = begin(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 10.0})
+    bench = begin(ros, frame_id='world', frames__tolerance_s=10.0)
     broadcaster, rows = is_followed(ros, bench), obstacle_table([(0.2, 0.02, 0.0, 0.03)])
-    broadcaster.sendTransform(transform('world', 'camera', 10 * SECOND - 1, (0.0, 0.0, 0.0)))
+    broadcaster.sendTransform(transform(TYPES, 'camera', (0.0, 0.0, 0.0), stamp_ns=10 * SECOND - 1))
     for i, pose in enumerate(hand_path(40)):
         pose.header.frame_id = 'camera'
         stamp_ns = 10 * SECOND + i * SECOND // 100
@@ -57,7 +46,7 @@ def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> N
             bench.send('obstacles', cloud(TYPES, rows, stamp_ns, 'camera'))
         bench.send('hand_pose', pose)
         ros.spin_until(lambda: 'hand_pose' in bench.node._transforms.roles, 'a message that is held')
-        broadcaster.sendTransform(transform('world', 'camera', stamp_ns, (0.0, 0.001 * i, 0.0)))
+        broadcaster.sendTransform(transform(TYPES, 'camera', (0.0, 0.001 * i, 0.0), stamp_ns=stamp_ns))
         ros.spin_until(lambda: not bench.node._transforms.roles, 'the transform')
         assert bench.node.intake.sample.position.tolist() == pytest.approx([pose.pose.position.x, 0.001 * i])
     status = figures(bench.health())
@@ -68,8 +57,7 @@ def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> N
 
 def test_a_simulation_that_starts_again_forgets_its_transforms(ros: Graph) -> None:
     """In the second round the camera is elsewhere: the transforms of the first, newer by their stamps, are not used."""
-    parameters = {'frame_id': 'world', 'frames.tolerance_s': 10.0, 'use_sim_time': True}
-    bench = Bench(ros, parameters=parameters, outputs=[])
+    bench = Bench(ros, outputs=[], frame_id='world', frames__tolerance_s=10.0, use_sim_time=True)
     broadcaster, clock = is_followed(ros, bench), bench.player.create_publisher(Clock, '/clock', 10)
     ros.spin_until(lambda: clock.get_subscription_count() > 0, 'the clock')
     rows, node_clock = obstacle_table([(0.2, 0.0, 0.0, 0.03)]), bench.node.get_clock()
@@ -80,7 +68,7 @@ def test_a_simulation_that_starts_again_forgets_its_transforms(ros: Graph) -> No
             ros.spin_until(lambda now=stamp_ns: node_clock.now().nanoseconds == now, 'the clock of the node')
             bench.send('obstacles', cloud(TYPES, rows, stamp_ns, 'camera'))
             ros.spin_until(lambda: bench.node._transforms.roles == ['obstacles'], 'a message that is held')
-            broadcaster.sendTransform(transform('world', 'camera', stamp_ns, (turn + 0.01 * i, 0.0, 0.0)))
+            broadcaster.sendTransform(transform(TYPES, 'camera', (turn + 0.01 * i, 0.0, 0.0), stamp_ns=stamp_ns))
             ros.spin_until(lambda: not bench.node._transforms.roles, 'the transform')
             centre = bench.node.pipeline.scene.sources['cloud'].obstacles.centre
             np.testing.assert_allclose(centre, [[0.2 + turn + 0.01 * i, 0.0]])
@@ -96,9 +84,8 @@ def test_the_transforms_of_a_recording_are_those_of_tf2() -> None:
         for i in range(1, 6):
             parent, is_static = names[generator.integers(i)], generator.random() < 0.3
             for stamp_ns in np.sort(generator.integers(1, 5 * SECOND, 1 if is_static else 8)).tolist():
-                message = transform(
-                    parent, names[i], stamp_ns, generator.normal(size=3), Rotation.random(rng=generator).as_quat()
-                )
+                turn = Rotation.random(rng=generator).as_quat()
+                message = transform(TYPES, names[i], generator.normal(size=3), turn, stamp_ns, parent)
                 tree.add(SimpleNamespace(transforms=[message]), is_static=is_static)
                 (buffer.set_transform_static if is_static else buffer.set_transform)(message, '')
         for stamp_ns in [0, *generator.integers(1, 5 * SECOND, 20).tolist()]:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -14,18 +15,32 @@ import ros_helpers
 
 ros_helpers.require_ros()
 
-from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures, hand_path  # noqa: E402
+from message_helpers import (  # noqa: E402
+    SECOND,
+    cloud,
+    marker,
+    marker_array,
+    obstacle_table,
+    pose_array,
+    pose_stamped,
+    transform,
+)
+from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 
 from foc_ros.core.config import Config, replace_values  # noqa: E402
+from foc_ros.core.errors import MessageError  # noqa: E402
 from foc_ros.core.obstacles.geometry import measure_offsets  # noqa: E402
 from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
+from foc_ros.core.pipeline import Pipeline  # noqa: E402
+from foc_ros.ros.intake import Intake  # noqa: E402
+from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud  # noqa: E402
 from foc_ros.ros.messages.decode_poses import decode_hand_sample  # noqa: E402
+from foc_ros.ros.messages.plane import Transform  # noqa: E402
 from foc_ros.ros.transforms import Transforms, TransformTree, TransformUnavailableError  # noqa: E402
 
-QUARTER = {'x': 0.0, 'y': 0.0, 'z': np.sqrt(0.5), 'w': np.sqrt(0.5)}
+BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
 
 
 class TransformException(Exception):
@@ -44,8 +59,8 @@ class Buffer(TransformTree):
             found = self.look_up(target, source, time.nanoseconds)
         except TransformUnavailableError as error:
             raise TransformException(str(error)) from None
-        rotation = Rotation.from_matrix(found.rotation).as_quat().tolist()
-        return transform(target, source, found.stamp_ns, *(name_axes(each) for each in (found.translation.tolist(), rotation)))
+        rotation = Rotation.from_matrix(found.rotation).as_quat()
+        return transform(TYPES, source, found.translation, rotation, found.stamp_ns, target)
 
     def set_transform(self, transform: Any, authority: str) -> None:
         self.add(SimpleNamespace(transforms=[transform]), is_static=False)
@@ -54,22 +69,9 @@ class Buffer(TransformTree):
         self.add(SimpleNamespace(transforms=[transform]), is_static=True)
 
 
-def name_axes(numbers: list[float]) -> Any:
-    return SimpleNamespace(**dict(zip('xyzw', numbers, strict=False)))
-
-
-def transform(parent: str, child: str, stamp_ns: int, translation: Any, rotation: Any) -> Any:
-    """Return a geometry_msgs/TransformStamped."""
-    return SimpleNamespace(
-        header=SimpleNamespace(stamp=pose_stamped(TYPES, (0, 0, 0), stamp_ns).header.stamp, frame_id=parent),
-        child_frame_id=child,
-        transform=SimpleNamespace(translation=translation, rotation=rotation),
-    )
-
-
 def camera(x: float, stamp_ns: int = 0) -> Any:
     """Return the transform of a camera at (x, 0, 0) in the world, rotated by 90 degrees to the left."""
-    return transform('world', 'camera', stamp_ns, SimpleNamespace(x=x, y=0.0, z=0.0), SimpleNamespace(**QUARTER))
+    return transform(TYPES, 'camera', (x, 0.0, 0.0), (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)), stamp_ns)
 
 
 @pytest.fixture
@@ -77,11 +79,6 @@ def tf2(monkeypatch: pytest.MonkeyPatch) -> None:
     """Install a substitute for tf2."""
     module = SimpleNamespace(Buffer=Buffer, TransformListener=lambda buffer, node: None, TransformException=TransformException)
     monkeypatch.setitem(sys.modules, 'tf2_ros', module)
-
-
-@pytest.fixture
-def no_tf2(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'tf2_ros', None)
 
 
 def seen(bench: Bench) -> np.ndarray:
@@ -111,17 +108,10 @@ def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
     assert bench.node.intake.sample.height == 0.25
     assert {message.header.frame_id for message in bench.wait_for('prediction', 2)} == {'world'}
 
-
-BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
-
-
-@pytest.mark.usefixtures('tf2')
-def test_boxes_are_turned(ros: Graph) -> None:
-    bench = begin(ros, 1)
     bench.deliver('obstacles', cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)], BOX), 10 * SECOND, 'camera'))
     turned = {'z': np.sin(0.15), 'w': np.cos(0.15)}
     cube = marker(TYPES, (0.1, 0.0, 0.0), (0.2, 0.1, 0.05), type=1, frame_id='camera', turned=turned)
-    bench.deliver('obstacle_markers', marker_array(TYPES, cube))
+    bench.deliver('obstacle_markers', marker_array(TYPES, marker(TYPES, action=3, ns=''), cube))
     obstacles = bench.node.pipeline.scene.obstacles(10 * SECOND)
     np.testing.assert_allclose(obstacles.centre, [[0.7, 0.2], [1.0, 0.1]], atol=1e-12)
     expected = make_box_polygon((0.2, 0.1), 0.3 + np.pi / 2)
@@ -130,18 +120,27 @@ def test_boxes_are_turned(ros: Graph) -> None:
 
 
 @pytest.mark.usefixtures('tf2')
-@pytest.mark.parametrize(
-    ('columns', 'plane', 'words'),
-    [
-        (BOX[:-1], 'xy', 'fields: expected a field yaw, because the transform turns the boxes'),
-        (BOX, 'xz', 'fields[size_x]: expected boxes that the transform leaves in the task plane, got a tilt of 1'),
-    ],
-)
-def test_boxes_that_cannot_be_turned_are_refused(ros: Graph, columns: list[Any], plane: str, words: str) -> None:
-    message = cloud(TYPES, obstacle_table([(0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3)[: len(columns)]], columns), 10 * SECOND, 'camera')
-    bench = Bench(ros, parameters={'plane': plane, 'frame_id': 'world'})
-    bench.deliver('obstacles', message)
-    assert words in figures(bench.health())['last refusal']
+def test_what_cannot_be_transformed_is_refused_with_its_reason(ros: Graph) -> None:
+    bench = begin(ros, 1)
+    row, scene = (0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3), bench.node.pipeline.scene
+    for message, words in (
+        (
+            cloud(TYPES, obstacle_table([row[:-1]], BOX[:-1]), 10 * SECOND, 'camera'),
+            'fields: expected a field yaw, because the transform turns the boxes',
+        ),
+        (cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'camera', data=b'abc'), 'obstacles: data: expected 16 bytes'),
+        (
+            cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'),
+            "the working frame 'world', got 'moon'; no transform to world: moon and world are not connected",
+        ),
+    ):
+        bench.deliver('obstacles', message)
+        assert words in figures(bench.health())['last refusal']
+        assert bench.node.pipeline.scene is scene
+    turn = Transform(Rotation.from_euler('z', 90, degrees=True).as_matrix(), np.zeros(3))
+    words = 'fields[size_x]: expected boxes that the transform leaves in the task plane, got a tilt of 1'
+    with pytest.raises(MessageError, match=re.escape(words)):
+        decode_point_cloud(cloud(TYPES, obstacle_table([row], BOX)), 'xz', lambda _: ('world', turn))
 
 
 @pytest.mark.usefixtures('tf2')
@@ -156,27 +155,8 @@ def test_rows_that_are_not_finite_are_dropped_from_a_transformed_scene(ros: Grap
     assert figures(bench.health())['count obstacles_dropped_not_finite'] == '2'
 
 
-@pytest.mark.usefixtures('tf2')
-def test_a_frame_unknown_to_tf2_is_refused_with_both_names(ros: Graph) -> None:
-    bench = begin(ros, 1)
-    scene = bench.node.pipeline.scene
-    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'moon'))
-    assert bench.node.pipeline.scene is scene
-    refusal = figures(bench.health())['last refusal']
-    assert "the working frame 'world', got 'moon'" in refusal
-    assert 'no transform to world: moon and world are not connected' in refusal
-
-
-@pytest.mark.usefixtures('tf2')
-def test_a_wrong_message_in_another_frame_is_refused_with_its_reason(ros: Graph) -> None:
-    bench = Bench(ros)
-    bench.move(hand_path(1))
-    bench.deliver('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND, 'camera', data=b'abc'))
-    assert 'obstacles: data: expected 16 bytes' in figures(bench.health())['last refusal']
-
-
-@pytest.mark.usefixtures('no_tf2')
-def test_without_tf2_other_frames_are_refused(ros: Graph) -> None:
+def test_without_tf2_other_frames_are_refused(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'tf2_ros', None)
     bench = begin(ros, 2)
     bench.wait_for('prediction', 1)
     bench.deliver('goals', pose_array(TYPES, GOALS, 'camera'))
@@ -192,14 +172,15 @@ class Held:
 
     def __init__(self, tolerance_s: float) -> None:
         self.tree = TransformTree()
-        self.transforms = Transforms(self.tree)
-        self.config = replace_values(Config(), {'frames.tolerance_s': tolerance_s})
+        config = replace_values(Config(), {'frames.tolerance_s': tolerance_s, 'frame_id': 'world'})
+        self.intake = Intake(Pipeline(config))
+        self.transforms = Transforms(self.tree, self.intake)
 
     def move_camera(self, tick: float, x: float) -> None:
         self.tree.add(SimpleNamespace(transforms=[camera(x, round((10 + tick / 100) * SECOND))]), is_static=False)
 
     def release(self, tick: float) -> list[Any]:
-        return list(self.transforms.release('hand_pose', 'world', self.config, 10 + tick / 100))
+        return list(self.transforms.release('hand_pose', 10 + tick / 100))
 
 
 def test_messages_are_held_in_order_until_their_transform_arrives() -> None:
@@ -219,17 +200,16 @@ def test_messages_are_held_in_order_until_their_transform_arrives() -> None:
     assert held.transforms.roles == []
 
 
-def test_a_pose_that_is_skipped_neither_waits_for_a_transform_nor_gets_one() -> None:
+def test_a_pose_that_is_skipped_neither_waits_for_a_transform_nor_gets_one(monkeypatch: pytest.MonkeyPatch) -> None:
     held = Held(0.1)
-    skipped = {10 * SECOND + SECOND // 100}
-    held.transforms = Transforms(held.tree, skipped.__contains__)
+    monkeypatch.setattr(held.intake, 'is_skipped', {10 * SECOND + SECOND // 100}.__contains__)
     held.move_camera(-1, 1.0)
     for i in range(3):
         held.transforms.add('hand_pose', HAND[i], 10 + i / 100)
-    assert held.release(3) == [] and held.transforms.holds('hand_pose'), 'the first one waits, and those behind it'
+    assert held.release(3) == [] and held.transforms.roles, 'the first one waits, and those behind it'
     held.move_camera(0, 1.0)
     assert [each.place(HAND[i].header)[0] for i, each in enumerate(held.release(3))] == ['world', 'camera']
-    assert held.transforms.holds('hand_pose'), 'the third one waits'
+    assert held.transforms.roles, 'the third one waits'
 
 
 def test_after_the_tolerance_the_newest_transform_is_taken_if_it_is_near_enough() -> None:
@@ -248,7 +228,7 @@ def test_after_the_tolerance_the_newest_transform_is_taken_if_it_is_near_enough(
 
 def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: None) -> None:
     """Obstacles and hand in the frame of a camera that moves: every message is taken with the transform for its stamp."""
-    bench = Bench(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 10.0})
+    bench = Bench(ros, frame_id='world', frames__tolerance_s=10.0)
     tf = bench.node._tf
     tf.set_transform(camera(1.0, 9 * SECOND), '')
     for i, pose in enumerate(HAND):
@@ -265,7 +245,7 @@ def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: 
 
 
 def test_without_a_transform_for_its_stamp_the_newest_one_is_taken_and_counted(ros: Graph, tf2: None) -> None:
-    bench = Bench(ros, parameters={'frame_id': 'world', 'frames.tolerance_s': 0.05})
+    bench = Bench(ros, frame_id='world', frames__tolerance_s=0.05)
     bench.node._tf.set_transform(camera(1.0, 10 * SECOND), '')
     for i, expected in ((4, '0 of 1'), (6, '1 of 2')):
         rows = obstacle_table([(0.2, 0.1, 0.0, 0.03)])

@@ -45,9 +45,9 @@ LONG = (
     # a node under load, and a process that is stopped or killed
     'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
     'test_demo.py::test_the_live_predictions_are_those_of_the_recording',
-    'test_node_hostile.py::test_*a_flood_of_obstacles*',
-    'test_node_hostile.py::test_a_node_that_is_killed_and_started_again',
-    'test_node_hostile.py::test_the_node_keeps_its_promises_in_a_hostile_scene',
+    'test_node_scenes.py::test_*a_flood_of_obstacles*',
+    'test_node_scenes.py::test_the_node_keeps_its_promises_in_a_hostile_scene',
+    'test_node_process.py::test_a_node_that_is_killed_and_started_again',
     'test_node_process.py::test_a_*work*without_an_error',
     'test_node_rates.py::*',
 )

@@ -57,7 +57,7 @@ class Replay:
 
     def _begin_recording(self) -> None:
         self._tree = TransformTree()
-        self._transforms = Transforms(self._tree, self.intake.is_skipped)
+        self._transforms = Transforms(self._tree, self.intake)
         self._received: Counter[str] = Counter()
         self._refused: Counter[tuple[str, str]] = Counter()
         self._reasons: dict[tuple[str, str], str] = {}
@@ -113,7 +113,7 @@ class Replay:
         return '; '.join([*refused, *left_out])
 
     def _release(self, role: str, now_s: float) -> Iterator[tuple[Item, SampleStatus | None]]:
-        for arrival in self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, now_s):
+        for arrival in self._transforms.release(role, now_s):
             try:
                 status = self.intake.take_arrival(role, arrival)
             except (AttributeError, TypeError, ValueError) as error:  # the recording defines the message in another way than ROS

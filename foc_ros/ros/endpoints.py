@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Topics of the node: message types and quality of service, the emptying of a subscription's queue, and transforms from tf2."""
+"""Topics of the node: types and quality of service, who cannot hear whom, topics of goals, and transforms from tf2."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from importlib.util import find_spec
 from typing import Any
@@ -29,19 +29,29 @@ from rclpy.time import Time
 from foc_ros.core.types import Prediction, name_goal
 from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
-from .messages.encode_guidance import GUIDANCE_OUTPUTS, LIVE_OUTPUTS, TWIST, TWIST_TYPE
-from .messages.encode_prediction import GOAL_LIKELIHOOD_TYPE, OUTPUTS, encode_goal_likelihoods
+from .health import THROTTLE_S
+from .messages.encode_guidance import TWIST_TYPE
+from .messages.encode_prediction import GOAL_LIKELIHOOD_TYPE, encode_goal_likelihoods
 from .messages.plane import Transform, compute_rotation
 from .messages.types import MessageTypes, find_message_class
 from .transforms import TransformUnavailableError
 
-INPUTS = (GOALS, GOAL, CLOUD, MARKERS, COLLISION, DETECTIONS, HAND)
-"""Input topics in the order in which the executor takes their messages: the scene before the hand."""
-BEST_EFFORT = (HAND, CLOUD, DETECTIONS)
-"""Inputs of which a later message makes up for a lost one: best-effort subscriptions hear every publisher."""
+BEST_EFFORT, RELIABLE = QoSReliabilityPolicy.BEST_EFFORT, QoSReliabilityPolicy.RELIABLE
+DEPTH = 10
 HAND_DEPTH = 200
 """Length of the queue of hand poses: 0.2 s at 1 kHz, during which a prediction may be computed."""
-SCENE_DEPTH, OUTPUT_DEPTH = 10, 10
+INPUTS = {
+    GOALS: (RELIABLE, DEPTH),
+    GOAL: (RELIABLE, DEPTH),
+    CLOUD: (BEST_EFFORT, DEPTH),
+    MARKERS: (RELIABLE, DEPTH),
+    COLLISION: (RELIABLE, DEPTH),
+    DETECTIONS: (BEST_EFFORT, DEPTH),
+    HAND: (BEST_EFFORT, HAND_DEPTH),
+    COMMAND: (BEST_EFFORT, 1),
+}
+"""Reliability and length of the queue of each input, in the order in which the executor takes their messages: the scene before
+the hand. Best effort, which hears every publisher, where a later message makes up for a lost one."""
 MOST_GOAL_TOPICS = 16
 """Number of goals with a topic of their own: each costs an endpoint in every participant. `~/likelihoods_by_name` has all."""
 OVERRIDABLE = QoSOverridingOptions(
@@ -52,29 +62,24 @@ OVERRIDABLE = QoSOverridingOptions(
 def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dict[str, Any]:
     """Create the subscriptions, by topic; each calls `receive(topic, message)`.
 
-    A message of `BEST_EFFORT` is a complete state; those of the other inputs are changes, or are sent once, and are received
-    reliably. A scene that was published once, before the start of the node, is received with
+    A scene that was published once, before the start of the node, is received with
     `qos_overrides./obstacles.subscription.durability: transient_local`, reliably, but then not from volatile or best-effort
     publishers. Inputs of `find_missing_packages` have no subscription.
 
     The endpoints here have no event callbacks, because each of them lengthens every wake-up of rclpy's plain executor:
     `describe_incompatible_publishers` and `describe_incompatible_subscriptions` find the same in the graph.
     """
-    subscriptions = {}
-    missing = find_missing_packages()
-    for role in INPUTS:
-        if role in missing:
-            continue
-        is_best_effort = role in BEST_EFFORT and not _is_kept_by_publishers(node, role)
-        reliability = QoSReliabilityPolicy.BEST_EFFORT if is_best_effort else QoSReliabilityPolicy.RELIABLE
-        subscriptions[role] = node.create_subscription(
-            find_message_class(TYPES[role]),
-            role,
-            partial(receive, role),
-            _build_qos(reliability, HAND_DEPTH if role == HAND else SCENE_DEPTH),
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-            qos_overriding_options=OVERRIDABLE,
-        )
+    subscriptions, kinds, missing = {}, TYPES | {COMMAND: TWIST_TYPE}, find_missing_packages()
+    for role, (reliability, depth) in INPUTS.items():
+        if role not in missing:
+            subscriptions[role] = node.create_subscription(
+                find_message_class(kinds[role]),
+                role,
+                partial(receive, role),
+                _build_qos(RELIABLE if _is_kept_by_publishers(node, role) else reliability, depth),
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+                qos_overriding_options=OVERRIDABLE,
+            )
     return subscriptions
 
 
@@ -84,45 +89,21 @@ def _is_kept_by_publishers(node: Node, role: str) -> bool:
     return bool(node.has_parameter(name) and node.get_parameter(name).value == 'transient_local')
 
 
-def describe_incompatible_publishers(node: Node, role: str, subscription: Any) -> list[str]:
-    """Return a text for each present publisher of an input that its subscription cannot hear."""
-    found = node.get_publishers_info_by_topic(subscription.topic_name)
-    reasons = [(each.node_name, _find_incompatibility(each.qos_profile, subscription.qos_profile)) for each in found]
-    remedy = f'(see qos_overrides.{subscription.topic_name}.subscription)'
-    return [f'{role} is not heard from {name}, incompatible QoS: {reason} {remedy}' for name, reason in reasons if reason]
+def create_publisher(node: Node, name: str, kind: str) -> Any:
+    """Create the publisher of an output; name: of the topic below the node's name; kind: type of its messages."""
+    return node.create_publisher(
+        find_message_class(kind),
+        f'~/{name}',
+        _build_qos(RELIABLE, DEPTH),
+        event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        qos_overriding_options=OVERRIDABLE,
+    )
 
 
-def describe_incompatible_subscriptions(node: Node, publisher: Any) -> list[str]:
-    """Return a text for each present subscription of an output that cannot receive its messages."""
-    found, given = node.get_subscriptions_info_by_topic(publisher.topic_name), publisher.qos_profile
-    # as in the profiles of the graph: what the node leaves open would count as shorter than infinite, and fit every liveliness
-    rest = {'deadline': Infinite, 'liveliness': QoSLivelinessPolicy.AUTOMATIC, 'liveliness_lease_duration': Infinite}
-    offered = QoSProfile(reliability=given.reliability, durability=given.durability, depth=given.depth, **rest)
-    reasons = [(each.node_name, _find_incompatibility(offered, each.qos_profile)) for each in found]
-    topic = publisher.topic_name
-    remedy = f'(see qos_overrides.{topic}.publisher)'
-    return [f'{name} cannot hear {topic}, incompatible QoS: {reason} {remedy}' for name, reason in reasons if reason]
-
-
-def _find_incompatibility(publisher: QoSProfile, subscription: QoSProfile) -> str:
-    """Return why a subscription cannot receive the messages of a publisher; empty if it can."""
-    compatibility, reason = qos_check_compatible(publisher, subscription)
-    return reason.removeprefix('ERROR: ').rstrip('; ') if compatibility == QoSCompatibility.ERROR else ''
-
-
-def create_command_subscription(node: Node, receive: Callable[[Any], None]) -> Any:
-    """Create the subscription of the operator's velocity command, of which only the newest counts."""
-    qos = _build_qos(QoSReliabilityPolicy.BEST_EFFORT, 1)
-    events = SubscriptionEventCallbacks(use_default_callbacks=False)
-    kind = find_message_class(TWIST_TYPE)
-    return node.create_subscription(kind, COMMAND, receive, qos, event_callbacks=events, qos_overriding_options=OVERRIDABLE)
-
-
-def create_guidance_publishers(node: Node) -> dict[str, Any]:
-    """Create the publishers of guidance, by the name of the topic below the node's name."""
-    outputs = LIVE_OUTPUTS if node.get_parameter('guidance.unstamped').value else GUIDANCE_OUTPUTS
-    kinds = {name: kind for name, (kind, _) in outputs.items()} | {TWIST: TWIST_TYPE}
-    return {name: _create_publisher(node, name, kind) for name, kind in kinds.items()}
+def _build_qos(reliability: QoSReliabilityPolicy, depth: int) -> QoSProfile:
+    """Return a new profile, because rclpy writes the overrides of a topic into its profile."""
+    volatile, keep_last = QoSDurabilityPolicy.VOLATILE, QoSHistoryPolicy.KEEP_LAST
+    return QoSProfile(reliability=reliability, durability=volatile, history=keep_last, depth=depth)
 
 
 def find_missing_packages() -> dict[str, str]:
@@ -131,9 +112,79 @@ def find_missing_packages() -> dict[str, str]:
     return {role: package for role, package in packages.items() if find_spec(package) is None}
 
 
-def create_publishers(node: Node) -> dict[str, Any]:
-    """Create the publishers of the outputs, by the name of the topic below the node's name."""
-    return {name: _create_publisher(node, name, kind) for name, (kind, _) in OUTPUTS.items()}
+def report_unconnected(node: Node, inputs: Mapping[str, Any], outputs: Iterable[Any], loggers: Mapping[str, Any]) -> list[str]:
+    """Log which endpoints cannot hear each other, and which published inputs need a package that is not installed.
+
+    inputs: subscriptions by topic; outputs: publishers; loggers: of the inputs. Returns a text for each publisher that is not
+    heard.
+    """
+    for role, package in find_missing_packages().items():
+        if inputs and node.count_publishers(role):
+            text = f'{role} is published, but cannot be received: the package {package} is not installed'
+            loggers[role].error(text, throttle_duration_sec=THROTTLE_S)
+    unheard = []
+    for role, subscription in inputs.items():
+        if texts := describe_incompatible_publishers(node, role, subscription):
+            loggers[role].warning('; '.join(texts), throttle_duration_sec=THROTTLE_S)
+            unheard += texts
+    if unserved := [text for each in outputs for text in describe_incompatible_subscriptions(node, each)]:
+        node.get_logger().warning('; '.join(unserved), throttle_duration_sec=THROTTLE_S)
+    return unheard
+
+
+def describe_incompatible_publishers(node: Node, role: str, subscription: Any) -> list[str]:
+    """Return a text for each present publisher of an input that its subscription cannot hear."""
+    topic, wanted = subscription.topic_name, subscription.qos_profile
+    pairs = [(each.node_name, each.qos_profile, wanted) for each in node.get_publishers_info_by_topic(topic)]
+    remedy = f'(see qos_overrides.{topic}.subscription)'
+    return [f'{role} is not heard from {name}, {reason} {remedy}' for name, reason in _find_incompatible(pairs)]
+
+
+def describe_incompatible_subscriptions(node: Node, publisher: Any) -> list[str]:
+    """Return a text for each present subscription of an output that cannot receive its messages."""
+    topic, given = publisher.topic_name, publisher.qos_profile
+    # as in the profiles of the graph: what the node leaves open would count as shorter than infinite, and fit every liveliness
+    rest = {'deadline': Infinite, 'liveliness': QoSLivelinessPolicy.AUTOMATIC, 'liveliness_lease_duration': Infinite}
+    offered = QoSProfile(reliability=given.reliability, durability=given.durability, depth=given.depth, **rest)
+    pairs = [(each.node_name, offered, each.qos_profile) for each in node.get_subscriptions_info_by_topic(topic)]
+    remedy = f'(see qos_overrides.{topic}.publisher)'
+    return [f'{name} cannot hear {topic}, {reason} {remedy}' for name, reason in _find_incompatible(pairs)]
+
+
+def _find_incompatible(pairs: Iterable[tuple[str, QoSProfile, QoSProfile]]) -> Iterator[tuple[str, str]]:
+    """Yield name and reason of those names whose profile of the publisher does not fit that of the subscription."""
+    for name, offered, wanted in pairs:
+        compatibility, reason = qos_check_compatible(offered, wanted)
+        if compatibility == QoSCompatibility.ERROR:
+            yield name, f'incompatible QoS: {reason.removeprefix("ERROR: ").rstrip("; ")}'
+
+
+def answer_refused_transitions(service: Any, logger: Any) -> None:
+    """Make the service `~/change_state` answer `success: false` to a transition that does not start in the present state.
+
+    rclpy raises an exception in the service instead, and the caller waits without end.
+    """
+    change = service.callback
+
+    def change_or_refuse(request: Any, response: Any) -> Any:
+        try:
+            return change(request, response)
+        except Exception as error:
+            wanted = request.transition.label or request.transition.id
+            logger.warning(f'transition {wanted} is refused: {" ".join(str(error).split())}')
+            response.success = False
+            return response
+
+    service.callback = change_or_refuse
+
+
+def take_queued(subscription: Any) -> list[Any]:
+    """Take the messages from a subscription's queue, at most as many as it holds, because it may be filled meanwhile."""
+    messages: list[Any] = []
+    with subscription.handle:
+        while len(messages) < HAND_DEPTH and (taken := subscription.handle.take_message(subscription.msg_type, subscription.raw)):
+            messages.append(taken[0])
+    return messages
 
 
 class GoalTopics:
@@ -152,7 +203,7 @@ class GoalTopics:
         """Publish the likelihood of each goal of which something is known; there is no message for another."""
         self._goals = min(len(prediction.goal_positions), MOST_GOAL_TOPICS)
         for row in range(len(self.publishers), self._goals):
-            self.publishers.append(_create_publisher(self._node, f'goal_likelihood/{name_goal(row)}', GOAL_LIKELIHOOD_TYPE))
+            self.publishers.append(create_publisher(self._node, f'goal_likelihood/{name_goal(row)}', GOAL_LIKELIHOOD_TYPE))
         heard = [row for row in range(self._goals) if self.publishers[row].get_subscription_count()]
         messages = encode_goal_likelihoods(prediction, types) if heard else {}
         for row in heard:
@@ -170,42 +221,10 @@ class GoalTopics:
         self.remove_absent()
 
 
-def _create_publisher(node: Node, name: str, kind: str) -> Any:
-    qos = _build_qos(QoSReliabilityPolicy.RELIABLE, OUTPUT_DEPTH)
-    events = PublisherEventCallbacks(use_default_callbacks=False)
-    message_class = find_message_class(kind)
-    return node.create_publisher(message_class, f'~/{name}', qos, event_callbacks=events, qos_overriding_options=OVERRIDABLE)
-
-
-def take_queued(subscription: Any) -> list[Any]:
-    """Take the messages from a subscription's queue, at most as many as it holds, because it may be filled meanwhile."""
-    messages: list[Any] = []
-    with subscription.handle:
-        while len(messages) < HAND_DEPTH and (taken := subscription.handle.take_message(subscription.msg_type, subscription.raw)):
-            messages.append(taken[0])
-    return messages
-
-
-def _build_qos(reliability: QoSReliabilityPolicy, depth: int) -> QoSProfile:
-    """Return a new profile, because rclpy writes the overrides of a topic into its profile."""
-    volatile, keep_last = QoSDurabilityPolicy.VOLATILE, QoSHistoryPolicy.KEEP_LAST
-    return QoSProfile(reliability=reliability, durability=volatile, history=keep_last, depth=depth)
-
-
 class TfListener:
-    """A buffer of tf2 and its listener; a jump of the node's clock back in time clears it.
+    """A buffer of tf2 and its listener; a jump of the node's clock back in time clears it. Raises ImportError without `tf2_ros`.
 
-    Parameters
-    ----------
-    node
-        The node that subscribes to `/tf` and `/tf_static`.
-    notify
-        Called after each transform that arrives, in the thread of the node's executor.
-
-    Raises
-    ------
-    ImportError
-        If `tf2_ros` is not installed.
+    node: subscribes to `/tf` and `/tf_static`; notify: called after each transform that arrives, in the thread of its executor.
     """
 
     def __init__(self, node: Node, notify: Callable[[], None]) -> None:
@@ -217,10 +236,7 @@ class TfListener:
         self._listener = tf2_ros.TransformListener(self, node)
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
-        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0, without waiting.
-
-        Raises TransformUnavailableError.
-        """
+        """Return a transform as `TransformSource.look_up` says, without waiting."""
         try:
             found = self._buffer.lookup_transform(target, source, Time(nanoseconds=stamp_ns))
         except self._unavailable as error:

@@ -26,7 +26,15 @@ from foc_ros.io.topics import COMMAND
 
 from .health import THROTTLE_S
 from .messages.decode_poses import decode_frame
-from .messages.encode_guidance import LIVE_OUTPUTS, TWIST, Place, blend_twist, encode_guidance_markers
+from .messages.encode_guidance import (
+    GUIDANCE_OUTPUTS,
+    LIVE_OUTPUTS,
+    TWIST,
+    TWIST_TYPE,
+    Place,
+    blend_twist,
+    encode_guidance_markers,
+)
 from .messages.types import MessageTypes, RclpyTypes
 
 if TYPE_CHECKING:
@@ -65,18 +73,9 @@ class Newest:
 class GuidanceLoop:
     """Updates guidance, and publishes it until the force has become zero, and then once more.
 
-    Attributes: newest; output, the last one, and place, that of the last one that was published, None before the first.
-
-    Parameters
-    ----------
-    config
-        All parameters.
-    publish
-        Called in the thread with each output and the place where it holds.
-    report
-        Called in the thread with an exception of an update, after which guidance begins anew with a force of zero.
-    warn
-        Called in the thread with a text if it may not have its priority, the first time.
+    Attributes: newest; output, the last one, and place, that of the last one that was published, None before the first. Called in
+    the thread: publish, with each output and the place where it holds; report, with an exception of an update, after which
+    guidance begins anew with a force of zero; warn, with a text if it may not have its priority, the first time.
     """
 
     def __init__(
@@ -207,18 +206,9 @@ def _has_ended(output: GuidanceOutput) -> bool:
 
 
 class GuidanceTopics:
-    """Publishes guidance for a node between `create` and `destroy`.
+    """Publishes guidance for a node between `create` and `destroy`; `report` is called with an exception of an update.
 
     Attributes: loop, which has to be told what is new; publishers, by the name of the topic below the node's name.
-
-    Parameters
-    ----------
-    node
-        The node to which the topics belong.
-    config
-        All parameters.
-    report
-        Called in the thread of guidance with an exception of an update.
     """
 
     def __init__(self, node: Node, config: Config, report: Callable[[Exception], None]) -> None:
@@ -229,9 +219,11 @@ class GuidanceTopics:
 
     def create(self) -> None:
         """Create the publishers and begin to update."""
-        from .endpoints import create_guidance_publishers  # needs rclpy, and the loop does not
+        from .endpoints import create_publisher  # needs rclpy, and the loop does not
 
-        self.publishers = create_guidance_publishers(self._node)
+        outputs = LIVE_OUTPUTS if self._node.get_parameter('guidance.unstamped').value else GUIDANCE_OUTPUTS
+        kinds = {name: kind for name, (kind, _) in outputs.items()} | {TWIST: TWIST_TYPE}
+        self.publishers = {name: create_publisher(self._node, name, kind) for name, kind in kinds.items()}
         self.loop.start()
 
     def destroy(self) -> None:

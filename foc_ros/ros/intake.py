@@ -8,7 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from foc_ros.core.errors import LostHandError, MessageError
 from foc_ros.core.pipeline import Pipeline, SampleStatus
@@ -16,14 +16,26 @@ from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
 from .messages.decode_objects import CollisionTable, MarkerTable, decode_detections
-from .messages.decode_point_cloud import decode_point_cloud
+from .messages.decode_point_cloud import DecodedCloud, decode_point_cloud
 from .messages.decode_poses import Place, decode_goal, decode_goals, decode_hand_sample, decode_stamp, stay
-from .transforms import Arrival
 
 DROPPED = '_dropped_'
 """Between input and reason in the name of a count of parts of messages that were left out."""
 STILL_S = 1.0
 """Time with the same position after which this is told [s]: a tracker repeats its last pose, or a simulated hand rests."""
+
+
+class Arrival(NamedTuple):
+    """A message that can be taken, when it arrived [s], and the frame and transform of its headers.
+
+    error: why it is not in the working frame, empty if it is; is_inexact: whether the newest transform was taken for another.
+    """
+
+    message: Any
+    received_s: float
+    place: Place = stay
+    error: str = ''
+    is_inexact: bool = False
 
 
 class Intake:
@@ -59,27 +71,24 @@ class Intake:
         """How often each kind of refusal, drop, restart or failure occurred here and in the pipeline, by name."""
         return {**self.pipeline.counts, **self._counts}
 
+    def take(self, role: str, message: Any) -> SampleStatus | None:
+        """Take one message that is in its frame, as `take_arrival` does."""
+        return self.take_arrival(role, Arrival(message, 0.0))
+
     def take_arrival(self, role: str, arrival: Arrival) -> SampleStatus | None:
-        """Take one message whose transform is known, or is not needed or missing; None if it cannot be decoded."""
+        """Take one message, or the error of its decoding; None if it cannot be decoded."""
         if arrival.is_inexact:
             self._counts[f'transform_newest_{role}'] += 1
-        return self.take(role, arrival.message, arrival.place, arrival.error)
-
-    def take(self, role: str, message: Any, place: Place = stay, transform_error: str = '') -> SampleStatus | None:
-        """Take one message, or the error of its decoding; None if it cannot be decoded.
-
-        place: gives its frame and the transform to there; transform_error: why that is not the working frame.
-        """
         refused_before = self.pipeline.refused
         try:
-            if isinstance(message, MessageError):
-                raise message
-            status = self._handlers[role](message, place)
+            if isinstance(arrival.message, MessageError):
+                raise arrival.message
+            status = self._handlers[role](arrival.message, arrival.place)
         except MessageError as error:
             self.refuse(role, error)
             return None
         if self.pipeline.refused > refused_before:
-            self.last_refusal = '; '.join(filter(None, [self.pipeline.last_refusal, transform_error]))
+            self.last_refusal = '; '.join(filter(None, [self.pipeline.last_refusal, arrival.error]))
         return status
 
     def refuse(self, role: str, error: MessageError) -> None:
@@ -127,16 +136,18 @@ class Intake:
             self._set_markers(self._markers)
         return status
 
+    def _set_obstacles(self, source: str, role: str, decoded: DecodedCloud) -> SampleStatus:
+        """Pass the obstacles of a source to the pipeline, and count the parts of their message that were left out."""
+        status = self.pipeline.set_obstacles(source, decoded.obstacles, decoded.stamp_ns, decoded.frame_id)
+        return self._count_dropped(role, decoded.dropped, status)
+
     def _take_cloud(self, message: Any, place: Place) -> SampleStatus:
-        cloud = decode_point_cloud(message, self.pipeline.config.plane, place)
-        status = self.pipeline.set_obstacles('cloud', cloud.obstacles, cloud.stamp_ns, cloud.frame_id)
-        return self._count_dropped(topics.CLOUD, cloud.dropped, status)
+        return self._set_obstacles('cloud', topics.CLOUD, decode_point_cloud(message, self.pipeline.config.plane, place))
 
     def _take_detections(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config
         found = decode_detections(message, config.plane, config.scene.marker_radius_stddev, place)
-        status = self.pipeline.set_obstacles(topics.DETECTIONS, found.obstacles, found.stamp_ns, found.frame_id)
-        return self._count_dropped(topics.DETECTIONS, found.dropped, status)
+        return self._set_obstacles(topics.DETECTIONS, topics.DETECTIONS, found)
 
     def _take_collision_object(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config
@@ -144,10 +155,11 @@ class Intake:
         table = before.with_message(message, place)
         table = replace(table, stamp_ns=self._ignore_small_steps_back(before.stamp_ns, table.stamp_ns))
         obstacles = table.obstacles(config.plane, config.scene.marker_radius_stddev)
-        status = self.pipeline.set_obstacles(topics.COLLISION, obstacles, table.stamp_ns, table.frame_id)
+        found = DecodedCloud(obstacles, table.stamp_ns, table.frame_id, table.dropped)
+        status = self._set_obstacles(topics.COLLISION, topics.COLLISION, found)
         if status.is_taken:
             self._collisions = table
-        return self._count_dropped(topics.COLLISION, table.dropped, status)
+        return status
 
     def _ignore_small_steps_back(self, newest_ns: int, stamp_ns: int) -> int:
         """Return a stamp, or the newest one if that is at most `estimator.gap_s` after it."""

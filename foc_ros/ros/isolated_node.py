@@ -63,23 +63,16 @@ def reserve_domain() -> Iterator[int]:
         domain = DOMAINS[turn % len(DOMAINS)]
         base = 7400 + 250 * domain
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as reserved:
-            if _bind(reserved, base + UNUSED_PORT) and all(_is_free(base + port) for port in USED_PORTS):
-                yield domain
-                return
+            try:
+                reserved.bind(('', base + UNUSED_PORT))
+                for port in USED_PORTS:
+                    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                        probe.bind(('', base + port))
+            except OSError:
+                continue
+            yield domain
+            return
     raise FocError(f'each of the {len(DOMAINS)} domains that can be used on this host has a participant')
-
-
-def _is_free(port: int) -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        return _bind(probe, port)
-
-
-def _bind(endpoint: socket.socket, port: int) -> bool:
-    try:
-        endpoint.bind(('', port))
-    except OSError:
-        return False
-    return True
 
 
 @contextmanager

@@ -21,7 +21,7 @@ when `/diagnostics` counts the obstacles and goals. Messages on the hand's best-
 from __future__ import annotations
 
 import traceback
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -32,30 +32,21 @@ from std_srvs.srv import SetBool, Trigger
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError
-from foc_ros.core.pipeline import Pipeline, SampleStatus
+from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
 
-from .endpoints import (
-    INPUTS,
-    GoalTopics,
-    TfListener,
-    create_command_subscription,
-    create_publishers,
-    create_subscriptions,
-    describe_incompatible_publishers,
-    describe_incompatible_subscriptions,
-    find_missing_packages,
-    take_queued,
-)
+from . import endpoints
+from .freshness import SOURCE_TOPICS, Freshness
 from .guidance import GuidanceTopics
-from .health import SOURCE_TOPICS, THROTTLE_S, Freshness, Monitor, encode_diagnostics
-from .intake import Intake
-from .messages.encode_prediction import encode_outputs
+from .health import THROTTLE_S, Monitor
+from .intake import Arrival, Intake
+from .messages.encode_prediction import OUTPUTS, encode_outputs
 from .messages.types import RclpyTypes
-from .node_parameters import LiveParameters, declare_autostart, declare_parameters
-from .transforms import Arrival, Transforms
+from .node_parameters import LiveParameters, declare_parameters
+from .parameters import AUTOSTART
+from .transforms import Transforms
 from .worker import Computation, Worker
 
 RETRY_S = 0.01
@@ -76,29 +67,29 @@ class FocNode(LifecycleNode):
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
         self._live_parameters = LiveParameters(self, declare_parameters(self, Config()), self._reconfigure)
         self._library = load_library(self._live_parameters.config.homotopy.library)
-        autostart = declare_autostart(self)
         self._types = RclpyTypes()
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
-        self._loggers = {role: self.get_logger().get_child(role) for role in INPUTS}
+        self._loggers = {role: self.get_logger().get_child(role) for role in endpoints.INPUTS}
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
         self._has_predicted, self._is_hand_fast, self._hand_s = False, False, 0.0
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
-        self._goal_topics = GoalTopics(self)
+        self._goal_topics = endpoints.GoalTopics(self)
         self._guidance = GuidanceTopics(self, self._live_parameters.config, self.report)
         try:
-            self._tf: TfListener | None = TfListener(self, self._take_held)
+            self._tf: endpoints.TfListener | None = endpoints.TfListener(self, self._take_held)
         except ImportError:  # tf2 is optional
             self._tf = None
-        self._retries = self.create_timer(RETRY_S, self._take_held, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._retries = self.create_timer(RETRY_S, self._take_held, clock=steady)
         self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(SetBool, '~/engage', self._engage)
         self.create_service(Trigger, '~/reset', self._reset)
-        self.create_timer(1.0, self._publish_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._answer_refused_transitions()
-        if autostart and (self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS):
+        self.create_timer(1.0, self._publish_health, clock=steady)
+        endpoints.answer_refused_transitions(self._service_change_state, self.get_logger())  # rclpy has no public way to it
+        if self.get_parameter(AUTOSTART).value and (self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS):
             raise FocError(self._start_error)
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
@@ -106,9 +97,8 @@ class FocNode(LifecycleNode):
         self._create_pipeline()
         try:
             warm_up(self._live_parameters.config)
-            self._outputs = create_publishers(self)
-            self._inputs = create_subscriptions(self, self._receive)
-            self._inputs[COMMAND] = create_command_subscription(self, self._blend_command)
+            self._outputs = {name: endpoints.create_publisher(self, name, kind) for name, (kind, _) in OUTPUTS.items()}
+            self._inputs = endpoints.create_subscriptions(self, self._receive)
             self._guidance.create()
         except Exception as error:
             self._destroy_topics()
@@ -152,7 +142,8 @@ class FocNode(LifecycleNode):
         if self._is_hand_fast:
             self._is_hand_fast = False
             unneeded_s = 0.0 if self.pipeline.config.guidance.enabled else self.pipeline.until_due_s
-            self._worker.wait(min(max(unneeded_s, REST_S), LONGEST_REST_S))
+            wait = self.is_busy_after if self.is_busy else sleep
+            wait(min(max(unneeded_s, REST_S), LONGEST_REST_S))
 
     def report(self, error: Exception) -> None:
         """Count and log an internal error."""
@@ -175,31 +166,13 @@ class FocNode(LifecycleNode):
         """Return whether a prediction is still being computed after so many seconds."""
         return self._worker.is_busy_after(seconds)
 
-    def _answer_refused_transitions(self) -> None:
-        """Make `~/change_state` answer `success: false` to a transition that does not start in the present state.
-
-        rclpy raises an exception in the service instead, and the caller waits without end.
-        """
-        service = self._service_change_state  # rclpy has no public way to it
-        change = service.callback
-
-        def change_or_refuse(request: Any, response: Any) -> Any:
-            try:
-                return change(request, response)
-            except Exception as error:
-                wanted = request.transition.label or request.transition.id
-                self.get_logger().warning(f'transition {wanted} is refused: {" ".join(str(error).split())}')
-                response.success = False
-                return response
-
-        service.callback = change_or_refuse
-
     def _create_pipeline(self) -> None:
         if hasattr(self, 'pipeline'):
             self.pipeline.reset()  # ends a prediction that is being computed
         self.pipeline = Pipeline(self._live_parameters.config, self._library)
-        self.intake, self._freshness, self._monitor = Intake(self.pipeline), Freshness(), Monitor(monotonic())
-        self._transforms = Transforms(self._tf, self.intake.is_skipped)
+        self.intake, self._freshness = Intake(self.pipeline), Freshness()
+        self._monitor = Monitor(self.intake, self._freshness, monotonic())
+        self._transforms = Transforms(self._tf, self.intake)
 
     def _destroy_topics(self) -> None:
         self._guidance.destroy()
@@ -227,7 +200,11 @@ class FocNode(LifecycleNode):
         """
         if role not in self._inputs:
             return  # the executor still held messages when the node was cleaned up
-        waiting = [] if role == MARKERS else take_queued(self._inputs[role])
+        if role == COMMAND:
+            if self._state == 'active':
+                self._guidance.blend_command(messages[0], self._types)
+            return
+        waiting = [] if role == MARKERS else endpoints.take_queued(self._inputs[role])
         now_s = monotonic()
         for each in (*messages, *waiting):
             self._transforms.add(role, each, now_s)
@@ -245,7 +222,7 @@ class FocNode(LifecycleNode):
 
     def _take_released(self, role: str) -> None:
         """Take the messages of an input that are not held, and predict if a hand pose was used and a prediction is due."""
-        arrivals = self._transforms.release(role, self.pipeline.frame_id, self.pipeline.config, monotonic())
+        arrivals = self._transforms.release(role, monotonic())
         is_taken = False
         for each in reversed(list(arrivals)) if role in COMPLETE else arrivals:
             is_taken = self._take(role, each) or is_taken
@@ -257,27 +234,19 @@ class FocNode(LifecycleNode):
             self._predict()
 
     def _take(self, role: str, arrival: Arrival) -> bool:
+        """Take a message, and log it if it was refused; return whether it was used."""
         status = self.intake.take_arrival(role, arrival)
-        self._note(role, status, arrival.received_s)
+        entry = self._freshness.note(role, status, arrival.received_s, self.intake.last_refusal)
+        if status is None or status.is_refused:
+            text = f'{self.intake.last_refusal} ({entry.refused} of {entry.received} refused so far)'
+            self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
         if status is None or not status.is_taken:
             return False
-        self._freshness.note_received(role, arrival.received_s)
-        if role == HAND:
-            self._guidance.loop.note_hand(self.pipeline.hand_state, arrival.received_s)
         if role == HAND and self.intake.sample is not None:
+            self._guidance.loop.note_hand(self.pipeline.hand_state, arrival.received_s)
             clock_ns, timeout_s = self.get_clock().now().nanoseconds, self.pipeline.config.estimator.hand_timeout_s
             self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, is_restart=status.is_restart)
         return True
-
-    def _note(self, role: str, status: SampleStatus | None, received_s: float) -> None:
-        """Count a message, and log it if it was refused."""
-        is_refused = status is None or status.is_refused
-        refused, received = self._monitor.note_message(role, received_s, is_refused=is_refused)
-        if is_refused:
-            if role == HAND:
-                self._freshness.note_refused(received_s, self.intake.last_refusal or '')
-            text = f'{self.intake.last_refusal} ({refused} of {received} refused so far)'
-            self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
 
     def _find_clock_reason(self) -> tuple[str, str] | None:
         """Return why the clocks allow no prediction, as (kind, text); the pipeline decides all that depends on stamps."""
@@ -290,7 +259,7 @@ class FocNode(LifecycleNode):
         start_s = monotonic()
         clock_reason = self._find_clock_reason()
         if clock_reason is not None:
-            self._monitor.note_withheld(clock_reason[0])
+            self._monitor.counts[f'predict_{clock_reason[0]}'] += 1
             return
         try:
             task = self.pipeline.begin(Deadline(self.pipeline.config.budget_s or None))
@@ -298,7 +267,7 @@ class FocNode(LifecycleNode):
             self._recover(error)
             return
         if task is not None:
-            self._worker.start(task, self._freshness.received_s(HAND, start_s), start_s)
+            self._worker.start(task, self._freshness.used_s(HAND, start_s), start_s)
 
     def _finish(self) -> None:
         """Publish a prediction that was computed, unless it is too old or not wanted any more, and begin the next."""
@@ -337,10 +306,6 @@ class FocNode(LifecycleNode):
             self._has_predicted = True
             self.get_logger().info(f'predicting in frame {self.pipeline.frame_id}, plane {config.plane}')
 
-    def _blend_command(self, command: Any) -> None:
-        if self._state == 'active':
-            self._guidance.blend_command(command, self._types)
-
     def _recover(self, error: Exception) -> None:
         self.report(error)
         self.pipeline.reset()
@@ -348,35 +313,16 @@ class FocNode(LifecycleNode):
 
     def _publish_health(self) -> None:
         self._receive(HAND)  # a hand whose poses wait here is not silent
-        self._report_missing_packages()
         self._goal_topics.remove_absent()
-        clock_reason, present = self._find_clock_reason(), self._worker.present
+        clock_reason, present, now_s = self._find_clock_reason(), self._worker.present, monotonic()
         not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
-        busy_s = monotonic() - present.start_s if present is not None else 0.0
-        unheard = self._report_incompatible_endpoints()
-        health = self._monitor.report(monotonic(), self.intake, self._state, not_ready_reason, busy_s, unheard)
+        busy_s = now_s - present.start_s if present is not None else 0.0
+        publishers = (*self._outputs.values(), *self._guidance.publishers.values())
+        unheard = endpoints.report_unconnected(self, self._inputs, publishers, self._loggers)
+        health = self._monitor.report(now_s, self._state, not_ready_reason, busy_s, unheard)
         health.values.update(self._guidance.loop.describe())
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
-        self._publish(self._diagnostics, encode_diagnostics(health, name, stamp_ns, self._types))
-
-    def _report_missing_packages(self) -> None:
-        """Log which optional inputs are published that cannot be received."""
-        for role, package in find_missing_packages().items():
-            if self._inputs and self.count_publishers(role):
-                text = f'{role} is published, but cannot be received: the package {package} is not installed'
-                self._loggers[role].error(text, throttle_duration_sec=THROTTLE_S)
-
-    def _report_incompatible_endpoints(self) -> list[str]:
-        """Log which endpoints have an incompatible quality of service; return a text for each publisher that is not heard."""
-        unheard = []
-        for role, subscription in self._inputs.items():
-            if role in INPUTS and (texts := describe_incompatible_publishers(self, role, subscription)):
-                self._loggers[role].warning('; '.join(texts), throttle_duration_sec=THROTTLE_S)
-                unheard += texts
-        publishers = (*self._outputs.values(), *self._guidance.publishers.values())
-        if unserved := [text for each in publishers for text in describe_incompatible_subscriptions(self, each)]:
-            self.get_logger().warning('; '.join(unserved), throttle_duration_sec=THROTTLE_S)
-        return unheard
+        self._publish(self._diagnostics, health.encode(name, stamp_ns, self._types))
 
     def _publish(self, publisher: Any, message: Any) -> None:
         if self.context.ok():

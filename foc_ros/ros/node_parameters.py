@@ -21,25 +21,30 @@ from .parameters import AUTOSTART, KNOWN, NODE_ONLY
 
 
 def declare_parameters(node: Any, config: Config) -> Config:
-    """Declare every parameter on a node and return the configuration with which it starts.
+    """Declare every parameter and `autostart` on a node, and return the configuration with which it starts.
 
     config: the defaults. The node must be created with `automatically_declare_parameters_from_overrides`: the values that it was
     started with are checked together. Raises ParameterError, also for an unknown name, with a note for every further error.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix('').items()}
     errors: list[FocError] = []
-    for name in given:
-        if name in KNOWN:
+    for name, value in given.items():
+        if name in KNOWN or name == AUTOSTART:
             node.undeclare_parameter(name)
         elif name.split('.')[0] not in NODE_ONLY:
-            errors.append(ParameterError(name, f'a known parameter{suggest(name, (*KNOWN, *NODE_ONLY))}', repr(given[name])))
+            errors.append(ParameterError(name, f'a known parameter{suggest(name, (*KNOWN, *NODE_ONLY))}', repr(value)))
+    autostart = given.get(AUTOSTART, True)
+    if not isinstance(autostart, bool):
+        errors.append(ParameterError(AUTOSTART, 'true or false', repr(autostart)))
     checked = collect(errors, replace_values, config, {name: value for name, value in given.items() if name in KNOWN})
     if checked is None or errors:
         raise join_errors(errors)
-    config, values = checked, flatten(checked)
+    values = flatten(checked)
     rows = [(name, values[name], _build_descriptor(parameter)) for name, parameter in KNOWN.items()]
+    meaning = 'configure and activate the node when it starts; false: a lifecycle manager does it'
+    rows.append((AUTOSTART, autostart, ParameterDescriptor(description=meaning, read_only=True)))
     node.declare_parameters('', rows, ignore_override=True)
-    return config
+    return checked
 
 
 def read_config(node: Any) -> Config:
@@ -47,33 +52,20 @@ def read_config(node: Any) -> Config:
     return replace_values(Config(), {name: node.get_parameter(name).value for name in KNOWN})
 
 
-def declare_autostart(node: Any) -> bool:
-    """Declare the parameter that makes a managed node activate itself when it is created, and return its value."""
-    value = True
-    if node.has_parameter(AUTOSTART):
-        value = node.get_parameter(AUTOSTART).value
-        node.undeclare_parameter(AUTOSTART)
-    if not isinstance(value, bool):
-        raise ParameterError(AUTOSTART, 'true or false', repr(value))
-    description = 'configure and activate the node when it starts; false: a lifecycle manager does it'
-    node.declare_parameter(AUTOSTART, value, ParameterDescriptor(description=description, read_only=True), ignore_override=True)
-    return value
-
-
 def _build_descriptor(parameter: Parameter) -> ParameterDescriptor:
-    bound, choices, ranges = parameter.bound, tuple(parameter.bound.choices), {}
-    if bound.low is not None and bound.high is not None:
-        if isinstance(parameter.default, int):
-            ranges['integer_range'] = [IntegerRange(from_value=int(bound.low), to_value=int(bound.high), step=1)]
-        else:
-            ranges['floating_point_range'] = [FloatingPointRange(from_value=float(bound.low), to_value=float(bound.high))]
-    return ParameterDescriptor(
+    bound, choices = parameter.bound, tuple(parameter.bound.choices)
+    descriptor = ParameterDescriptor(
         name=parameter.name,
         description=f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning,
         additional_constraints=f'one of {", ".join(choices)}' if choices else '',
         read_only=bound.read_only,
-        **ranges,
     )
+    if bound.low is not None and bound.high is not None:
+        if isinstance(parameter.default, int):
+            descriptor.integer_range = [IntegerRange(from_value=int(bound.low), to_value=int(bound.high), step=1)]
+        else:
+            descriptor.floating_point_range = [FloatingPointRange(from_value=float(bound.low), to_value=float(bound.high))]
+    return descriptor
 
 
 class LiveParameters:

@@ -10,23 +10,24 @@ their order. Node and replay share this: times are those of the steady clock in 
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_right, insort
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from operator import itemgetter
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from foc_ros.core.config import Config
 from foc_ros.core.errors import MessageError
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.topics import HAND, MARKERS
 
+from .intake import Arrival, Intake
 from .messages.decode_objects import ADD
 from .messages.decode_poses import Place, check_hand_pose, decode_frame, decode_stamp, stay
-from .messages.plane import Transform
+from .messages.plane import NO_TRANSFORM, Transform
 
 MOST_HELD = 1000
 """Largest number of messages of one input that are held: 1 s of a hand at 1 kHz."""
@@ -42,34 +43,17 @@ class TransformSource(Protocol):
     """What knows transforms: tf2 in the node, a recording in a replay."""
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
-        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.
-
-        Raises TransformUnavailableError.
-        """
-
-
-class Arrival(NamedTuple):
-    """A message that can be taken.
-
-    received_s: when it arrived [s]; place: gives the frame and the transform of its headers; error: why it is not in the working
-    frame, empty if it is; is_inexact: whether the newest transform was taken instead of that for its stamp.
-    """
-
-    message: Any
-    received_s: float
-    place: Place = stay
-    error: str = ''
-    is_inexact: bool = False
+        """Return a transform at a stamp [ns], the newest one for a stamp of 0. Raises TransformUnavailableError."""
 
 
 class Transforms:
     """Queues of messages, one for each input.
 
-    source: None if there is none; is_skipped: whether a hand pose of a stamp [ns] will be skipped, so that it needs no transform.
+    source: None if there is none; intake: that takes the messages. A hand pose that it will skip needs no transform.
     """
 
-    def __init__(self, source: TransformSource | None, is_skipped: Callable[[int], bool] = lambda _: False) -> None:
-        self._source, self._is_skipped = source, is_skipped
+    def __init__(self, source: TransformSource | None, intake: Intake) -> None:
+        self._source, self._intake = source, intake
         self._held: dict[str, deque[tuple[Any, float]]] = {}
 
     @property
@@ -77,39 +61,36 @@ class Transforms:
         """The inputs of which messages are held."""
         return [role for role, queue in self._held.items() if queue]
 
-    def holds(self, role: str) -> bool:
-        """Return whether messages of an input are held."""
-        return bool(self._held.get(role))
-
     def add(self, role: str, message: Any, now_s: float) -> None:
         """Append a message of an input that arrives at a time [s]."""
         self._held.setdefault(role, deque()).append((message, now_s))
 
-    def release(self, role: str, frame_id: str | None, config: Config, now_s: float) -> Iterator[Arrival]:
+    def release(self, role: str, now_s: float) -> Iterator[Arrival]:
         """Yield the messages of an input that need not be held any longer at a time [s], in the order of their arrival.
 
-        Each has to be taken before the next one is asked for: it decides whether the next one is skipped. frame_id: the working
-        frame; while it is unknown, None, messages are not transformed.
+        Each has to be taken before the next one is asked for: it decides whether the next one is skipped. While the working frame
+        is unknown, messages are not transformed.
         """
-        queue = self._held.get(role, ())
+        queue, pipeline = self._held.get(role, ()), self._intake.pipeline
         while queue:
             message, received_s = queue[0]
-            is_overdue = now_s - received_s >= config.frames.tolerance_s or len(queue) > MOST_HELD
+            is_overdue = now_s - received_s >= pipeline.config.frames.tolerance_s or len(queue) > MOST_HELD
             try:
-                place, is_inexact = self._find_place(role, message, frame_id, config, is_overdue)
+                place, is_inexact = self._find_place(role, message, is_overdue)
                 arrival = Arrival(message, received_s, place, is_inexact=is_inexact)
             except TransformUnavailableError as error:
                 if not is_overdue:
                     break
-                arrival = Arrival(message, received_s, error=f'no transform to {frame_id}: {error}')
+                arrival = Arrival(message, received_s, error=f'no transform to {pipeline.frame_id}: {error}')
             except Exception:  # the message is not checked yet, and will be refused
                 arrival = Arrival(message, received_s)
             queue.popleft()
             yield arrival
 
-    def _find_place(self, role: str, message: Any, frame_id: str | None, config: Config, is_overdue: bool) -> tuple[Place, bool]:
+    def _find_place(self, role: str, message: Any, is_overdue: bool) -> tuple[Place, bool]:
         """Return the transforms for the headers of a message, and whether the newest one was taken for one of them."""
-        is_unneeded = role == HAND and self._is_skipped(decode_stamp(message.header))
+        frame_id = self._intake.pipeline.frame_id
+        is_unneeded = role == HAND and self._intake.is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
             return stay, False
         if role == HAND:
@@ -118,15 +99,15 @@ class Transforms:
         headers = [each.header for each in message.markers if each.action == ADD] if role == MARKERS else [message.header]
         found: dict[tuple[str, int], Transform] = {}
         is_inexact = False
-        for given in map(_identify, headers):
-            if given[0] == frame_id or given in found:
+        for given in dict.fromkeys(map(_identify, headers)):
+            if given[0] == frame_id:
                 continue
             try:
                 found[given] = self._source.look_up(frame_id, *given)
             except TransformUnavailableError as reason:
                 if not is_overdue:
                     raise
-                found[given], is_inexact = self._find_newest(frame_id, *given, config.frames.tolerance_s, reason), True
+                found[given], is_inexact = self._find_newest(frame_id, *given, reason), True
 
         def place(header: Any) -> tuple[str, Transform]:
             transform = found.get(_identify(header))
@@ -134,9 +115,10 @@ class Transforms:
 
         return place, is_inexact
 
-    def _find_newest(self, target: str, source: str, stamp_ns: int, tolerance_s: float, reason: Exception) -> Transform:
-        """Return the newest transform instead of that for a stamp [ns], if its stamp differs by the tolerance [s] at most."""
+    def _find_newest(self, target: str, source: str, stamp_ns: int, reason: Exception) -> Transform:
+        """Return the newest transform instead of that for a stamp [ns], if its stamp differs by the tolerance at most."""
         assert self._source is not None
+        tolerance_s = self._intake.pipeline.config.frames.tolerance_s
         newest = self._source.look_up(target, source, 0)
         late_s = (stamp_ns - newest.stamp_ns) / NANOSECONDS
         if abs(late_s) > tolerance_s:
@@ -150,39 +132,39 @@ def _identify(header: Any) -> tuple[str, int]:
     return decode_frame(header), decode_stamp(header)
 
 
+_STAMP = itemgetter(0)
+
+
 @dataclass
 class _Frame:
-    """A frame with its parent and its poses in it, rotation and position (3,) [m], by stamp [ns]; a static one has one pose."""
+    """A frame with its parent and its poses in it: stamp [ns], rotation, position (3,) [m] of each; a static one has one pose."""
 
     parent: str
     is_static: bool
-    stamps: list[int] = field(default_factory=list)
-    poses: list[tuple[Rotation, Array]] = field(default_factory=list)
+    poses: list[tuple[int, Rotation, Array]] = field(default_factory=list)
 
     def add(self, stamp_ns: int, rotation: Rotation, position: Array) -> None:
         """Keep a pose, and forget those that are too old."""
-        if self.is_static or (self.stamps and stamp_ns < self.stamps[-1] - KEPT_NS):
-            self.stamps, self.poses = [], []
-        place = bisect_right(self.stamps, stamp_ns)
-        self.stamps.insert(place, stamp_ns)
-        self.poses.insert(place, (rotation, position))
-        old = bisect_right(self.stamps, self.stamps[-1] - KEPT_NS)
-        del self.stamps[:old], self.poses[:old]
+        if self.is_static or (self.poses and stamp_ns < self.poses[-1][0] - KEPT_NS):
+            self.poses = []
+        insort(self.poses, (stamp_ns, rotation, position), key=_STAMP)
+        del self.poses[: bisect_right(self.poses, self.poses[-1][0] - KEPT_NS, key=_STAMP)]
 
-    def find(self, name: str, stamp_ns: int) -> tuple[Rotation, Array]:
+    def find(self, name: str, stamp_ns: int) -> Transform:
         """Return the pose at a stamp; raise TransformUnavailableError outside the known stamps."""
-        after = bisect_right(self.stamps, stamp_ns)
-        if self.is_static or (after and self.stamps[after - 1] == stamp_ns):
-            return self.poses[after - 1]
-        if not 0 < after < len(self.stamps):
-            nearest_ns = self.stamps[min(after, len(self.stamps) - 1)]
+        after = bisect_right(self.poses, stamp_ns, key=_STAMP)
+        if self.is_static or (after and self.poses[after - 1][0] == stamp_ns):
+            _, rotation, position = self.poses[after - 1]
+            return Transform(rotation.as_matrix(), position)
+        if not 0 < after < len(self.poses):
+            nearest_ns = self.poses[min(after, len(self.poses) - 1)][0]
             relation = 'after the newest' if after else 'before the oldest'
             distance = f'{abs(stamp_ns - nearest_ns) / NANOSECONDS:.3g} s'
             raise TransformUnavailableError(f'the stamp is {distance} {relation} transform from {name} to {self.parent}')
-        (earlier, start), (later, end) = self.poses[after - 1 : after + 1]
-        share = (stamp_ns - self.stamps[after - 1]) / (self.stamps[after] - self.stamps[after - 1])
-        turn = Slerp([0.0, 1.0], Rotation.concatenate([earlier, later]))
-        return turn(share), (1.0 - share) * start + share * end
+        (begin_ns, earlier, start), (end_ns, later, end) = self.poses[after - 1 : after + 1]
+        share = (stamp_ns - begin_ns) / (end_ns - begin_ns)
+        turn = Slerp([0.0, 1.0], Rotation.concatenate([earlier, later]))(share)
+        return Transform(turn.as_matrix(), (1.0 - share) * start + share * end)
 
 
 class TransformTree:
@@ -219,10 +201,7 @@ class TransformTree:
         return left_out
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
-        """Return the transform from one frame to another at a stamp [ns], the newest one for a stamp of 0.
-
-        Raises TransformUnavailableError.
-        """
+        """Return a transform as `TransformSource.look_up` says."""
         up, down = self._list_ancestors(source), self._list_ancestors(target)
         common = next((name for name in up if name in down), None)
         if common is None:
@@ -231,11 +210,9 @@ class TransformTree:
         chain, back = up[: up.index(common)], down[: down.index(common)]
         if not stamp_ns:
             frames = [self._frames[name] for name in (*chain, *back)]
-            stamp_ns = min((frame.stamps[-1] for frame in frames if not frame.is_static), default=0)
-        rotation, position = self._compose(chain, stamp_ns)
-        inverse, offset = self._compose(back, stamp_ns)
-        inverse = inverse.inv()
-        return Transform((inverse * rotation).as_matrix(), inverse.apply(position - offset), stamp_ns)
+            stamp_ns = min((frame.poses[-1][0] for frame in frames if not frame.is_static), default=0)
+        pose = self._compose(back, stamp_ns).inverse().compose(self._compose(chain, stamp_ns))
+        return pose._replace(stamp_ns=stamp_ns)
 
     def _list_ancestors(self, name: str) -> list[str]:
         """Return a frame and the frames above it, its parent first."""
@@ -244,10 +221,9 @@ class TransformTree:
             names.append(frame.parent)
         return names
 
-    def _compose(self, chain: list[str], stamp_ns: int) -> tuple[Rotation, Array]:
+    def _compose(self, chain: list[str], stamp_ns: int) -> Transform:
         """Return the pose of the first frame of a chain in the parent of the last one."""
-        rotation, position = Rotation.identity(), np.zeros(3)
+        pose = NO_TRANSFORM
         for name in chain:
-            turn, shift = self._frames[name].find(name, stamp_ns)
-            rotation, position = turn * rotation, turn.apply(position) + shift
-        return rotation, position
+            pose = self._frames[name].find(name, stamp_ns).compose(pose)
+        return pose

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The thread in which predictions are computed, so that the node answers services and publishes diagnostics meanwhile.
 
-A running computation cannot be stopped from another thread. If its result is no
-longer wanted, its deadline is cancelled, it ends when it next checks its deadline, and the result is ignored.
+A running computation cannot be stopped from another thread. If its result is no longer wanted, its deadline is cancelled, it
+ends when it next checks its deadline, and the result is ignored.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from time import sleep
 
 from rclpy.node import Node
 
@@ -22,11 +21,7 @@ from foc_ros.core.types import Prediction
 
 @dataclass(frozen=True)
 class Computation:
-    """A task that is being computed.
-
-    received_s: time at which the hand pose of the task arrived; start_s: time at which the computation began, both by the steady
-    clock [s]. result: the prediction and the memory for the next one, as soon as they are available.
-    """
+    """A task, when its hand pose arrived and it began [s, steady clock], and its result: the prediction and the tracks."""
 
     task: PredictionTask
     received_s: float
@@ -35,16 +30,9 @@ class Computation:
 
 
 class Worker:
-    """A thread that computes one task at a time.
+    """A thread that computes one task at a time. Attributes: present, the computation whose result was not taken yet, or None.
 
-    present: the computation whose result has not been taken yet, or None.
-
-    Parameters
-    ----------
-    node
-        The node in whose executor `notify` is called.
-    notify
-        Called after the end of each computation. It has to call `take`.
+    node: in whose executor `notify` is called after the end of each computation. `notify` has to call `take`.
     """
 
     def __init__(self, node: Node, notify: Callable[[], None]) -> None:
@@ -64,15 +52,8 @@ class Worker:
         ended, self.present = self.present, None
         return ended
 
-    def wait(self, seconds: float) -> None:
-        """Wait for the end of the present computation, at most for some seconds; for so many if there is none."""
-        if self.present is None:
-            sleep(seconds)
-        else:
-            wait([self.present.result], seconds)
-
     def is_busy_after(self, seconds: float) -> bool:
-        """Wait for the present computation for at most so many seconds; return whether it has not ended then."""
+        """Wait for the end of the present computation, at most for some seconds; return whether it still runs then."""
         return self.present is not None and bool(wait([self.present.result], seconds).not_done)
 
     def stop(self) -> None:

@@ -23,7 +23,7 @@ from foc_ros.core.obstacles.shapes import make_hull_polygon
 from foc_ros.core.types import NANOSECONDS, UNKNOWN_HEIGHTS, Array, Obstacles, make_obstacles
 
 from .decode_point_cloud import MAX_ROWS, DecodedCloud
-from .decode_poses import MAX_COORDINATE, Place, check_coordinate, decode_frame, decode_stamp, stay
+from .decode_poses import MAX_COORDINATE, Place, check_coordinates, decode_frame, decode_stamp, stay
 from .plane import Transform, compute_rotation, make_heights, project, project_box
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
@@ -123,16 +123,13 @@ class MarkerTable:
 def _find_reason_to_drop(marker: Any) -> str | None:
     if marker.type not in (BOX, SPHERE, CYLINDER):
         return 'not_a_shape'
-    parts = [*_read(marker.pose.position, 'xyz'), *_read(marker.scale, 'xyz')]
-    numbers = parts + (_read(marker.pose.orientation, 'xyzw') if marker.type == BOX else [])
-    return None if all(map(math.isfinite, numbers)) else 'not_finite'
+    return None if _is_finite(marker.pose, marker.scale, is_turned=marker.type == BOX) else 'not_finite'
 
 
 def _outline_marker(marker: Any, name: str, plane: str, transform: Transform) -> Outline:
-    position, size = transform.apply(_read(marker.pose.position, 'xyz')), _read(marker.scale, 'xyz')
-    for axis, value, length in zip('xyz', position.tolist(), size, strict=True):
-        check_coordinate(f'{name}.pose.position.{axis}', value)
-        _check_size(f'{name}.scale.{axis}', length)
+    position, size = transform.apply(_read(marker.pose.position)), _read(marker.scale)
+    check_coordinates(f'{name}.pose.position', position.tolist())
+    _check_sizes(f'{name}.scale', size)
     if marker.type == BOX:
         rotation = transform.rotation @ compute_rotation(marker.pose.orientation)
         return _outline_box(Transform(rotation, position), size, plane, f'{name}.scale')
@@ -223,8 +220,7 @@ def _read_primitives(message: Any, dropped: Counter[str]) -> tuple[tuple[int, tu
         size = tuple(float(length) for length in primitive.dimensions)
         if len(size) != DIMENSIONS[kind]:
             raise MessageError(name, f'{DIMENSIONS[kind]} numbers for a primitive of type {kind}', len(size))
-        for axis, length in enumerate(size):
-            _check_size(f'{name}[{axis}]', length)
+        _check_sizes(name, size, ('[0]', '[1]', '[2]'))
         if not any(size):
             raise MessageError(name, 'a size > 0 m', '0')
         found.append((kind, size, _read_pose(f'primitive_poses[{number}]', pose)))
@@ -261,12 +257,11 @@ def decode_detections(message: Any, plane: str, radius_stddev: float, place: Pla
         label, own_frame = f'detections[{row}]', decode_frame(each.header)
         if own_frame not in ('', given):
             raise MessageError(f'{label}.header.frame_id', f"'{given}', as the array", f"'{own_frame}'")
-        centre, size = each.bbox.center, _read(each.bbox.size, 'xyz')
-        if not all(map(math.isfinite, (*_read(centre.position, 'xyz'), *_read(centre.orientation, 'xyzw'), *size))):
+        centre, size = each.bbox.center, _read(each.bbox.size)
+        if not _is_finite(centre, each.bbox.size, is_turned=True):
             dropped['not_finite'] += 1
             continue
-        for axis, length in zip('xyz', size, strict=True):
-            _check_size(f'{label}.bbox.size.{axis}', length)
+        _check_sizes(f'{label}.bbox.size', size)
         name, pose = encode_name(str(each.id) or str(row)), transform.compose(_read_pose(f'{label}.bbox.center', centre))
         dropped['duplicate_id'] += outlines.pop(name, None) is not None
         outlines[name] = _outline_box(pose, size, plane, f'{label}.bbox.size')
@@ -279,20 +274,25 @@ def encode_name(*parts: str) -> str:
     return '/'.join(part.replace('%', '%25').replace(';', '%3B') for part in parts)
 
 
-def _read(vector: Any, axes: str) -> list[float]:
+def _read(vector: Any, axes: str = 'xyz') -> list[float]:
     return [getattr(vector, axis) for axis in axes]
 
 
+def _is_finite(pose: Any, size: Any, *, is_turned: bool) -> bool:
+    numbers = [*_read(pose.position), *_read(size), *(_read(pose.orientation, 'xyzw') if is_turned else ())]
+    return all(map(math.isfinite, numbers))
+
+
 def _read_pose(name: str, pose: Any) -> Transform:
-    for part, axes in (('position', 'xyz'), ('orientation', 'xyzw')):
-        for axis, value in zip(axes, _read(getattr(pose, part), axes), strict=True):
-            check_coordinate(f'{name}.{part}.{axis}', value)
-    return Transform(compute_rotation(pose.orientation), np.array(_read(pose.position, 'xyz'), dtype=float))
+    check_coordinates(f'{name}.position', _read(pose.position))
+    check_coordinates(f'{name}.orientation', _read(pose.orientation, 'xyzw'))
+    return Transform(compute_rotation(pose.orientation), np.array(_read(pose.position), dtype=float))
 
 
-def _check_size(name: str, length: float) -> None:
-    if not 0.0 <= length <= MAX_COORDINATE:
-        raise MessageError(name, f'a size in [0, {MAX_COORDINATE:g}] m', f'{length:g}')
+def _check_sizes(name: str, lengths: Iterable[float], parts: Iterable[str] = ('.x', '.y', '.z')) -> None:
+    for part, length in zip(parts, lengths, strict=False):
+        if not 0.0 <= length <= MAX_COORDINATE:
+            raise MessageError(f'{name}{part}', f'a size in [0, {MAX_COORDINATE:g}] m', f'{length:g}')
 
 
 def _outline_box(pose: Transform, size: Iterable[float], plane: str, name: str) -> Outline:

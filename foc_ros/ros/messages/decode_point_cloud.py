@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
@@ -41,7 +42,7 @@ class DecodedCloud:
     obstacles: Obstacles
     stamp_ns: int
     frame_id: str
-    dropped: dict[str, int]
+    dropped: Mapping[str, int]
 
 
 def decode_point_cloud(message: Any, plane: str, place: Place = stay) -> DecodedCloud:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,14 +106,14 @@ def decode_frame(header: Any) -> str:
 
 def _decode_point(point: Any, field: str, transform: Transform) -> list[float]:
     coordinates: list[float] = transform.apply([point.x, point.y, point.z]).tolist()
-    for axis, value in zip('xyz', coordinates, strict=True):
-        check_coordinate(f'{field}.{axis}', value)
+    check_coordinates(field, coordinates)
     return coordinates
 
 
-def check_coordinate(field: str, value: float) -> None:
-    """Raise MessageError for a coordinate that is not finite or beyond MAX_COORDINATE."""
-    if not math.isfinite(value):
-        raise MessageError(field, 'a finite number [m]', value)
-    if abs(value) > MAX_COORDINATE:
-        raise MessageError(field, f'a coordinate within {MAX_COORDINATE:g} m of the origin', f'{value:g}')
+def check_coordinates(field: str, values: Iterable[float]) -> None:
+    """Raise MessageError for the first of x, y, z, w that is not finite or beyond MAX_COORDINATE."""
+    for axis, value in zip('xyzw', values, strict=False):
+        if not math.isfinite(value):
+            raise MessageError(f'{field}.{axis}', 'a finite number [m]', value)
+        if abs(value) > MAX_COORDINATE:
+            raise MessageError(f'{field}.{axis}', f'a coordinate within {MAX_COORDINATE:g} m of the origin', f'{value:g}')

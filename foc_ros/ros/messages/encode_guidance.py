@@ -12,9 +12,9 @@ import numpy as np
 
 from foc_ros.core.guidance.guide import GuidanceOutput
 
-from .encode_inputs import encode_hand_pose
+from .encode_inputs import encode_array, encode_hand_pose, encode_pose
 from .plane import lift, project
-from .types import MessageTypes, make_header
+from .types import MessageTypes, make_header, make_marker
 
 ARROW, SPHERE = 0, 2
 METRES_PER_NEWTON = 0.02
@@ -36,13 +36,15 @@ class Place:
 
 def encode_wrench(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/WrenchStamped without torque."""
-    wrench = types.make('geometry_msgs/msg/Wrench', force=_encode_vector(lift(output.force, 0.0, place.plane), types))
-    return types.make('geometry_msgs/msg/WrenchStamped', header=_encode_header(place, types), wrench=wrench)
+    header = make_header(types, place.stamp_ns, place.frame_id)
+    return types.make('geometry_msgs/msg/WrenchStamped', header=header, wrench=encode_force(output, place, types))
 
 
 def encode_force(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/Wrench without torque and without a stamp, as drivers of haptic devices take it."""
-    return encode_wrench(output, place, types).wrench
+    return types.make(
+        'geometry_msgs/msg/Wrench', force=types.fill('geometry_msgs/msg/Vector3', lift(output.force, 0.0, place.plane).tolist())
+    )
 
 
 def encode_reference(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
@@ -54,20 +56,15 @@ def encode_reference(output: GuidanceOutput, place: Place, types: MessageTypes) 
 def encode_stiffness(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the stiffness [N/m] as a std_msgs/Float64MultiArray of 3 x 3."""
     axes = lift(np.eye(2), 0.0, place.plane)
-    dimensions = [
-        types.make('std_msgs/msg/MultiArrayDimension', label=label, size=3, stride=stride)
-        for label, stride in (('row', 9), ('column', 3))
-    ]
-    layout = types.make('std_msgs/msg/MultiArrayLayout', dim=dimensions)
-    return types.make('std_msgs/msg/Float64MultiArray', layout=layout, data=(axes.T @ output.stiffness @ axes).ravel())
+    return encode_array(types, axes.T @ output.stiffness @ axes, (('row', 3, 9), ('column', 3, 3)))
 
 
 def blend_twist(output: GuidanceOutput, command: Any, plane: str, types: MessageTypes) -> Any:
     """Return a geometry_msgs/TwistStamped command with the part in the plane blended; the rest of it is kept."""
     linear = command.twist.linear
     velocity, across = project([linear.x, linear.y, linear.z], plane)
-    blended = lift(output.blend_command(velocity), across, plane)
-    twist = types.make('geometry_msgs/msg/Twist', linear=_encode_vector(blended, types), angular=command.twist.angular)
+    blended = types.fill('geometry_msgs/msg/Vector3', lift(output.blend_command(velocity), across, plane).tolist())
+    twist = types.make('geometry_msgs/msg/Twist', linear=blended, angular=command.twist.angular)
     return types.make('geometry_msgs/msg/TwistStamped', header=command.header, twist=twist)
 
 
@@ -75,30 +72,14 @@ def encode_guidance_markers(output: GuidanceOutput, place: Place, types: Message
     """Encode the force as an arrow from the hand, and the reference as a sphere."""
     start = lift(output.position, place.height, place.plane)
     end = start + METRES_PER_NEWTON * lift(output.force, 0.0, place.plane)
-    points = [types.make('geometry_msgs/msg/Point', **dict(zip('xyz', each.tolist(), strict=True))) for each in (start, end)]
-    reference = encode_reference(output, place, types).pose
-    arrow = {'type': ARROW, 'scale': _encode_vector(np.array(ARROW_SCALE), types), 'points': points}
-    sphere = {'type': SPHERE, 'scale': _encode_vector(np.full(3, REFERENCE_DIAMETER), types)}
-    shared = {
-        'header': _encode_header(place, types),
-        'ns': 'guidance',
-        'color': types.make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', COLOUR, strict=True))),
-        'lifetime': types.make('builtin_interfaces/msg/Duration', sec=1),
-    }
-    origin = encode_hand_pose(types, 0, '', (0.0, 0.0, 0.0)).pose
+    reference = encode_reference(output, place, types)
+    shared = {'header': reference.header, 'lifetime': types.make('builtin_interfaces/msg/Duration', sec=1)}
+    points = [types.fill('geometry_msgs/msg/Point', each.tolist()) for each in (start, end)]
+    arrow = {'pose': encode_pose(types, (0.0, 0.0, 0.0)), 'points': points}
     return [
-        types.make('visualization_msgs/msg/Marker', id=0, pose=origin, **arrow, **shared),
-        types.make('visualization_msgs/msg/Marker', id=1, pose=reference, **sphere, **shared),
+        make_marker(types, 'guidance', 0, ARROW, COLOUR, ARROW_SCALE, **arrow, **shared),
+        make_marker(types, 'guidance', 1, SPHERE, COLOUR, 3 * (REFERENCE_DIAMETER,), pose=reference.pose, **shared),
     ]
-
-
-def _encode_header(place: Place, types: MessageTypes) -> Any:
-    return make_header(types, place.stamp_ns, place.frame_id)
-
-
-def _encode_vector(vector: Any, types: MessageTypes) -> Any:
-    x, y, z = vector.tolist()
-    return types.make('geometry_msgs/msg/Vector3', x=x, y=y, z=z)
 
 
 WRENCH, REFERENCE, STIFFNESS, TWIST = (f'guidance/{name}' for name in ('wrench', 'reference', 'stiffness', 'twist'))

@@ -12,7 +12,7 @@ import numpy as np
 
 from foc_ros.core.types import Array
 
-from .types import MessageTypes, make_header
+from .types import MessageTypes, make_header, make_marker
 
 _NAMES = ('x', 'y', 'z', 'radius', 'radius_stddev', 'id')
 _BOX_NAMES = ('size_x', 'size_y', 'yaw')
@@ -26,30 +26,24 @@ CUBE, GREY = 1, (0.45, 0.45, 0.5, 0.9)
 
 def encode_pose(types: MessageTypes, position: Iterable[float]) -> Any:
     """Encode a geometry_msgs/Pose without rotation."""
-    x, y, z = position
-    return types.make(
-        'geometry_msgs/msg/Pose',
-        position=types.make('geometry_msgs/msg/Point', x=x, y=y, z=z),
-        orientation=_no_rotation(types),
-    )
+    return types.fill('geometry_msgs/msg/Pose', (types.fill('geometry_msgs/msg/Point', position), _no_rotation(types)))
 
 
 @lru_cache(maxsize=8)
 def _no_rotation(types: MessageTypes) -> Any:
-    return types.make('geometry_msgs/msg/Quaternion', w=1.0)
+    return types.fill('geometry_msgs/msg/Quaternion', (0.0, 0.0, 0.0, 1.0))
 
 
 def encode_hand_pose(types: MessageTypes, stamp_ns: int, frame_id: str, position: Iterable[float]) -> Any:
     """Encode a geometry_msgs/PoseStamped."""
-    return types.make(
-        'geometry_msgs/msg/PoseStamped', header=make_header(types, stamp_ns, frame_id), pose=encode_pose(types, position)
-    )
+    head = make_header(types, stamp_ns, frame_id)
+    return types.fill('geometry_msgs/msg/PoseStamped', (head, encode_pose(types, position)))
 
 
 def encode_goals(types: MessageTypes, stamp_ns: int, frame_id: str, positions: Array) -> Any:
     """Encode goals (g, 3) as a geometry_msgs/PoseArray."""
     poses = [encode_pose(types, position) for position in positions]
-    return types.make('geometry_msgs/msg/PoseArray', header=make_header(types, stamp_ns, frame_id), poses=poses)
+    return types.fill('geometry_msgs/msg/PoseArray', (make_header(types, stamp_ns, frame_id), poses))
 
 
 def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Sequence[tuple[float, ...]]) -> Any:
@@ -67,20 +61,19 @@ def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Se
 
 def encode_boxes(types: MessageTypes, stamp_ns: int, frame_id: str, boxes: Mapping[str, Sequence[float]]) -> Any:
     """Encode boxes by name, x, y, z of the centre and full lengths along these axes [m], as a MarkerArray of cubes."""
-    colour = types.make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', GREY, strict=True)))
+    header = make_header(types, stamp_ns, frame_id)
     markers = [
-        types.make(
-            'visualization_msgs/msg/Marker',
-            header=make_header(types, stamp_ns, frame_id),
-            ns=name,
-            type=CUBE,
-            pose=encode_pose(types, box[:3]),
-            scale=types.make('geometry_msgs/msg/Vector3', **dict(zip('xyz', box[3:], strict=True))),
-            color=colour,
-        )
+        make_marker(types, name, 0, CUBE, GREY, box[3:], header=header, pose=encode_pose(types, box[:3]))
         for name, box in boxes.items()
     ]
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
+
+
+def encode_array(types: MessageTypes, array: Array, dimensions: Iterable[tuple[str, int, int]]) -> Any:
+    """Encode an array as a std_msgs/Float64MultiArray; dimensions: label, size and stride of each."""
+    made = [types.fill('std_msgs/msg/MultiArrayDimension', each) for each in dimensions]
+    layout = types.fill('std_msgs/msg/MultiArrayLayout', (made, 0))
+    return types.fill('std_msgs/msg/Float64MultiArray', (layout, array.ravel()))
 
 
 def encode_table(types: MessageTypes, cloud_header: Any, table: np.ndarray[Any, np.dtype[np.void]]) -> Any:
@@ -101,7 +94,5 @@ def encode_table(types: MessageTypes, cloud_header: Any, table: np.ndarray[Any, 
 @lru_cache(maxsize=8)
 def _encode_columns(types: MessageTypes, columns: np.dtype[np.void]) -> list[Any]:
     """Return the PointFields of a table; cached, because all clouds of one kind share them."""
-    return [
-        types.make('sensor_msgs/msg/PointField', name=name, offset=offset, datatype=_DATATYPES[kind.str], count=1)
-        for name, (kind, offset, *_) in (columns.fields or {}).items()
-    ]
+    fields = (columns.fields or {}).items()
+    return [types.fill('sensor_msgs/msg/PointField', (name, at, _DATATYPES[kind.str], 1)) for name, (kind, at, *_) in fields]

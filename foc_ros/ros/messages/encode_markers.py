@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
 
 from .plane import lift
 from .ranking import describe_candidate, find_drawn_curve, order_candidates
-from .types import MessageTypes, make_header
+from .types import MessageTypes, make_header, make_marker
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
 DELETE_ALL = 3
@@ -96,7 +96,7 @@ class _MarkerEncoder:
             colour, text = GREY, outcome.reason
         points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
-        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[self._encode_point(*p) for p in points])
+        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[*map(self._encode_point, points)])
         if outcome.has_likelihood and likelihood < LABELLED:
             return
         label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goal_positions))}) {text}'
@@ -144,7 +144,7 @@ class _MarkerEncoder:
             return self.encode(name, row, CYLINDER, colour, (diameter, diameter, 10 * THICKNESS), centre)
         outline = self._lift(trace_obstacle(obstacles, row, growth, ARC_POINTS))
         corners = [corner for before, after in pairwise(outline) for corner in (centre, before, after)]
-        return self.encode(name, row, TRIANGLES, colour, points=[self._encode_point(*corner) for corner in corners])
+        return self.encode(name, row, TRIANGLES, colour, points=[*map(self._encode_point, corners)])
 
     def _find_nearest(self, obstacles: Obstacles) -> Obstacles:
         if len(obstacles) <= MAX_DRAWN or not self.prediction.candidates:
@@ -164,25 +164,14 @@ class _MarkerEncoder:
         angle: float = 0.0,
         **rest: Any,
     ) -> Any:
-        make = self.types.make
-        x, y, z, w = _compute_rotation(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
-        orientation = make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w)
-        return make(
-            'visualization_msgs/msg/Marker',
-            ns=name,
-            id=identity,
-            type=kind,
-            pose=make('geometry_msgs/msg/Pose', position=self._encode_point(*centre), orientation=orientation),
-            scale=make('geometry_msgs/msg/Vector3', **dict(zip('xyz', scale, strict=True))),
-            color=make('std_msgs/msg/ColorRGBA', **dict(zip('rgba', colour, strict=True))),
-            **self._shared_fields,
-            **rest,
-        )
+        turn = _compute_rotation(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
+        orientation = self.types.fill('geometry_msgs/msg/Quaternion', turn)
+        pose = self.types.make('geometry_msgs/msg/Pose', position=self._encode_point(centre), orientation=orientation)
+        return make_marker(self.types, name, identity, kind, colour, scale, pose=pose, **self._shared_fields, **rest)
 
     def _lift(self, positions: Array) -> list[list[float]]:
         """Return positions in the plane (m, 2) as points in space, at the height of the hand."""
-        points: list[list[float]] = lift(positions, self.prediction.height, self.plane).tolist()
-        return points
+        return cast('list[list[float]]', lift(positions, self.prediction.height, self.plane).tolist())
 
     def _lift_curve(self, curve: Array, outcome: PredictedCandidate, rows: Any = slice(None)) -> list[list[float]]:
         """Return rows of a curve (m, 2) along the whole way of a candidate as points in space, at its predicted heights."""
@@ -190,10 +179,10 @@ class _MarkerEncoder:
             return self._lift(curve[rows])
         heights = outcome.height.mean[:, 0]
         between = np.interp(np.linspace(0.0, 1.0, len(curve)), np.linspace(0.0, 1.0, len(heights)), heights)
-        points: list[list[float]] = lift(curve[rows], between[rows], self.plane).tolist()
-        return points
+        return cast('list[list[float]]', lift(curve[rows], between[rows], self.plane).tolist())
 
-    def _encode_point(self, x: float, y: float, z: float) -> Any:
+    def _encode_point(self, point: Sequence[float]) -> Any:
+        x, y, z = point
         return self.types.make('geometry_msgs/msg/Point', x=x, y=y, z=z)
 
 

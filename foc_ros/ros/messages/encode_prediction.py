@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.types import NANOSECONDS, Obstacles, Prediction, Status
 
-from .encode_inputs import encode_hand_pose, encode_table
+from .encode_inputs import encode_array, encode_hand_pose, encode_table
 from .encode_markers import encode_markers
 from .plane import lift
 from .ranking import compute_cost_ratios, order_candidates
@@ -101,22 +101,21 @@ def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     outcomes = order_candidates(prediction)
     ratios = compute_cost_ratios(outcomes)
     rows = [(o.likelihood, o.solution.effort, ratio, o.solution.eta) for o, ratio in zip(outcomes, ratios, strict=True)]
-    names, width = [outcome.candidate.label for outcome in outcomes], len(LIKELIHOOD_COLUMNS)
-    for name, share in ((UNKNOWN, prediction.unknown), (OTHER, prediction.other)):
-        if share > 0.0:
-            rows.append((share, math.nan, math.nan, math.nan))
-            names.append(name)
-    labels = ';'.join(names)
-    dimensions = [
-        types.make('std_msgs/msg/MultiArrayDimension', label=label, size=size, stride=stride)
-        for label, size, stride in (
-            (labels, len(rows), width * len(rows)),
-            (','.join(LIKELIHOOD_COLUMNS), width, width),
-            (f'{STAMP}{prediction.stamp_ns}', 1, 1),
-        )
-    ]
-    layout = types.make('std_msgs/msg/MultiArrayLayout', dim=dimensions)
-    return types.make('std_msgs/msg/Float64MultiArray', layout=layout, data=np.array(rows, dtype=float).ravel())
+    shares, width = _list_shares(prediction), len(LIKELIHOOD_COLUMNS)
+    rows += [(share, math.nan, math.nan, math.nan) for share in shares.values()]
+    labels = ';'.join([*(outcome.candidate.label for outcome in outcomes), *shares])
+    dimensions = (
+        (labels, len(rows), width * len(rows)),
+        (','.join(LIKELIHOOD_COLUMNS), width, width),
+        (f'{STAMP}{prediction.stamp_ns}', 1, 1),
+    )
+    return encode_array(types, np.array(rows, dtype=float), dimensions)
+
+
+def _list_shares(prediction: Prediction) -> dict[str, float]:
+    """Return the shares above 0 that no candidate has, by their labels."""
+    shares = {UNKNOWN: prediction.unknown, OTHER: prediction.other}
+    return {name: share for name, share in shares.items() if share > 0.0}
 
 
 def encode_likelihoods_by_name(prediction: Prediction, types: MessageTypes) -> Any:
@@ -127,14 +126,13 @@ def encode_likelihoods_by_name(prediction: Prediction, types: MessageTypes) -> A
     """
     classes = {outcome.label: outcome.likelihood for outcome in order_candidates(prediction)}
     goals = {goal.name: goal.likelihood for goal in prediction.goals if goal.likelihood is not None}
-    rest = {name: share for name, share in ((UNKNOWN, prediction.unknown), (OTHER, prediction.other)) if share > 0.0}
     statuses = []
     for name, rows in (('goals', goals), ('classes', classes)):
-        items = (rows | rest).items()
-        values = [types.make('diagnostic_msgs/msg/KeyValue', key=key, value=f'{share:.6g}') for key, share in items]
+        items = (rows | _list_shares(prediction)).items()
+        values = [types.fill('diagnostic_msgs/msg/KeyValue', (key, f'{share:.6g}')) for key, share in items]
         statuses.append(types.make('diagnostic_msgs/msg/DiagnosticStatus', name=name, values=values))
     header = make_header(types, prediction.stamp_ns, prediction.frame_id)
-    return types.make('diagnostic_msgs/msg/DiagnosticArray', header=header, status=statuses)
+    return types.fill('diagnostic_msgs/msg/DiagnosticArray', (header, statuses))
 
 
 def encode_goal_likelihoods(prediction: Prediction, types: MessageTypes) -> dict[int, Any]:
@@ -153,7 +151,7 @@ def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
         points = lift(outcome.solution.path, height, plane).tolist()
         for seconds, point in zip(outcome.solution.times.tolist(), points, strict=True):
             poses.append(encode_hand_pose(types, stamp_ns + round(seconds * NANOSECONDS), frame_id, point))
-    return types.make('nav_msgs/msg/Path', header=make_header(types, stamp_ns, frame_id), poses=poses)
+    return types.fill('nav_msgs/msg/Path', (make_header(types, stamp_ns, frame_id), poses))
 
 
 Encoder = Callable[[Prediction, Obstacles, str, MessageTypes], Any]

@@ -49,6 +49,10 @@ class Transform(NamedTuple):
         """Return a pose after the transform."""
         return Transform(self.rotation @ inner.rotation, self.apply(inner.translation), self.stamp_ns)
 
+    def inverse(self) -> Transform:
+        """Return the transform back."""
+        return Transform(self.rotation.T, -self.rotation.T @ self.translation, self.stamp_ns)
+
 
 NO_TRANSFORM = Transform(np.eye(3), np.zeros(3))
 

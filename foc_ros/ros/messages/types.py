@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import array
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -43,10 +43,7 @@ class MessageTypes(ABC):
         Messages share the values of their fields, defaults above all, so they must not be changed. rosbags knows no defaults but
         zero: give a Quaternion its w. Raises TypeError for a field that the type does not have.
         """
-        try:
-            message_class, is_checked, fields = self._layouts[name]
-        except KeyError:
-            message_class, is_checked, fields = self._layouts[name] = self._find_layout(name)
+        message_class, is_checked, fields = self._layouts.get(name) or self._keep_layout(name)
         message: Any = object.__new__(message_class)  # the constructor is slower: it creates the default of every field
         given = 0
         if is_checked is not None:
@@ -60,6 +57,15 @@ class MessageTypes(ABC):
         if given < len(values):
             raise TypeError(f'{name} has no field {", ".join(sorted(set(values) - set(fields)))}')
         return message
+
+    def fill(self, name: str, values: Iterable[Any]) -> Any:
+        """Create a message from the values of all its fields in their order, such as a Point from x, y and z."""
+        fields = (self._layouts.get(name) or self._keep_layout(name)).fields
+        return self.make(name, **dict(zip(fields, values, strict=True)))
+
+    def _keep_layout(self, name: str) -> _Layout:
+        layout = self._layouts[name] = self._find_layout(name)
+        return layout
 
     @abstractmethod
     def _find_layout(self, name: str) -> _Layout:
@@ -129,9 +135,24 @@ def _find_converter(default: Any) -> Callable[[Any], Any]:
 def make_stamp(types: MessageTypes, stamp_ns: int) -> Any:
     """Return a builtin_interfaces/Time of nanoseconds; beyond its 32 bits, the seconds are the first or last possible."""
     seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-    return types.make('builtin_interfaces/msg/Time', sec=min(max(seconds, -(2**31)), 2**31 - 1), nanosec=nanoseconds)
+    return types.fill('builtin_interfaces/msg/Time', (min(max(seconds, -(2**31)), 2**31 - 1), nanoseconds))
 
 
 def make_header(types: MessageTypes, stamp_ns: int, frame_id: str) -> Any:
     """Return a std_msgs/Header."""
-    return types.make('std_msgs/msg/Header', stamp=make_stamp(types, stamp_ns), frame_id=frame_id)
+    return types.fill('std_msgs/msg/Header', (make_stamp(types, stamp_ns), frame_id))
+
+
+def make_marker(
+    types: MessageTypes, ns: str, identity: int, kind: int, colour: Iterable[float], scale: Iterable[float], **rest: Any
+) -> Any:
+    """Return a visualization_msgs/Marker; rest: its other fields."""
+    return types.make(
+        'visualization_msgs/msg/Marker',
+        ns=ns,
+        id=identity,
+        type=kind,
+        color=types.fill('std_msgs/msg/ColorRGBA', colour),
+        scale=types.fill('geometry_msgs/msg/Vector3', scale),
+        **rest,
+    )
