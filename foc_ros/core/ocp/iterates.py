@@ -62,8 +62,9 @@ class Plan:
         """Return the plans of some of the problems."""
         rows = self.rows[is_taken]
         kept, further = np.isin(self.contacts.problem, rows), np.isin(self.further.problem, rows)
-        parts = (each[is_taken] for each in (self.step, self.k, self.gain, self.fall))
-        return Plan(rows, *parts, self.contacts.take(kept), self.multipliers[kept], self.further.take(further))
+        step, k, gain, fall = (each[is_taken] for each in (self.step, self.k, self.gain, self.fall))
+        contacts, multipliers = self.contacts.take(kept), self.multipliers[kept]
+        return Plan(rows, step, k, gain, fall, contacts, multipliers, self.further.take(further))
 
     def replace(self, other: Plan) -> Plan:
         """Return the plans with those of some of the problems replaced."""

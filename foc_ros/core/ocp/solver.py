@@ -67,8 +67,8 @@ ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
 VIOLATED, VIOLATED_APART = 1e-3, 0.25
 """Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
-MOST_TRIALS, SHORTER = 6, 0.25
-"""Steps that are tried: the whole one, the same with rows added where it failed, and a part of the last one each."""
+MOST_TRIALS, SHORTER = 5, 0.25
+"""Steps that are tried besides corrected ones: the whole one, and a part of the last one each."""
 CURVED = 1.0
 """Largest gain of a step that is corrected where it fails: farther away it is shortened."""
 SUFFICIENT = 1e-4
