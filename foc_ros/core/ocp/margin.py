@@ -143,9 +143,9 @@ class Margins:
         rate[:, 0, 1, 0] = self.step_s
         means = np.stack([each.free[:, :4] for each in self.problems]).reshape(-1, self.steps + 1, 2, 2) * rate
         variance = np.zeros((len(self.problems), self.steps, 6, 3))
-        for row, problem in enumerate(self.problems):
+        for problem in {id(each): each for each in self.problems}.values():
             if problem.initial_covariance.any():
-                variance[row] = _spread_start(problem)
+                variance[[each is problem for each in self.problems]] = _spread_start(problem)
         self._free = Motion(np.concatenate((means[:, :-1], means[:, 1:]), axis=2), variance)
 
     def _set_obstacles(self, tau: Array) -> None:

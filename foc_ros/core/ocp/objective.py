@@ -79,7 +79,8 @@ class Objective:
     def __init__(self, problems: Sequence[Problem], wanted_k: Array, rate: Array, lam: Array) -> None:
         self.wanted_k = wanted_k
         self.set_rate(rate)
-        known = {id(each): tabulate_cost(each) for each in problems}
+        # candidates with one goal share their problem
+        known = {key: tabulate_cost(each) for key, each in {id(each): each for each in problems}.items()}
         costs = [known[id(each)] for each in problems]
         self.weights = np.stack([each.weights for each in costs]) + lam[:, None] * np.stack([each.variance for each in costs])
         self.fixed = np.array([each.fixed for each in costs])
