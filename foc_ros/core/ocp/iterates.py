@@ -42,42 +42,6 @@ class Evaluation:
 
 
 @dataclass
-class Plan:
-    """The solutions of the QPs of r problems.
-
-    rows (r,): the problems; step (r, 2N); k (r,): planned safety factors; gain, fall (r,): how much the loss falls to first
-    order, and to second order; contacts and multipliers (q,): the rows of the QPs; further: those of them that were added.
-    """
-
-    rows: Indices
-    step: Array
-    k: Array
-    gain: Array
-    fall: Array
-    contacts: Contacts
-    multipliers: Array
-    further: Contacts
-
-    def take(self, is_taken: NDArray[np.bool_]) -> Plan:
-        """Return the plans of some of the problems."""
-        rows = self.rows[is_taken]
-        kept, further = np.isin(self.contacts.problem, rows), np.isin(self.further.problem, rows)
-        step, k, gain, fall = (each[is_taken] for each in (self.step, self.k, self.gain, self.fall))
-        contacts, multipliers = self.contacts.take(kept), self.multipliers[kept]
-        return Plan(rows, step, k, gain, fall, contacts, multipliers, self.further.take(further))
-
-    def replace(self, other: Plan) -> Plan:
-        """Return the plans with those of some of the problems replaced."""
-        place = np.searchsorted(self.rows, other.rows)
-        for mine, new in ((self.step, other.step), (self.k, other.k), (self.gain, other.gain), (self.fall, other.fall)):
-            mine[place] = new
-        kept = ~np.isin(self.contacts.problem, other.rows)
-        contacts = self.contacts.take(kept).join(other.contacts)
-        multipliers = np.concatenate((self.multipliers[kept], other.multipliers))
-        return Plan(self.rows, self.step, self.k, self.gain, self.fall, contacts, multipliers, other.further)
-
-
-@dataclass
 class Iterates:
     """Where the sequence is: a row for each of b problems.
 
