@@ -25,7 +25,8 @@ from matplotlib.ticker import NullLocator
 from foc_ros.core.obstacles.risk import RiskBound, count_events, k_of_eta
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.types import Array, Solution, Status
+from foc_ros.core.solution import Solution, Status
+from foc_ros.core.types import Array
 from foc_ros.reporting.draw import get_class_style, open_figure, save_figure
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / 'test'))

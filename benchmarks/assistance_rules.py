@@ -15,8 +15,9 @@ import numpy as np
 from foc_ros.analysis.simulation.operators import Task
 from foc_ros.analysis.simulation.study import Assistance
 from foc_ros.core.config import Config
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.types import Array, Obstacles
+from foc_ros.core.types import Array
 
 RATIONALITY = 50.0
 """Log-likelihood of a goal that an operator loses with each metre of detour [1/m]."""

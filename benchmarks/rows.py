@@ -24,11 +24,14 @@ from foc_ros.analysis.replay import replay
 from foc_ros.core import predict as predictor
 from foc_ros.core.candidates import solve_candidates
 from foc_ros.core.config import Config, FocConfig
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, resample, warm_start
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import Candidate, Solution, Status
 from foc_ros.core.tracks import NO_TRACKS, Tracks
-from foc_ros.core.types import NANOSECONDS, Candidate, Obstacles, PredictedCandidate, Prediction, Solution, Status
+from foc_ros.core.types import NANOSECONDS
 
 Array = scenes.Array
 SETTINGS = FocConfig(strategy='optimal')

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.kalman import FilterState, update
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import make_box_polygon
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.plant.covariance import scale_noise
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
-from foc_ros.core.types import HandSample, Obstacles, make_obstacles
+from foc_ros.core.types import HandSample
 
 Array = NDArray[np.float64]
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from foc_ros.core.errors import SceneError as SceneError
     from foc_ros.core.guidance.guide import GuidanceOutput as GuidanceOutput
     from foc_ros.core.guidance.guide import GuidanceStatus as GuidanceStatus
+    from foc_ros.core.obstacle_table import Obstacles as Obstacles
     from foc_ros.core.obstacles.shapes import Box as Box
     from foc_ros.core.obstacles.shapes import Capsule as Capsule
     from foc_ros.core.obstacles.shapes import Circle as Circle
@@ -32,13 +33,12 @@ if TYPE_CHECKING:
     from foc_ros.core.ocp.strategies import StrategyResult as StrategyResult
     from foc_ros.core.plant.models import PlantModel as PlantModel
     from foc_ros.core.plant.plants import Plant as Plant
-    from foc_ros.core.types import Candidate as Candidate
-    from foc_ros.core.types import Goal as Goal
+    from foc_ros.core.prediction import PredictedCandidate as PredictedCandidate
+    from foc_ros.core.prediction import PredictedGoal as PredictedGoal
+    from foc_ros.core.solution import Candidate as Candidate
+    from foc_ros.core.solution import Goal as Goal
+    from foc_ros.core.solution import Status as Status
     from foc_ros.core.types import HandState as HandState
-    from foc_ros.core.types import Obstacles as Obstacles
-    from foc_ros.core.types import PredictedCandidate as PredictedCandidate
-    from foc_ros.core.types import PredictedGoal as PredictedGoal
-    from foc_ros.core.types import Status as Status
     from foc_ros.extending import *  # noqa: F403
     from foc_ros.solving import *  # noqa: F403
 
@@ -52,10 +52,13 @@ _MODULES = {
     'core.plant.plants': 'Plant',
     'core.errors': 'FocError FocWarning InputError MessageError ParameterError RecordingError SceneError',
     'core.guidance.guide': 'GuidanceOutput GuidanceStatus',
+    'core.obstacle_table': 'Obstacles',
     'core.obstacles.shapes': 'Box Capsule Circle Hull',
     'core.ocp.monte_carlo': 'MonteCarlo',
     'core.ocp.strategies': 'StrategyResult',
-    'core.types': 'Candidate Goal HandState Obstacles PredictedCandidate PredictedGoal Status',
+    'core.prediction': 'PredictedCandidate PredictedGoal',
+    'core.solution': 'Candidate Goal Status',
+    'core.types': 'HandState',
 }
 _MODULE_OF = {name: f'{__name__}.{module}' for module, names in _MODULES.items() for name in names.split()}
 

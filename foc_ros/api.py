@@ -12,18 +12,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from foc_ros.core import types
+from foc_ros.core import prediction as core_prediction
 from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError, InputError, SceneError
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.hand.kalman import describe_jump
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
+from foc_ros.core.solution import Goal
 from foc_ros.core.support import check_config, check_number, check_vector, collect_goals, find_shape
-from foc_ros.core.types import NANOSECONDS, Goal, HandSample, Obstacles, SampleStatus, make_obstacles
+from foc_ros.core.types import NANOSECONDS, HandSample, SampleStatus
 
 STEP_COLUMNS = ('ahead_s', 'x_m', 'y_m', 'vx_m_s', 'vy_m_s', 'xx_m2', 'xy_m2', 'yy_m2')
 """Columns of the steps in `Prediction.to_records`."""
@@ -36,7 +38,7 @@ PLANE, SPACE = 2, 3
 """Number of coordinates of a position in the task plane, and of one with its height over the plane."""
 
 
-class Prediction(types.Prediction):
+class Prediction(core_prediction.Prediction):
     """The prediction for one hand sample.
 
     Attributes
@@ -158,7 +160,7 @@ class Guidance:
         t: float,
         position: ArrayLike,
         velocity: ArrayLike,
-        prediction: types.Prediction | None,
+        prediction: core_prediction.Prediction | None,
         acceleration: ArrayLike = (0.0, 0.0),
     ) -> GuidanceOutput:
         """Return the guidance for a hand.
@@ -189,7 +191,7 @@ class Guidance:
         time = check_number('t', t, -LATEST_S, LATEST_S)
         if self._state.energy is not None and time <= self._state.t:
             raise InputError('t', f'a time after the last one, {self._state.t:.9g} s', t)
-        if prediction is not None and not isinstance(prediction, types.Prediction):
+        if prediction is not None and not isinstance(prediction, core_prediction.Prediction):
             raise InputError('prediction', 'a Prediction or None', repr(prediction))
         age_s = 0.0 if prediction is None else time - prediction.t
         place, motion, change = (

@@ -27,8 +27,9 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.core.config import Config
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.scene import Scene
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, PredictedCandidate, Prediction
+from foc_ros.core.types import NANOSECONDS, Array, HandSample
 from foc_ros.io.topics import HAND
 from foc_ros.ros.intake import Intake
 

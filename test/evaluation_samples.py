@@ -12,7 +12,8 @@ from foc_ros.analysis.evaluation.observations import CandidateTable, Observation
 from foc_ros.analysis.evaluation.truth import TIMES_S, GroundTruth, RecordedPath, find_open_gaps
 from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.classes.sides import BranchTimes
-from foc_ros.core.types import LEFT, RIGHT, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.solution import LEFT, RIGHT
 
 H = len(TIMES_S)
 

@@ -10,7 +10,7 @@ import evaluation_samples
 import numpy as np
 
 from foc_ros.analysis.fitting.direct import RecordedHand
-from foc_ros.core.types import Obstacles
+from foc_ros.core.obstacle_table import Obstacles
 
 OBSTACLE = (0.15, 0.0, 0.03)
 GOALS = np.array([[0.3, -0.1], [0.3, 0.0], [0.3, 0.1]])

@@ -11,8 +11,11 @@ from prediction_samples import outcome, prediction
 
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, guide
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction, Status, make_obstacles
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import Status
+from foc_ros.core.types import Array
 
 SAMPLES, PERIOD = 12, 0.005
 HANDS = ('still', 'walks', 'flees', 'shakes', 'attacks', 'circles')

@@ -11,7 +11,7 @@ import numpy as np
 
 from foc_ros.core.classes import Search, search
 from foc_ros.core.config import HomotopyConfig
-from foc_ros.core.types import Obstacles, make_obstacles
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 
 CLEARANCE = 0.005
 GOAL = np.array([0.35, 0.0])

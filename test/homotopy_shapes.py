@@ -9,7 +9,7 @@ from homotopy_scenes import CLEARANCE, GOAL
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from foc_ros.core.types import Obstacles, make_obstacles
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 
 HAND = np.zeros(2)
 

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.types import Candidate, PredictedCandidate, Prediction, Solution, Status, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import Candidate, Solution, Status
 
 STEPS, DT = 4, 0.05
 

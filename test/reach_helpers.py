@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import FocConfig
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
-from foc_ros.core.types import Obstacles, Solution, make_obstacles
+from foc_ros.core.solution import Solution
 
 REFERENCE = Path(__file__).with_name('reference_cases.json')
 REFERENCE_SHAPES = Path(__file__).with_name('reference_shapes.json')

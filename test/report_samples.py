@@ -8,20 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from foc_ros.core.types import (
-    LEFT,
-    NANOSECONDS,
-    RIGHT,
-    Array,
-    Candidate,
-    HandSample,
-    Obstacles,
-    PredictedCandidate,
-    Prediction,
-    Solution,
-    Status,
-    make_obstacles,
-)
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
+from foc_ros.core.types import NANOSECONDS, Array, HandSample
 
 START_NS = 1_000 * NANOSECONDS
 OBSTACLES = make_obstacles([[0.15, 0.0], [0.22, 0.1]], [0.03, 0.02], [0.003, 0.0], ids=('1', 'post'))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, random_scene, reach, solved
 
-from foc_ros.core.types import Status
+from foc_ros.core.solution import Status
 
 
 def dense(seed: int):

@@ -16,7 +16,7 @@ import foc_ros
 from foc_ros import Circle, Goal
 from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.interpolation import interpolate_covariance
-from foc_ros.core.types import Status
+from foc_ros.core.solution import Status
 
 FAST = Config(budget_s=0.0, foc={'steps': 20})
 CUP = Circle((0.15, 0.01), radius=0.03, name='cup')

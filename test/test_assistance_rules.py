@@ -23,7 +23,7 @@ from test_simulation import QUICK
 from foc_ros.analysis.simulation import NOISY
 from foc_ros.analysis.simulation.operators import DT, draw_task
 from foc_ros.analysis.simulation.study import run_trial
-from foc_ros.core.types import make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 
 STUDY = Path(__file__).parents[1] / 'benchmarks' / 'assistance.py'
 POST = make_obstacles([(0.0, 0.0)], [0.02])

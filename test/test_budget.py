@@ -9,11 +9,14 @@ from reach_helpers import bowed, one_obstacle
 from foc_ros.core.config import Config, FocConfig, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.hand.kalman import update
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.predict import predict
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS, Tracks
-from foc_ros.core.types import HandSample, Obstacles, Prediction, Status, make_obstacles
+from foc_ros.core.types import HandSample
 
 OBSTACLES = make_obstacles([[0.12, 0.01], [0.2, -0.03]], [0.02, 0.02], 0.001)
 SCENES = {

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import (
     RiskBound,
     compute_safety_factor,
@@ -14,7 +15,6 @@ from foc_ros.core.obstacles.risk import (
     k_of_eta,
     size_moments,
 )
-from foc_ros.core.types import make_obstacles
 
 
 @given(st.floats(0.0, 0.999))

@@ -12,13 +12,14 @@ from reach_helpers import reach
 
 from foc_ros.core.classes import find_path_sides, search
 from foc_ros.core.config import FocConfig, HomotopyConfig
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem, solve_problems
 from foc_ros.core.ocp.solver import LARGEST_TOLERANCE
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.safety_preference import SafetyPreference
-from foc_ros.core.types import Candidate, Obstacles, Solution, Status, make_obstacles
+from foc_ros.core.solution import Candidate, Solution, Status
 
 REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'random_shapes.json'
 PREFERENCE = SafetyPreference(beta=2.0, shortfall=6.0)

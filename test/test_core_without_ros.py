@@ -36,7 +36,8 @@ import numpy as np
 from foc_ros.core.config import Config
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.predict import predict
-from foc_ros.core.types import HandState, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.types import HandState
 hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
 scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)
 prediction, _ = predict(Config(), hand, scene, np.array([[0.3, 0.0]]), NO_TRACKS)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import FocConfig
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.plant.plants import condense, discretise_damped_mass, discretise_triple_integrator
-from foc_ros.core.types import make_obstacles
 
 STEPS, LAMBDA = 12, 3e4
 PLANTS = {'jerk': discretise_triple_integrator(0.05), 'force': discretise_damped_mass(0.05, 1.5, 4.0)}

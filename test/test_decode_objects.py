@@ -20,10 +20,11 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from foc_ros.analysis.replay import replay
 from foc_ros.core.errors import MessageError
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import make_box_polygon
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import Obstacles, SampleStatus
+from foc_ros.core.types import SampleStatus
 from foc_ros.io.topics import OPTIONAL, TYPES
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections

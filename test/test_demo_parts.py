@@ -24,7 +24,8 @@ from foc_ros.cli.demo import Recorder, describe_lead
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
-from foc_ros.core.types import NANOSECONDS, Prediction
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.reporting.live_text import GOAL, HAND, HEIGHT, OBSTACLE, WIDTH, draw_scene, extend_bounds, show_live
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot

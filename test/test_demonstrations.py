@@ -19,9 +19,10 @@ from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
 from foc_ros.core.learning.learnt import Knowledge
 from foc_ros.core.learning.recordings import make_library
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import HandState, make_obstacles
+from foc_ros.core.types import HandState
 from foc_ros.io.class_library import load_library, save_library
 
 OBSTACLES = make_obstacles([[0.15, 0.0], [0.15, 0.06], [0.15, -0.06]], 0.015)

@@ -12,18 +12,11 @@ import pytest
 
 from foc_ros.core.config import Config, CovarianceConfig, replace_values
 from foc_ros.core.learning.dispersion import REST_SHARE, Dispersion
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import (
-    NANOSECONDS,
-    Candidate,
-    HandSample,
-    HandState,
-    PredictedCandidate,
-    Prediction,
-    Solution,
-    Status,
-    make_obstacles,
-)
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import Candidate, Solution, Status
+from foc_ros.core.types import NANOSECONDS, HandSample, HandState
 
 STDDEV = 0.02
 FIXED = {'duration.adaptation': 'none'}

@@ -27,10 +27,12 @@ from report_samples import START_NS, prediction, predictions, samples, scene, wi
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles import shapes
 from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import Prediction, Status, make_obstacles
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import Status
 from foc_ros.io.bags import BagReader
 from foc_ros.reporting.draw import (
     CLASS_COLOURS,

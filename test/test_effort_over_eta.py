@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, case_guess, case_problem, random_scene, reach, reference_cases, solved
 
-from foc_ros.core.types import Solution, Status
+from foc_ros.core.solution import Solution, Status
 
 STRATEGIES = ('lv', 'hc', 'optimal')
 EVERY = pytest.mark.parametrize('strategy', STRATEGIES)

@@ -14,9 +14,11 @@ from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_
 from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import FocError
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
-from foc_ros.core.types import PredictedCandidate, Prediction, Status, make_obstacles
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import Status
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_goal_likelihoods, encode_outputs
 from foc_ros.ros.messages.plane import lift, project
 from foc_ros.ros.messages.ranking import MAX_RATIO

@@ -27,7 +27,7 @@ from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask, ask_mai
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS_S
 from foc_ros.core.config import LikelihoodConfig
-from foc_ros.core.types import LEFT, RIGHT
+from foc_ros.core.solution import LEFT, RIGHT
 
 L, R = LEFT, RIGHT
 

@@ -28,8 +28,9 @@ from foc_ros.core import tracks
 from foc_ros.core.classes.rows import find_direction, find_rows, locate_rows
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.learning.movements import find_reached_goal
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.shapes import Box, Circle, Shape, collect_obstacles
-from foc_ros.core.types import LEFT, RIGHT, Solution, Status, make_obstacles
+from foc_ros.core.solution import LEFT, RIGHT, Solution, Status
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
 from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes

@@ -26,7 +26,7 @@ from foc_ros.analysis.evaluation.scores import (
 )
 from foc_ros.analysis.evaluation.truth import TIMES_S
 from foc_ros.core.config import LikelihoodConfig
-from foc_ros.core.types import LEFT, RIGHT
+from foc_ros.core.solution import LEFT, RIGHT
 
 L, R = LEFT, RIGHT
 TWO_ROWS = {'centre': [(1.0, 0.2), (1.0, -0.2), (2.0, 0.0)], 'row': (0, 0, 1)}

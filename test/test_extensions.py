@@ -21,7 +21,7 @@ from foc_ros.core.ocp.strategies import Strategy, StrategyResult, solve_fixed
 from foc_ros.core.plant.models import PlantModel
 from foc_ros.core.plant.plants import Plant
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
-from foc_ros.core.types import Status
+from foc_ros.core.solution import Status
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)

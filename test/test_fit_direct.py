@@ -27,7 +27,8 @@ from foc_ros.analysis.fitting.direct import (
 )
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.kalman import compute_gramian, compute_transition, update
-from foc_ros.core.types import Array, HandSample, SampleStatus, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.types import Array, HandSample, SampleStatus
 
 CONFIG = replace_values(Config(), {'estimator.acceleration_time_s': 0.0})
 GOAL = np.array([[0.3, 0.0]])

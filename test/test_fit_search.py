@@ -23,7 +23,8 @@ from foc_ros.analysis.fitting.race import DURATIONS, Replays, make_eta_settings,
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.types import Array, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.types import Array
 
 CONFIG = replace_values(
     Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0, 'estimator.acceleration_time_s': 0.0}

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, replace_values
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import HandSample, make_obstacles
+from foc_ros.core.types import HandSample
 
 PERIOD_NS = 10_000_000
 SAMPLES = {'optimal': 1000, 'lv': 250, 'hc': 250}

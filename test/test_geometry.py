@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.errors import SceneError
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import SMALLEST_DISTANCE, Offset, find_offset, measure_offsets, tabulate_edges
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles, make_box_polygon, make_hull_polygon
-from foc_ros.core.types import make_obstacles
 
 SEEDS = st.integers(0, 10_000)
 MANY = settings(max_examples=100, deadline=None, derandomize=True)

@@ -11,11 +11,13 @@ import foc_ros
 from foc_ros.core.config import Config
 from foc_ros.core.errors import SceneError
 from foc_ros.core.learning.learnt import Knowledge
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.obstacles.geometry import find_holders
 from foc_ros.core.predict import predict
+from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import Array, HandState, Obstacles, PredictedCandidate, Prediction, make_obstacles
+from foc_ros.core.types import Array, HandState
 
 BOX = np.array([[-0.03, -0.03], [0.03, -0.03], [0.03, 0.03], [-0.03, 0.03]])
 PLACES = np.array([[0.2, 0.0], [0.4, 0.01]])

@@ -18,7 +18,7 @@ from varied_reaches import STEPS, VariedReach, feasible_reaches
 from foc_ros.core.obstacles.risk import RiskBound, count_events, k_of_eta
 from foc_ros.core.ocp.monte_carlo import monte_carlo, wilson
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.types import Solution, Status
+from foc_ros.core.solution import Solution, Status
 
 REACHES = 70
 SAMPLES = 2000

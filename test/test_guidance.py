@@ -26,7 +26,9 @@ from foc_ros.core.guidance.paths import (
     find_crossing,
     find_need,
 )
-from foc_ros.core.types import Array, Prediction, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import Array
 
 ROUND = make_obstacles([(0.1, 0.0)], [0.03])
 SETTINGS = GuidanceConfig(k_max=100.0, clearance=0.0)

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config, replace_values
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.predict import predict
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import HandState, Obstacles, Prediction, Status, make_obstacles
+from foc_ros.core.types import HandState
 
 GOAL = np.array([[0.3, 0.0]])
 CONFIG = replace_values(Config(), {'foc.steps': 30})

@@ -13,12 +13,15 @@ import foc_ros
 from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.height import predict_height, reach_along_axis
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.plant.covariance import SharedCovariances
 from foc_ros.core.predict import build_problem, predict
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import HandState, Obstacles, Prediction, Status, make_obstacles
+from foc_ros.core.types import HandState
 
 CONFIG = replace_values(Config(), {'budget_s': 0.0, 'foc.noise_x': 0.1, 'foc.noise_y': 0.1})
 STEPS, DT = CONFIG.foc.steps, 0.02

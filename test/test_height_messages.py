@@ -16,7 +16,7 @@ from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import MessageError
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import HeightTrajectory, Prediction
+from foc_ros.core.prediction import HeightTrajectory, Prediction
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import CollisionTable, MarkerTable, decode_detections

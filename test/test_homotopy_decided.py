@@ -9,7 +9,7 @@ from homotopy_scenes import find, gap_to_circles
 from foc_ros.core.classes import find_path_sides, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.errors import SceneError
-from foc_ros.core.types import make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 
 NOTHING = make_obstacles()
 

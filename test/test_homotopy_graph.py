@@ -8,7 +8,7 @@ from homotopy_scenes import CLEARANCE, GOAL, find, random_scene
 from homotopy_shapes import turn
 
 from foc_ros.core.classes import scene
-from foc_ros.core.types import make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 
 VELOCITY = np.array([0.1, 0.05])
 

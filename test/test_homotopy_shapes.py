@@ -10,9 +10,9 @@ from homotopy_scenes import CLEARANCE, GOAL, find
 from homotopy_shapes import HAND, make_box, random_shapes, shortest_by_pattern, turn
 
 from foc_ros.core.classes import find_path_sides
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Capsule, collect_obstacles, make_box_polygon
-from foc_ros.core.types import make_obstacles
 
 BEST = 16
 """Number of classes to compare: the longest of 32 wind about obstacles, where limits of winding count."""

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from foc_ros.core.classes import compute_swept_angles, find_path_sides
 from foc_ros.core.errors import SceneError
-from foc_ros.core.types import LEFT, RIGHT, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.solution import LEFT, RIGHT
 
 ABEAM = make_obstacles([[0.5, 0.0]], 0.1, ids=('post',))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from homotopy_scenes import AVOIDING, avoiding, find
 
-from foc_ros.core.types import make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 
 TICKS = 400
 

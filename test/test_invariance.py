@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, random_scene, reach, solved
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
-from foc_ros.core.types import Obstacles, Solution, Status
+from foc_ros.core.solution import Solution, Status
 
 STRATEGIES = pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
 KINDS = pytest.mark.parametrize('kind', ['circles', 'shapes'])

@@ -14,7 +14,7 @@ from bag_helpers import messages, write_bag
 from foc_ros.analysis.replay import Replay
 from foc_ros.cli.main import main
 from foc_ros.core.classes.library import record_demonstration
-from foc_ros.core.types import make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.io.bags import BagReader
 from foc_ros.io.class_library import MOST_WAYS, load_library, save_library
 from foc_ros.ros.parameters import load_parameter_file

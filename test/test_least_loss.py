@@ -14,7 +14,7 @@ from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.safety_preference import SafetyPreference
-from foc_ros.core.types import Solution, Status
+from foc_ros.core.solution import Solution, Status
 
 SOFT = SafetyPreference(beta=0.5, shortfall=1.0, dt=0.02)
 SETTINGS = {name: FocConfig(strategy=name) for name in ('lv', 'hc')}

@@ -19,9 +19,12 @@ from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.errors import InputError
 from foc_ros.core.likelihood import compute_likelihoods
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.prediction import PredictedCandidate
 from foc_ros.core.registry import LIKELIHOOD_RULES
 from foc_ros.core.safety_preference import SafetyPreference
-from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, HandState, PredictedCandidate, Solution, Status, make_obstacles
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
+from foc_ros.core.types import Array, HandState
 
 ANY_COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)

@@ -39,7 +39,7 @@ from ros_helpers import Graph  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 
 from foc_ros.core.config import Config  # noqa: E402
-from foc_ros.core.types import Status  # noqa: E402
+from foc_ros.core.solution import Status  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
 TAKING_PART = tuple(f'{status.value}, likelihood ' for status in Status if status.has_likelihood)

@@ -16,7 +16,8 @@ import foc_ros
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Prediction
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.topics import CLOUD, GOALS, HAND
 from foc_ros.ros.intake import Intake

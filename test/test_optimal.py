@@ -16,7 +16,7 @@ from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.safety_preference import HARD, SafetyPreference
-from foc_ros.core.types import Solution, Status
+from foc_ros.core.solution import Solution, Status
 
 DT, GRID = 0.02, 40
 SEEDS = (1, 2, 4, 8, 9)  # in others a gap is so narrow that the wanted k is out of reach

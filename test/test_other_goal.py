@@ -12,8 +12,10 @@ from foc_ros.core.errors import ParameterError
 from foc_ros.core.goals import compare_goals, find_common_time, find_other_share
 from foc_ros.core.guidance.guide import weigh_candidates
 from foc_ros.core.hand.straight import compute_straight_effort
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Prediction, make_obstacles
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.reporting.received import read_snapshot

@@ -15,9 +15,11 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
 from foc_ros.core.learning.learnt import Knowledge
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.pipeline import Pipeline, SampleStatus
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import Tracks
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, make_obstacles
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState
 
 START = 1000 * NANOSECONDS
 MS = NANOSECONDS // 1000

@@ -10,13 +10,14 @@ from numpy.testing import assert_allclose
 
 import foc_ros
 from foc_ros.core.config import Config
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
 from foc_ros.core.plant.plants import Plant, discretise_triple_integrator
 from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.registry import PLANTS
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import HandState, make_obstacles
+from foc_ros.core.types import HandState
 
 STEPS, MASS, DAMPING = 50, 1.5, 4.0
 MASS_CONFIG = Config().with_values(

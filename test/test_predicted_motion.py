@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.kalman import compute_gramian, compute_transition
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
@@ -17,8 +18,9 @@ from foc_ros.core.plant.covariance import compute_duration_sensitivity, compute_
 from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
 from foc_ros.core.plant.replanning import compute_error_map, triple_integrator_goal_map, triple_integrator_process_covariance
 from foc_ros.core.predict import predict
+from foc_ros.core.solution import Solution
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import HandState, Solution, make_obstacles
+from foc_ros.core.types import HandState
 
 MEAN = np.array([0.0, 0.0, 0.2, 0.1, -0.4, 1.0])
 

@@ -10,7 +10,8 @@ from homotopy_shapes import HAND, random_shapes
 from foc_ros.core.config import Config
 from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.scene import ReachingScene
-from foc_ros.core.types import HandState, Status
+from foc_ros.core.solution import Status
+from foc_ros.core.types import HandState
 
 SCENES = {'optimal': 20, 'lv': 2}
 """Numbers of scenes: `lv` takes a hundred times as long."""

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.predict import predict
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import Array, HandState, Prediction, Record, make_obstacles
+from foc_ros.core.types import Array, HandState, Record
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import pytest
 from reach_helpers import case_guess, case_problem, reference_cases, solved
 
 from foc_ros.core.classes import find_path_sides
-from foc_ros.core.types import Status
+from foc_ros.core.solution import Status
 
 CASES = pytest.mark.parametrize('case', reference_cases())
 

@@ -9,7 +9,7 @@ from reach_helpers import REFERENCE_SHAPES, case_guess, shapes_problem, solved
 
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.types import Solution, Status
+from foc_ros.core.solution import Solution, Status
 
 CASES = pytest.mark.parametrize(
     'case',

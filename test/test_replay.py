@@ -23,7 +23,7 @@ from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.cli.main import main
 from foc_ros.core.config import replace_values
 from foc_ros.core.scene import Scene
-from foc_ros.core.types import Status
+from foc_ros.core.solution import Status
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.topics import HAND
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles

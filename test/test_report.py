@@ -18,7 +18,8 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
 
 from foc_ros.core.errors import InputError
-from foc_ros.core.types import HandSample, Status
+from foc_ros.core.solution import Status
+from foc_ros.core.types import HandSample
 from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
 from foc_ros.reporting.report import describe_late, write_report
 from foc_ros.reporting.views import Snapshot, build_hand_trajectory, build_snapshot

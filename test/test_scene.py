@@ -5,8 +5,9 @@
 import numpy as np
 import pytest
 
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.scene import ObstacleSource, Scene
-from foc_ros.core.types import NANOSECONDS, make_obstacles
+from foc_ros.core.types import NANOSECONDS
 
 NOW = 50 * NANOSECONDS
 

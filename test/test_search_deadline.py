@@ -8,7 +8,7 @@ from homotopy_scenes import CLEARANCE, find
 from foc_ros.core.classes import Turn, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.types import make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 
 GOALS = np.column_stack([np.full(6, 0.4), np.linspace(-0.2, 0.2, 6)])
 CROWD = np.random.default_rng(2).uniform([0.05, -0.2], [0.35, 0.2], (40, 2))

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, reach, solved
 
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.obstacles.shapes import Box, Capsule, Hull, Shape, collect_obstacles, make_box_polygon
 from foc_ros.core.ocp.monte_carlo import wilson
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
-from foc_ros.core.types import Solution, Status, make_obstacles
+from foc_ros.core.solution import Solution, Status
 
 GOAL = np.array([0.3, 0.0])
 SAMPLES = 20_000

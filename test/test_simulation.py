@@ -35,7 +35,8 @@ from foc_ros.analysis.simulation.study import (
 )
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
-from foc_ros.core.types import Array, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.types import Array
 from foc_ros.ros.parameters import dump_parameter_file
 
 GOALS = np.array([[0.3, 0.1], [0.3, -0.1]])

@@ -16,7 +16,7 @@ from message_helpers import SECOND, message_types, pose_stamped
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.pipeline import Pipeline, SampleStatus
-from foc_ros.core.types import Prediction
+from foc_ros.core.prediction import Prediction
 from foc_ros.io.bags import BagReader
 from foc_ros.ros.intake import Intake
 

@@ -10,7 +10,8 @@ import pytest
 from reach_helpers import bowed, one_obstacle, reach, solved
 from scipy.interpolate import CubicHermiteSpline
 
-from foc_ros.core.types import Status, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.solution import Status
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
 EVERY = ['lv', 'hc', 'optimal', 'fixed', 'algorithm1']

@@ -16,7 +16,7 @@ from reach_helpers import reference_cases
 
 from foc_ros.cli.main import main
 from foc_ros.core.ocp import strategies
-from foc_ros.core.types import Status
+from foc_ros.core.solution import Status
 
 SCENE: dict[str, Any] = {
     'start': [0.0, 0.0],

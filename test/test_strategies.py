@@ -11,13 +11,14 @@ from reach_helpers import bowed, one_obstacle, reach, solved
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.errors import SceneError
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import eta_of_k
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
-from foc_ros.core.types import Status, make_obstacles
+from foc_ros.core.solution import Status
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.05)
 EVERY = pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])

@@ -12,9 +12,11 @@ import pytest
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.duration import CHANGE_S, limit_change
 from foc_ros.core.hand.kalman import update
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.predict import predict
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Status
 from foc_ros.core.tracks import NO_TRACKS, SMOOTHING_S, Track, Tracks
-from foc_ros.core.types import LEFT, RIGHT, Candidate, HandSample, HandState, Status, make_obstacles
+from foc_ros.core.types import HandSample, HandState
 
 CONFIG = replace_values(Config(), {'foc.steps': 20})
 GOALS = np.array([[0.3, 0.0]])

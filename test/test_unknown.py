@@ -13,9 +13,12 @@ from bag_helpers import TYPES
 
 from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.predict import predict
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import Solution, Status
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import HandState, Prediction, Solution, Status, make_obstacles
+from foc_ros.core.types import HandState
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_markers
 

@@ -11,7 +11,10 @@ import pytest
 from report_samples import START_NS, prediction, predictions, samples, scene, widen
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.types import LEFT, RIGHT, HandSample, Prediction, Status, describe_class, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import LEFT, RIGHT, Status, describe_class
+from foc_ros.core.types import HandSample
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.received import is_same_prediction, read_snapshot
 from foc_ros.reporting.tracks import Slots, build_candidate_tracks

@@ -8,8 +8,9 @@ from functools import lru_cache
 import numpy as np
 from reach_helpers import bowed, random_scene, reach, solved
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.types import Obstacles, Status
+from foc_ros.core.solution import Status
 
 STEPS = 40
 FASTEST = 0.05

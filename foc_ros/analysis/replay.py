@@ -15,8 +15,9 @@ from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import MessageError
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import Scene
-from foc_ros.core.types import NANOSECONDS, HandSample, HandState, Prediction, SampleStatus
+from foc_ros.core.types import NANOSECONDS, HandSample, HandState, SampleStatus
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES

@@ -15,7 +15,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from foc_ros.analysis.replay import GuidanceReplay, Replay, Step
-from foc_ros.core.types import Status
+from foc_ros.core.solution import Status
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.json_output import encode_guidance, encode_prediction
 from foc_ros.io.terminal import show_progress

@@ -16,11 +16,14 @@ from .classes.sides import compute_branch_times
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
 from .likelihood import BETWEEN_OPERATORS, compute_likelihoods, compute_lookahead_share
+from .obstacle_table import Obstacles
 from .obstacles.clearance import measure_clearance
 from .ocp.problem import Problem
 from .ocp.solve import solve_problems
 from .ocp.start import Start, cold_start, warm_start
-from .types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Solution, Status, as_readonly
+from .prediction import PredictedCandidate
+from .solution import Candidate, Solution, Status
+from .types import Array, HandState, as_readonly
 
 FAILED = (Status.LEFT_CLASS, Status.ITERATION_LIMIT, Status.INFEASIBLE)
 """What a solver says of classes that it could not solve."""

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The exceptions of the package: for wrong input they name the field, the value and what was expected.
 
-An expected failure (infeasible, unreachable, out of time) is a :class:`foc_ros.core.types.Status`, not an exception.
+An expected failure (infeasible, unreachable, out of time) is a :class:`foc_ros.core.solution.Status`, not an exception.
 """
 
 from __future__ import annotations

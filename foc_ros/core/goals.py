@@ -40,8 +40,9 @@ from dataclasses import replace
 import numpy as np
 
 from .hand.straight import compute_passing_effort, compute_straight_effort
+from .prediction import PredictedCandidate
 from .safety_preference import COST_FLOOR
-from .types import Array, HandState, PredictedCandidate
+from .types import Array, HandState
 
 LEAST_COMMON_S = 0.5
 """Least common time: a hand that is at one goal may still go to another, and this takes a movement [s]."""

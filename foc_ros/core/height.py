@@ -28,11 +28,14 @@ from numpy.typing import NDArray
 
 from .config import REFERENCE_STEP_S, Config
 from .hand.duration import is_passing
+from .obstacle_table import Obstacles
 from .obstacles.clearance import find_cleared
 from .plant.covariance import SharedCovariances, propagate_covariance, scale_noise, stack_noise, widen_covariance
 from .plant.models import HAND_STATES, make_plant_model
 from .plant.plants import apply_impulse_response, find_states_at_goal
-from .types import Array, HandState, HeightTrajectory, Obstacles, PredictedCandidate, Solution, Status
+from .prediction import HeightTrajectory, PredictedCandidate
+from .solution import Solution, Status
+from .types import Array, HandState
 
 CLEAR_STDDEVS = 2.0
 """Standard deviations of the predicted height by which it has to clear an obstacle that is to be ignored."""

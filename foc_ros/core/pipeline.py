@@ -17,11 +17,13 @@ from .errors import FocError
 from .hand.kalman import FilterState, describe_jump, update
 from .learning.learnt import Knowledge, Learnt
 from .learning.recordings import Library, make_library
+from .obstacle_table import Obstacles
 from .predict import predict
+from .prediction import Prediction
 from .scene import ObstacleSource, Scene
 from .support import Rejections
 from .tracks import NO_TRACKS, Tracks
-from .types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Prediction, SampleStatus
+from .types import NANOSECONDS, Array, HandSample, HandState, SampleStatus
 
 __all__ = ['Pipeline', 'PredictionTask', 'SampleStatus']
 

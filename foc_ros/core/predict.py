@@ -22,29 +22,19 @@ from .height import HeightPredictor
 from .learning.dispersion import scale_covariance
 from .learning.learnt import NOTHING, Knowledge
 from .learning.recordings import Library, pool_recordings
+from .obstacle_table import Obstacles, make_obstacles
 from .obstacles.clearance import cull_obstacles
 from .obstacles.geometry import find_holders
 from .obstacles.risk import RiskBound, count_events
 from .ocp.problem import Problem, rest_to_goal
 from .plant.covariance import SharedCovariances, scale_noise, widen_covariance
 from .plant.models import TripleIntegratorModel, make_plant_model
+from .prediction import PredictedCandidate, Prediction
 from .safety_preference import SafetyPreference
 from .scene import ReachingScene
+from .solution import LEFT, Candidate, Status
 from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_rest
-from .types import (
-    LEFT,
-    NANOSECONDS,
-    Array,
-    Candidate,
-    HandState,
-    Obstacles,
-    PredictedCandidate,
-    Prediction,
-    Record,
-    Rest,
-    Status,
-    make_obstacles,
-)
+from .types import NANOSECONDS, Array, HandState, Record, Rest
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
 """Shares of the time left after which the search and the solver begin no step. The last step may end later."""

@@ -11,8 +11,9 @@ import numpy as np
 
 from .config import Config
 from .errors import SceneError
+from .obstacle_table import Obstacles, make_obstacles
 from .obstacles.geometry import measure_offsets
-from .types import NANOSECONDS, Array, HandState, Obstacles, Record, make_obstacles
+from .types import NANOSECONDS, Array, HandState, Record
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from .config import Config
 from .errors import InputError, SceneError
-from .types import NANOSECONDS, Array, Goal, name_goal
+from .solution import Goal, name_goal
+from .types import NANOSECONDS, Array
 
 FARTHEST = 1e4
 """Bound on every length, velocity and acceleration, in SI units."""

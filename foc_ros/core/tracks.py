@@ -27,7 +27,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .plant.response import fall_as_minimum_jerk
-from .types import NANOSECONDS, Array, Candidate, PredictedCandidate, Record, Rest, Solution, as_readonly
+from .prediction import PredictedCandidate
+from .solution import Candidate, Solution
+from .types import NANOSECONDS, Array, Record, Rest, as_readonly
 
 HOLD_S = 0.2
 """Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten

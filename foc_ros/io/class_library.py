@@ -17,8 +17,8 @@ import numpy as np
 
 from foc_ros.core.classes.library import MOST_STATES, POINTS, Demonstration, is_same_recording
 from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.support import check_array
-from foc_ros.core.types import LEFT, RIGHT
 
 from .documents import MAX_BYTES, read_document
 

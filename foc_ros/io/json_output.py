@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.guidance.guide import GuidanceOutput
-from foc_ros.core.types import LEFT, Array, HeightTrajectory, PredictedCandidate, Prediction, Solution
+from foc_ros.core.prediction import HeightTrajectory, PredictedCandidate, Prediction
+from foc_ros.core.solution import LEFT, Solution
+from foc_ros.core.types import Array
 
 
 def encode_prediction(prediction: Prediction) -> dict[str, Any]:

@@ -19,10 +19,12 @@ from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag, Validat
 from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, join_errors
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.scene import ReachingScene
+from foc_ros.core.solution import Goal
 from foc_ros.core.support import FARTHEST, GoalTable, collect_goals
-from foc_ros.core.types import Goal, HandState, Obstacles
+from foc_ros.core.types import HandState
 
 from .documents import read_document
 from .fields import Fields, describe_errors

@@ -18,7 +18,7 @@ from foc_ros.core.deadline import Deadline
 from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
-from foc_ros.core.types import Prediction
+from foc_ros.core.prediction import Prediction
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND
 from foc_ros.ros.guidance import GuidanceLoop

@@ -22,7 +22,8 @@ import numpy as np
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.core.guidance.guide import GuidanceOutput
-from foc_ros.core.types import NANOSECONDS, HandSample, Prediction, as_readonly
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import NANOSECONDS, HandSample, as_readonly
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.topics import TYPES
 from foc_ros.reporting.report import Table, write_report

@@ -11,9 +11,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
-from foc_ros.core.types import Array, Obstacles
+from foc_ros.core.types import Array
 from foc_ros.io.fields import Fields
 from foc_ros.reporting.encode import encode_candidate, encode_unsolved
 from foc_ros.reporting.tracks import Slots

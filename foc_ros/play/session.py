@@ -14,7 +14,7 @@ import numpy as np
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.core.types import Prediction
+from foc_ros.core.prediction import Prediction
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND
 from foc_ros.reporting.tracks import Slots

@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import FocError, InputError
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obstacle
-from foc_ros.core.types import Array, Obstacles
+from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 
 from .legend import describe_in_legend

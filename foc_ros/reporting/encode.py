@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.geometry import find_limits
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, make_obstacles
+from foc_ros.core.types import NANOSECONDS, Array
 
 from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, Span, compute_bounds, compute_ellipse_axes
 from .tracks import CandidateTracks

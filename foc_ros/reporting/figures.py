@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from foc_ros.core.types import Array, Obstacles, Prediction
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import Array
 
 from .draw import (
     STYLE,

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.types import Array, Obstacles, describe_class
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.solution import describe_class
+from foc_ros.core.types import Array
 from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STAMP, STATUSES, UNKNOWN
 from foc_ros.ros.messages.plane import project

@@ -14,7 +14,8 @@ import numpy as np
 
 from foc_ros.analysis.replay import Step
 from foc_ros.core.errors import InputError
-from foc_ros.core.types import NANOSECONDS, HandSample, Status
+from foc_ros.core.solution import Status
+from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.outputs import MARK, OVERVIEW, REPORT_FILES, check_report
 
 from .draw import Span, save_figure

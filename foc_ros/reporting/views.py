@@ -10,20 +10,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.plant.response import compute_curve
-from foc_ros.core.types import (
-    LEFT,
-    NANOSECONDS,
-    RIGHT,
-    Array,
-    HandSample,
-    Obstacles,
-    PredictedCandidate,
-    Prediction,
-    Record,
-    Status,
-)
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import LEFT, RIGHT, Status
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, order_candidates
 
 COLOURS, SLOTS = 6, 12

@@ -26,7 +26,8 @@ from rclpy.qos import (
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.time import Time
 
-from foc_ros.core.types import Prediction, name_goal
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import name_goal
 from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
 from .health import THROTTLE_S

@@ -21,7 +21,7 @@ import numpy as np
 from foc_ros.core.config import Config
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.hand.kalman import FilterState
-from foc_ros.core.types import Prediction
+from foc_ros.core.prediction import Prediction
 from foc_ros.io.topics import COMMAND
 
 from .health import THROTTLE_S

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import PredictedCandidate, Prediction
+from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.io.topics import HAND
 
 from .freshness import Freshness

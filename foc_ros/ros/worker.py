@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from rclpy.node import Node
 
 from foc_ros.core.pipeline import PredictionTask
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import Tracks
-from foc_ros.core.types import Prediction
 
 
 @dataclass(frozen=True)

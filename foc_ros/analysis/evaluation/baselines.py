@@ -26,7 +26,8 @@ from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig
 from foc_ros.core.hand.straight import compute_straight_effort
 from foc_ros.core.likelihood import OWN_SPREAD, compute_likelihoods
 from foc_ros.core.registry import Registry
-from foc_ros.core.types import LEFT, RIGHT, Array, Record
+from foc_ros.core.solution import LEFT, RIGHT
+from foc_ros.core.types import Array, Record
 
 from .observations import Observation, ObservedRecording
 from .questions import GOAL, Answer, Question

@@ -24,17 +24,11 @@ from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, RecordingError, warn
 from foc_ros.core.hand.duration import is_passing
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.plant.covariance import compute_duration_sensitivity
-from foc_ros.core.types import (
-    NANOSECONDS,
-    Array,
-    HandState,
-    Obstacles,
-    PredictedCandidate,
-    Prediction,
-    Record,
-    Solution,
-)
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import Solution
+from foc_ros.core.types import NANOSECONDS, Array, HandState, Record
 
 from .truth import TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
 

@@ -15,7 +15,8 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.analysis.recordings import LABELS, TRIALS
 from foc_ros.analysis.scenes import read_picked
 from foc_ros.core.config import Config, flatten
-from foc_ros.core.types import LEFT, Array
+from foc_ros.core.solution import LEFT
+from foc_ros.core.types import Array
 from foc_ros.io.csv_tables import read_rows
 
 from .baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines

@@ -13,8 +13,10 @@ from foc_ros.analysis.scenes import NO_GOAL
 from foc_ros.core.classes import compute_swept_angles
 from foc_ros.core.classes.rows import WALL, Rows, locate_rows
 from foc_ros.core.learning.movements import find_reached_goal
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.types import LEFT, NANOSECONDS, RIGHT, Array, Obstacles, Record
+from foc_ros.core.solution import LEFT, RIGHT
+from foc_ros.core.types import NANOSECONDS, Array, Record
 
 TIMES_S = tuple(0.125 * step for step in range(1, 9))
 """Times ahead at which predicted positions are compared with the true ones [s]."""

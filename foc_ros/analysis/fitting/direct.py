@@ -46,7 +46,8 @@ from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.hand.duration import estimate_times_to_go
 from foc_ros.core.hand.kalman import Update, compute_gramian, compute_transition, update
 from foc_ros.core.learning.movements import has_covered_distance
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Obstacles, Record, SampleStatus
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record, SampleStatus
 
 from . import Estimate, Findings, SettingTable, clip_to_bounds, list_settings
 

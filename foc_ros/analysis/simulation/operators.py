@@ -17,9 +17,10 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.simulation import ACCURATE, CHANGES_WAY, HUMAN_PATHS, LAGGY, NOISY, UNANNOUNCED_GOAL
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError, RecordingError
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Array, Obstacles, Record, make_obstacles
+from foc_ros.core.types import NANOSECONDS, Array, Record
 from foc_ros.io.topics import HAND
 from foc_ros.ros.intake import Intake
 

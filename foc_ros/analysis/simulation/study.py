@@ -25,7 +25,8 @@ from foc_ros.core.guidance.guide import GuidanceInput, GuidanceState, guide
 from foc_ros.core.guidance.limits import find_largest_force, shorten
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, Prediction, Record
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
 POSE_STEPS = 2
 """Time steps between two measured poses: 100 Hz."""

@@ -9,8 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from foc_ros.core.errors import SceneError
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.types import Array, Obstacles
+from foc_ros.core.types import Array
 
 from .graph import Rows
 from .names import Names

@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import HomotopyConfig
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, HandState, Obstacles, Record
+from foc_ros.core.solution import LEFT, RIGHT, Candidate
+from foc_ros.core.types import Array, HandState, Record
 
 from .guess import compute_path_lengths, timed
 from .names import name_course, named_obstacles

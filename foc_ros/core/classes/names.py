@@ -12,9 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import cull_obstacles
 from foc_ros.core.obstacles.geometry import find_holders, measure_offsets
-from foc_ros.core.types import LEFT, Array, Candidate, Obstacles
+from foc_ros.core.solution import LEFT, Candidate
+from foc_ros.core.types import Array
 
 from .graph import Rows
 from .outlines import Flags, Outlines, measure_gaps, outline_obstacles

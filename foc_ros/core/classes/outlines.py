@@ -17,8 +17,9 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.types import Array, Obstacles
+from foc_ros.core.types import Array
 
 Flags = NDArray[np.bool_]
 P = ParamSpec('P')

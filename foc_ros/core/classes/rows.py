@@ -20,8 +20,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.risk import centre_trajectories
-from foc_ros.core.types import LEFT, RIGHT, Array, HandState, Obstacles, Solution
+from foc_ros.core.solution import LEFT, RIGHT, Solution
+from foc_ros.core.types import Array, HandState
 
 from .sides import compute_swept_angles
 

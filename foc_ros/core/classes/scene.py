@@ -13,8 +13,10 @@ import numpy as np
 
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.types import LEFT, RIGHT, Array, Candidate, Obstacles, as_readonly
+from foc_ros.core.solution import LEFT, RIGHT, Candidate
+from foc_ros.core.types import Array, as_readonly
 
 from .graph import Graph, Lines, Rows, build_graph
 from .guess import compute_path_lengths, make_guesses, timed

@@ -15,7 +15,9 @@ from typing import NamedTuple
 from foc_ros.core.config import MOST_CANDIDATES, HomotopyConfig
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
-from foc_ros.core.types import Array, Candidate, Obstacles
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.solution import Candidate
+from foc_ros.core.types import Array
 
 from .scene import PathClass, SearchScene
 

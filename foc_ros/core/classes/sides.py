@@ -15,9 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.errors import SceneError
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.risk import centre_trajectories
-from foc_ros.core.types import LEFT, RIGHT, Array, Obstacles, PredictedCandidate, Record
+from foc_ros.core.prediction import PredictedCandidate
+from foc_ros.core.solution import LEFT, RIGHT
+from foc_ros.core.types import Array, Record
 
 TURN = 2.0 * np.pi
 

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import Config, GuidanceConfig
-from foc_ros.core.types import Array, Obstacles, Prediction, Record, make_obstacles
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import Array, Record
 
 from .limits import (
     NEAR_M,

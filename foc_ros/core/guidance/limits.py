@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import GuidanceConfig
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import trace_obstacle
-from foc_ros.core.types import Array, Obstacles, Record
+from foc_ros.core.types import Array, Record
 
 ROUNDING = 1e-9
 """Relative size of differences that are rounding errors."""

@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import GuidanceConfig
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.types import Array, Obstacles, Prediction, Record
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import Array, Record
 
 WINDOW_M = 0.02
 """Length of path [m] on both sides of the progress within which the nearest point is sought."""

@@ -32,7 +32,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from foc_ros.core.config import CovarianceConfig, clip_values
-from foc_ros.core.types import NANOSECONDS, Array, HandState, PredictedCandidate, Record, Solution, as_readonly
+from foc_ros.core.prediction import PredictedCandidate
+from foc_ros.core.solution import Solution
+from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 
 from .posterior import GridPosterior
 

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 from foc_ros.core.config import ONLINE, Config, CovarianceConfig
 from foc_ros.core.likelihood import BETWEEN_OPERATORS, OWN_SPREAD
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import Scene
-from foc_ros.core.types import HandState, Prediction
+from foc_ros.core.types import HandState
 
 from .dispersion import Dispersion
 from .movements import Movements

@@ -25,9 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.classes import find_path_sides
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.obstacles.risk import centre_trajectories
-from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Record, Solution, as_readonly
+from foc_ros.core.prediction import PredictedCandidate
+from foc_ros.core.solution import Solution
+from foc_ros.core.types import Array, Record, as_readonly
 
 FADE_S = 0.25
 """Time over which the weight of a recording falls to zero before its end [s]."""

@@ -34,7 +34,10 @@ from numpy.typing import NDArray
 
 from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_demonstration
 from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
-from foc_ros.core.types import Array, Candidate, HandState, Obstacles, PredictedCandidate, Record, Solution
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.prediction import PredictedCandidate
+from foc_ros.core.solution import Candidate, Solution
+from foc_ros.core.types import Array, HandState, Record
 
 from .pooling import RecordedPaths, fade_weights, pool_path, stays_in_class
 

@@ -14,7 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import Array, Obstacles
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.types import Array
 
 from .geometry import measure_offsets
 from .risk import centre_trajectories

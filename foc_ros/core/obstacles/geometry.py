@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import Array, Obstacles
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.types import Array
 
 SMALLEST_DISTANCE = 1e-13
 """Distance [m] below which a point counts as on the polygon, where its normal is not defined: rounding."""

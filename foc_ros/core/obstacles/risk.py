@@ -18,7 +18,8 @@ from statistics import NormalDist
 
 import numpy as np
 
-from foc_ros.core.types import Array, Obstacles
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.types import Array
 
 CERTAIN_K = 1e6
 """Safety factor reported where the variance is zero: eta then differs from 1 by 1e-12."""

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foc_ros.core.errors import SceneError
+from foc_ros.core.obstacle_table import UNKNOWN_HEIGHTS, Obstacles, make_obstacles
 from foc_ros.core.support import check_array, check_number, check_vector
-from foc_ros.core.types import UNKNOWN_HEIGHTS, Array, Obstacles, make_obstacles
+from foc_ros.core.types import Array
 
 MOST_VERTICES = 16
 """Most vertices of a convex hull that a user gives."""

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.errors import SceneError
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
 from foc_ros.core.obstacles.risk import CANTELLI, RiskBound, centre_trajectories, compute_safety_factor, size_moments
 from foc_ros.core.plant.covariance import stack_noise
 from foc_ros.core.plant.plants import Horizon, find_states_at_goal, variance_weights
 from foc_ros.core.safety_preference import HARD, SafetyPreference
-from foc_ros.core.types import Array, Obstacles, Record, as_readonly
+from foc_ros.core.types import Array, Record, as_readonly
 
 BOTH = np.ones(2)
 SMALLEST_EXTENT = 1e-6

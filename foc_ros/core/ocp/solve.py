@@ -18,7 +18,8 @@ from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.plant.covariance import propagate_covariance
 from foc_ros.core.plant.response import sample_curve
 from foc_ros.core.registry import STRATEGIES
-from foc_ros.core.types import Array, Solution, Status, as_readonly
+from foc_ros.core.solution import Solution, Status
+from foc_ros.core.types import Array, as_readonly
 
 from .margin import Margins
 from .minima import find_least_factors

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.types import Array, Solution
+from foc_ros.core.solution import Solution
+from foc_ros.core.types import Array
 
 from .margin import Indices
 from .problem import Problem

@@ -21,7 +21,8 @@ import numpy as np
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.deadline import NEVER, Deadline
-from foc_ros.core.types import Array, Status
+from foc_ros.core.solution import Status
+from foc_ros.core.types import Array
 
 from .margin import Contacts, Indices, Margins
 from .minima import find_least_factors

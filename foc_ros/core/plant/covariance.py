@@ -38,7 +38,8 @@ import numpy as np
 
 from foc_ros.core.config import Config, DurationConfig
 from foc_ros.core.hand.duration import is_passing
-from foc_ros.core.types import Array, HandState, Solution
+from foc_ros.core.solution import Solution
+from foc_ros.core.types import Array, HandState
 
 from .models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
 from .plants import Horizon, apply_impulse_response

@@ -23,7 +23,8 @@ import numpy as np
 from foc_ros.core.config import REFERENCE_STEP_S, FocConfig
 from foc_ros.core.errors import InputError
 from foc_ros.core.registry import PLANTS
-from foc_ros.core.types import Array, Solution
+from foc_ros.core.solution import Solution
+from foc_ros.core.types import Array
 
 from .plants import (
     CACHED_HORIZONS,

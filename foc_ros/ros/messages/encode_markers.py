@@ -22,8 +22,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
-from foc_ros.core.types import Array, Obstacles, PredictedCandidate, Prediction
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.types import Array
 
 from .plane import lift
 from .ranking import describe_candidate, find_drawn_curve, order_candidates

@@ -15,7 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.types import NANOSECONDS, Obstacles, Prediction, Status
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import Status
+from foc_ros.core.types import NANOSECONDS
 
 from .encode_inputs import encode_array, encode_hand_pose, encode_table
 from .encode_markers import encode_markers

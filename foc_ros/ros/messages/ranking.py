@@ -10,7 +10,9 @@ import numpy as np
 
 from foc_ros.core.errors import FocError
 from foc_ros.core.plant.response import compute_curve
-from foc_ros.core.types import Array, PredictedCandidate, Prediction, describe_class
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import describe_class
+from foc_ros.core.types import Array
 
 MAX_NUMBER = 1e30
 """Largest number that is published; a larger one is an error of the solver, or infinite as a float32."""

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The table of obstacles: polygons with uncertain radii, centres and velocities, as all parts of the package read it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from foc_ros.core.types import Array, Record, as_readonly
+
+SHOWN_NAMES = 5
+"""Number of obstacles that the repr of a table names."""
+UNKNOWN_HEIGHTS = as_readonly(np.array([-np.inf, np.inf]))
+"""Lowest and highest point of an obstacle whose height is not known [m]: it blocks at every height."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Obstacles(Record):
+    """Rounded convex polygons in the task plane, as a table of n rows; a circle is a polygon with one vertex, at its centre.
+
+    ids: name of each, used in labels; centre (n, 2): a point inside [m]; radius (n,): mean distance of the boundary from the
+    polygon [m]; radius_stddev (n,) [m]; velocity (n, 2) [m/s]; centre_covariance (n, 2, 2) [m^2]; vertices (n, V, 2): of the
+    polygons, anticlockwise, relative to the centre [m]; corners (n,): number of vertices of each, rows beyond are not used;
+    heights (n, 2): lowest and highest point of each along the plane's normal [m], UNKNOWN_HEIGHTS where they are not known.
+    """
+
+    ids: tuple[str, ...]
+    centre: Array
+    radius: Array
+    radius_stddev: Array
+    velocity: Array
+    centre_covariance: Array
+    vertices: Array
+    corners: NDArray[np.intp]
+    heights: Array
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def __repr__(self) -> str:
+        """Count the obstacles and name the first few."""
+        names = ', '.join(self.ids[:SHOWN_NAMES]) + (', ...' if len(self) > SHOWN_NAMES else '')
+        return f'<Obstacles: {len(self)}{names and f" ({names})"}>'
+
+    def take(self, rows: NDArray[np.intp] | list[int]) -> Obstacles:
+        """Return the obstacles of the given rows, in that order."""
+        index = np.asarray(rows, dtype=np.intp)
+        return Obstacles(
+            tuple(self.ids[i] for i in index),
+            self.centre[index],
+            self.radius[index],
+            self.radius_stddev[index],
+            self.velocity[index],
+            self.centre_covariance[index],
+            self.vertices[index],
+            self.corners[index],
+            self.heights[index],
+        )
+
+    @property
+    def extent(self) -> Array:
+        """Largest distance of the boundary of each obstacle from its centre, (n,) [m]."""
+        farthest: Array = np.hypot(self.vertices[..., 0], self.vertices[..., 1]).max(axis=1, initial=0.0) + self.radius
+        return farthest
+
+    def grow(self, radius: float) -> Obstacles:
+        """Return the obstacles with a radius [m] added to those of all, such as that of the hand."""
+        return replace(self, radius=self.radius + radius) if radius else self
+
+    def after(self, seconds: float) -> Obstacles:
+        """Return the obstacles at a time `seconds` [s] later, each moved on at its velocity."""
+        if not self.velocity.any():
+            return self
+        return replace(self, centre=self.centre + seconds * self.velocity)
+
+
+def make_obstacles(
+    centre: ArrayLike = (),
+    radius: ArrayLike = (),
+    radius_stddev: ArrayLike = 0.0,
+    ids: tuple[str, ...] | None = None,
+    velocity: ArrayLike = 0.0,
+    centre_covariance: ArrayLike = 0.0,
+    polygons: Sequence[Array] | None = None,
+    heights: ArrayLike = UNKNOWN_HEIGHTS,
+) -> Obstacles:
+    """Build `Obstacles` from array-likes; scalars hold for every row, and ids default to the numbers of the rows.
+
+    polygons: vertices of each (v, 2), anticlockwise, relative to the centre [m]; circles if not given. heights: (n, 2) or (2,).
+    """
+    centres = np.asarray(centre, dtype=float).reshape(-1, 2)
+    n = len(centres)
+    corners = np.ones(n, dtype=np.intp) if polygons is None else np.array([len(each) for each in polygons], dtype=np.intp)
+    vertices = np.zeros((n, corners.max(initial=1), 2))
+    for row, each in enumerate(polygons or ()):
+        vertices[row, : len(each)] = each
+    return Obstacles(
+        tuple(str(i) for i in range(n)) if ids is None else tuple(ids),
+        centres,
+        np.full(n, radius, dtype=float),
+        np.full(n, radius_stddev, dtype=float),
+        np.full((n, 2), velocity, dtype=float),
+        np.full((n, 2, 2), centre_covariance, dtype=float),
+        vertices,
+        corners,
+        np.full((n, 2), heights, dtype=float),
+    )
