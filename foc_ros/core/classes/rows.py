@@ -21,11 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.solution import LEFT, RIGHT, Solution
 from foc_ros.core.types import Array, HandState
 
-from .sides import compute_swept_angles
+from .sides import find_offsets, sweep
 
 Rows = NDArray[np.int64]
 WALL = -1
@@ -94,11 +93,10 @@ class Decisions(NamedTuple):
 
 def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArray[np.int8]:
     """Return LEFT or RIGHT, (k, n): the side on which the mean path of each solution passes each obstacle."""
-    angles = [
-        compute_swept_angles(each.path, centre_trajectories(obstacles.centre, each.dt * obstacles.velocity, len(each.mean) - 1))
-        for each in solutions
-    ]
-    return np.where(np.array(angles).reshape(len(solutions), len(obstacles)) < 0.0, LEFT, RIGHT).astype(np.int8)
+    angles = np.zeros((len(solutions), len(obstacles)))
+    for rows, _, offset in find_offsets(solutions, obstacles):
+        angles[rows] = sweep(offset)
+    return np.where(angles < 0.0, LEFT, RIGHT).astype(np.int8)
 
 
 def find_decisions(

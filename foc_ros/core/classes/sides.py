@@ -8,7 +8,7 @@ and the directions of the two ends, as seen from the centre, give the angle that
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.risk import centre_trajectories
+from foc_ros.core.obstacles.geometry import find_offset, tabulate_edges
 from foc_ros.core.prediction import PredictedCandidate
-from foc_ros.core.solution import LEFT, RIGHT
+from foc_ros.core.solution import LEFT, RIGHT, Solution
 from foc_ros.core.types import Array, Record
 
 TURN = 2.0 * np.pi
@@ -152,24 +151,38 @@ def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obst
     """
     if not outcomes:
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
-    angles, times = [], []
-    for solution in [outcome.solution for outcome in outcomes]:
-        centre = centre_trajectories(obstacles.centre, solution.dt * obstacles.velocity, len(solution.mean) - 1)
-        angles.append(compute_swept_angles(solution.path, centre))
-        _, distance = measure_offsets(solution.path, obstacles, centre)
-        times.append(solution.dt * _find_minima(distance))
-    swept, passing_s = np.array(angles), np.array(times)
+    count = len(outcomes), len(obstacles)
+    swept, passing_s = np.zeros(count), np.zeros(count)
+    for rows, dt, offset in find_offsets([each.solution for each in outcomes], obstacles):
+        swept[rows] = sweep(offset)
+        edges = tabulate_edges(obstacles.vertices, obstacles.corners)
+        distance = find_offset(offset[..., 0], offset[..., 1], edges).distance
+        passing_s[rows] = dt[:, None] * _find_minima(distance)
     is_opposite = np.abs(swept[:, None] - swept) > np.pi
     after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)
     return BranchTimes(after_s, np.isinf(after_s).argmax(axis=1))
 
 
+def find_offsets(solutions: Sequence[Solution], obstacles: Obstacles) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
+    """Yield the solutions with equally many steps together: rows (r,), steps dt (r,) [s], and offsets (r, N + 1, n, 2) [m].
+
+    Offsets are those of the mean path from the centre of each obstacle, which moves from where it is now.
+    """
+    steps = np.array([len(each.mean) - 1 for each in solutions], dtype=np.intp)
+    for count in np.unique(steps).tolist():
+        rows = np.flatnonzero(steps == count)
+        path = np.stack([solutions[row].path for row in rows.tolist()])
+        dt = np.array([solutions[row].dt for row in rows.tolist()])
+        moved = (dt[:, None] * np.arange(count + 1.0))[:, :, None, None] * obstacles.velocity
+        yield rows, dt, path[:, :, None] - obstacles.centre - moved
+
+
 def _find_minima(distance: Array) -> Array:
-    """Return where the distances (N + 1, n) at steps are smallest, in steps (n,)."""
-    row, column = distance.argmin(axis=0), np.arange(distance.shape[1])
-    inner = np.clip(row, 1, len(distance) - 2)
-    before, here, after = (distance[inner + step, column] for step in (-1, 0, 1))
+    """Return where the distances (r, N + 1, n) at steps are smallest, in steps (r, n)."""
+    row, last = distance.argmin(axis=1), distance.shape[1] - 1
+    inner = np.clip(row, 1, last - 1)
+    before, here, after = (np.take_along_axis(distance, (inner + step)[:, None], axis=1)[:, 0] for step in (-1, 0, 1))
     bend = before - 2.0 * here + after
     offset = 0.5 * (before - after) / np.where(bend > 0.0, bend, np.inf)
-    minima: Array = np.where(bend > 0.0, np.clip(inner + np.clip(offset, -1.0, 1.0), 0.0, len(distance) - 1.0), row)
+    minima: Array = np.where(bend > 0.0, np.clip(inner + np.clip(offset, -1.0, 1.0), 0.0, last), row)
     return minima
