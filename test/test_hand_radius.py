@@ -43,6 +43,10 @@ def test_a_solution_keeps_the_hand_away_and_shows_the_given_obstacles() -> None:
     assert {0.02, 0.015} <= {patch.radius for patch in axes.patches if hasattr(patch, 'radius')}
 
 
-def test_the_hand_has_to_fit_at_start_and_goal() -> None:
-    with pytest.raises(foc_ros.SceneError, match=r'^goal: expected a point outside obstacle 0, of radius 0\.03 m'):
-        foc_ros.solve((0, 0), (0.175, 0.01), CUPS, config=WIDE)
+def test_the_hand_has_to_fit_at_the_start_and_a_goal_that_it_cannot_reach_beside_an_obstacle_is_that_obstacle() -> None:
+    beside = (0.175, 0.01)
+    with pytest.raises(foc_ros.SceneError, match=r'^start: expected a point outside obstacle 0, of radius 0\.03 m'):
+        foc_ros.solve(beside, (0.3, 0), CUPS, config=WIDE)
+    solution = foc_ros.solve((0, 0), beside, CUPS, config=WIDE)
+    assert solution.status is foc_ros.Status.SOLVED
+    np.testing.assert_allclose(solution.mean[-1, :2], beside, atol=1e-6)

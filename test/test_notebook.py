@@ -9,6 +9,7 @@ the path that the hand takes rises.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -39,7 +40,9 @@ def list_outputs(notebook: Any) -> list[str]:
     outputs = [output for cell in notebook.cells for output in cell.get('outputs', ())]
     assert not [output for output in outputs if output['output_type'] == 'error' or output.get('name') == 'stderr']
     shown = [{'text/plain': output['text']} if 'text' in output else output['data'] for output in outputs]
-    return [' '.join([*sorted(data), data.get('text/plain', '')]) for data in shown]
+    texts = [' '.join([*sorted(data), data.get('text/plain', '')]) for data in shown]
+    # the size of a picture follows its data to the last digit
+    return [re.sub(r'(<Figure size \d+)x\d+\.\d+', r'\1', text) for text in texts]
 
 
 @pytest.mark.timeout(2 * CELL_S)

@@ -33,6 +33,8 @@ ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
 VIOLATED, VIOLATED_APART = 1e-3, 0.25
 """Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
+CURVED = 1.0
+"""Gain of a step that failed below which margins are corrected to second order: farther away that tells nothing."""
 ACCURACY = 3e-10
 """Margin relative to the scene that counts as none: accuracy of a QP."""
 
@@ -164,7 +166,8 @@ class Planner:
         motion, k = self.margins.move(rows, now.control[rows] + step), failed.k[place]
         there = self.margins.measure(places, at, motion, k[at]).value
         foretold = (gradients.gradient * step[at]).sum(axis=1) - gradients.stddev_rate * change[at]
-        return gradients._replace(value=there - foretold)
+        is_near = (failed.gain[place] < CURVED)[at]
+        return gradients._replace(value=np.where(is_near, there - foretold, gradients.value))
 
     def _choose_places(self, now: Iterates, rows: Indices, further: Contacts) -> tuple[Contacts, Array]:
         """Return the places at which the QPs have rows, and what is known of their multipliers."""

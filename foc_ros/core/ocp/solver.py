@@ -24,7 +24,7 @@ from .iterates import Evaluation, Iterates
 from .margin import Contacts, Indices, Margins
 from .minima import find_minima
 from .objective import Objective
-from .planner import FREE, Plan, Planner
+from .planner import CURVED, FREE, Plan, Planner
 
 MOST_ITERATIONS = 150
 """Iterations after which a problem counts as not settled; ten are usual from a guess, three from an earlier solution."""
@@ -37,8 +37,9 @@ ROUGH_GAIN = 1e-3
 """Gain, as a logarithm of cost, at which the search with the gentle worth ends."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
-LAST_GAIN = 3e-4
-"""Gain of a whole step after which a problem is solved: Newton steps converge quadratically."""
+LAST_GAIN, LAST_EXACT_GAIN = 3e-4, 5e-5
+"""Gain of a whole step after which a problem is solved, because Newton steps converge quadratically: for a class that is followed
+from one prediction to the next, and otherwise."""
 FORETOLD = 0.1
 """Part of the promised gain that may be left, if the step brought what was foretold."""
 CLOSE = 3e-5
@@ -52,8 +53,6 @@ STALLED_GAIN = 2e-5
 """Gain below which a problem is solved that no step improves: rounding hides it."""
 MOST_TRIALS, SHORTER = 5, 0.25
 """Steps that are tried besides corrected ones: the whole one, and a part of the last one each."""
-CURVED = 1.0
-"""Largest gain of a step that is corrected where it fails: farther away it is shortened."""
 SUFFICIENT = 1e-4
 """Share of the promised gain that a step has to bring."""
 GRACE = 0.02
@@ -97,8 +96,8 @@ class Solver:
         k = np.clip(at.factor, 0.0, self.wanted_k)
         gain = np.full(len(rows), np.inf)
         bound, is_exact = at.loss + GRACE, is_cold | (not self._goes_on)
-        count, no = np.zeros_like(rows), [np.zeros(len(rows), dtype=np.bool_) for _ in range(3)]
-        return Iterates(control, k, at, contacts, multipliers, angles, no[0], no[1], gain, count, bound, is_exact, no[2])
+        count, no = np.zeros_like(rows), [np.zeros(len(rows), dtype=np.bool_) for _ in range(4)]
+        return Iterates(control, k, at, contacts, multipliers, angles, no[0], no[1], gain, count, bound, is_exact, no[2], no[3])
 
     def evaluate(self, rows: Indices, control: Array, k: Array) -> Evaluation:
         """Return what the sequence has to know of controls (r, 2N) of some problems, linearised at safety factors (r,)."""
@@ -177,25 +176,30 @@ class Solver:
         now.contacts = now.contacts.take(others).join(plan.contacts)
         now.multipliers = np.concatenate((now.multipliers[others], plan.multipliers))
         now.gain[rows] = plan.gain
-        now.is_done[rows[is_open]] = True
-        now.is_settled[rows[is_open]] = plan.gain[is_open] < STALLED_GAIN
+        # the next QP has rows where the steps failed: if it fails too, there is no better place near
+        stuck = is_open & now.has_failed[rows]
+        now.has_failed[rows] = is_open
+        now.is_done[rows[stuck]] = True
+        now.is_settled[rows[stuck]] = plan.gain[stuck] < STALLED_GAIN
 
     def _correct(self, now: Iterates, plan: Plan, is_open: NDArray[np.bool_]) -> Plan:
-        """Take steps in place of whole ones that failed, with margins as they were found there; return the plan with these.
+        """Take steps in place of whole ones that failed, with rows and margins as they were found there; return the new plan.
 
-        A whole step along a curved obstacle hits it, because the margins that it was planned with hold to first order only. This
-        is the second-order correction of sequential QPs (Nocedal and Wright, Numerical Optimization, section 18.3).
+        A whole step along a curved obstacle hits it, because the margins that it was planned with hold to first order only. Near
+        a solution this is the second-order correction of sequential QPs (Nocedal and Wright, Numerical Optimization, 18.3).
         """
-        place = np.flatnonzero(is_open & (plan.gain < CURVED))
+        is_near = plan.gain < CURVED
+        place = np.flatnonzero(is_open & (is_near | now.is_exact[plan.rows]))
         if not len(place):
             return plan
-        corrected = self._planner.solve(now, plan.rows[place], plan.further.join(now.trial), plan)
-        corrected.gain[:], corrected.fall[:] = plan.gain[place], plan.fall[place]
+        corrected, is_near = self._planner.solve(now, plan.rows[place], plan.further.join(now.trial), plan), is_near[place]
+        corrected.gain[is_near], corrected.fall[is_near] = plan.gain[place[is_near]], plan.fall[place[is_near]]
         failed = self._step(now, corrected, np.arange(len(place)), 1.0, may_end=False)
         is_taken = np.ones(len(place), dtype=np.bool_)
         is_taken[failed] = False
         is_open[place[is_taken]] = False
-        return plan.replace(corrected.take(is_taken))
+        # farther away, where the new rows are all that is new, shorter steps follow them too
+        return plan.replace(corrected.take(is_taken | ~is_near))
 
     def _step(self, now: Iterates, plan: Plan, place: Indices, share: float, *, may_end: bool) -> Indices:
         """Take a share of some steps of a plan where that brings enough in their class; return the places of the others."""
@@ -211,7 +215,8 @@ class Solver:
             is_free = plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
             is_exact = is_free | now.is_exact[rows]
             left = np.where(is_exact, plan.gain[place], np.maximum(plan.gain[place] * FORETOLD, missed))
-            is_small = left < LAST_GAIN * np.where(is_free, 1.0, self._tolerate(now, rows))
+            last = np.where(now.is_exact[rows], LAST_EXACT_GAIN, LAST_GAIN)
+            is_small = left < last * np.where(is_free, 1.0, self._tolerate(now, rows))
             is_met = is_free | (at.factor >= self.objective.wanted_k[rows])
             is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
@@ -219,7 +224,8 @@ class Solver:
         now.control[good] = control[is_good]
         now.k[good] = np.clip(at.factor[is_good], 0.0, self.wanted_k[good])
         now.at.put(good, at, is_good, rows)
-        now.trial = at.contacts.take(np.isin(at.contacts.problem, rows[~is_good]))
+        if may_end:
+            now.trial = at.contacts.take(np.isin(at.contacts.problem, rows[~is_good]))
         return place[~is_good]
 
     def _end(self, now: Iterates, plan: Plan) -> NDArray[np.bool_]:
