@@ -49,8 +49,8 @@ class Iterates:
     controls; contacts and multipliers (q,) of the last QPs; angles (b, m): swept angles of the class [rad]; is_done (b,): whether
     the sequence has ended, is_settled (b,): at a minimum; gain (b,): what the last QP promised; iterations (b,);
     bound (b,): what the loss must not exceed; is_exact (b,): whether to end only where the next step would change nothing;
-    is_waiting (b,): whether it is so unlikely that it goes on in the next prediction; has_failed (b,): whether no step was taken in
-    the last iteration; trial: contacts of the last whole steps that failed.
+    is_waiting (b,): whether it is so unlikely that it goes on in the next prediction; has_failed (b,): whether no step was
+    taken in the last iteration; trial: contacts of the last whole steps that failed.
     """
 
     control: Array
