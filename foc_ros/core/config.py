@@ -191,7 +191,7 @@ class LikelihoodConfig(Group):
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
     )
     other_goal: float = _p(
-        0.05,
+        0.02,
         'probability, before the hand has moved, that it will go to a goal that nobody announced',
         '',
         0.0,
