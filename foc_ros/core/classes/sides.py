@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import find_offset, tabulate_edges
+from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.prediction import PredictedCandidate
 from foc_ros.core.solution import LEFT, RIGHT, Solution
 from foc_ros.core.types import Array, Record
@@ -153,9 +154,9 @@ def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obst
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
     count = len(outcomes), len(obstacles)
     swept, passing_s = np.zeros(count), np.zeros(count)
+    edges = tabulate_edges(obstacles.vertices, obstacles.corners)
     for rows, dt, offset in find_offsets([each.solution for each in outcomes], obstacles):
         swept[rows] = sweep(offset)
-        edges = tabulate_edges(obstacles.vertices, obstacles.corners)
         distance = find_offset(offset[..., 0], offset[..., 1], edges).distance
         passing_s[rows] = dt[:, None] * _find_minima(distance)
     is_opposite = np.abs(swept[:, None] - swept) > np.pi
@@ -173,8 +174,8 @@ def find_offsets(solutions: Sequence[Solution], obstacles: Obstacles) -> Iterato
         rows = np.flatnonzero(steps == count)
         path = np.stack([solutions[row].path for row in rows.tolist()])
         dt = np.array([solutions[row].dt for row in rows.tolist()])
-        moved = (dt[:, None] * np.arange(count + 1.0))[:, :, None, None] * obstacles.velocity
-        yield rows, dt, path[:, :, None] - obstacles.centre - moved
+        drift = dt[:, None, None, None] * obstacles.velocity
+        yield rows, dt, path[:, :, None] - centre_trajectories(obstacles.centre, drift, count)
 
 
 def _find_minima(distance: Array) -> Array:

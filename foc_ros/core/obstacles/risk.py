@@ -75,7 +75,10 @@ def size_moments(obstacles: Obstacles) -> tuple[Array, Array]:
 
 
 def centre_trajectories(centre: Array, drift: Array, steps: int) -> Array:
-    """Return mean centres at steps 0..N, (N + 1, n, 2) [m], from those now (n, 2) [m] and their drift per step (n, 2) [m]."""
+    """Return mean centres at steps 0..N, (N + 1, n, 2) [m], from those now (n, 2) [m] and their drift per step (n, 2) [m].
+
+    For the drifts of r movements with different steps, (r, 1, n, 2), they are (r, N + 1, n, 2).
+    """
     moved: Array = centre + np.arange(steps + 1.0)[:, None, None] * drift
     return moved
 

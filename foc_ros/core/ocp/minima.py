@@ -44,7 +44,7 @@ def find_minima(
         Minima with refined times, and the safety factors there, (q,).
     """
     factor = grid.factor
-    at, obstacle, place = np.nonzero(_is_lowest(factor) & is_wanted)
+    at, obstacle, place = np.nonzero(mark_lowest(factor) & is_wanted)
     places = Contacts(rows[at], obstacle, margins.times[place])
     if not margins.between or not len(at):
         return places, factor[at, obstacle, place]
@@ -101,7 +101,7 @@ def _refine(
     """
     spacing = margins.spacing * (BRACKET[1] - BRACKET[0])
     times, factors, is_on_edge = _sample(margins, motion, k, at, places, margins.spacing)
-    is_lowest = _is_lowest(factors.T)
+    is_lowest = mark_lowest(factors.T)
     if bound is not None:
         bound = bound.copy()
         np.minimum.at(bound, at, factors.min(axis=0))
@@ -149,8 +149,8 @@ def _measure_exactly(margins: Margins, places: Contacts, control: Array) -> Arra
     return compute_safety_factor(margin.distance, along, margins.size_mean[where], margins.size_variance[where])
 
 
-def _is_lowest(values: Array) -> NDArray[np.bool_]:
-    """Return which values (..., T) are not above their neighbours; of equal ones the last."""
+def mark_lowest(values: Array) -> NDArray[np.bool_]:
+    """Mark the values (..., T) that are not above their neighbours; of equal ones the last."""
     before, after = np.full_like(values, np.inf), np.full_like(values, np.inf)
     before[..., 1:], after[..., :-1] = values[..., :-1], values[..., 1:]
     return (values <= before) & (values < after)

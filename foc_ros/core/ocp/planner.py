@@ -15,6 +15,7 @@ from foc_ros.core.types import Array
 from .gradients import Gradients, linearise
 from .iterates import Iterates
 from .margin import NO_CONTACTS, Contacts, Indices, Margins
+from .minima import mark_lowest
 from .objective import Objective
 from .qp import ReducedQP, number_rows, solve_dual
 
@@ -112,10 +113,8 @@ class Planner:
             return NO_CONTACTS
         moved = self.margins.find_step(plan.step[is_wanted])[:, :, None]
         margin = now.at.margin[rows] + (now.at.normal[rows] * moved).sum(axis=1)
-        before, after = np.full_like(margin, np.inf), np.full_like(margin, np.inf)
-        before[..., 1:], after[..., :-1] = margin[..., :-1], margin[..., 1:]
         bound = -VIOLATED * self.margins.extent[rows, None, None]
-        row, obstacle, place = np.nonzero((margin <= before) & (margin < after) & (margin < bound))
+        row, obstacle, place = np.nonzero(mark_lowest(margin) & (margin < bound))
         found = Contacts(rows[row], obstacle, self.margins.times[place])
         return found.take(~_is_known(found, plan.contacts, VIOLATED_APART))
 
