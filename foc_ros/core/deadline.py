@@ -46,7 +46,7 @@ class Deadline:
     whole
         A deadline that holds as well.
     goes_on
-        Whether what hardly matters may wait for the next time.
+        Whether a later prediction continues this one, so that what hardly matters may wait for it.
     """
 
     def __init__(

@@ -48,7 +48,7 @@ UNLIKELY, SMALL_PART = 6.0, 0.05
 """A class can wait for the next prediction if it is less likely than the best by more than the first number, as a logarithm, and
 if its QP promises less than the second one as a part of that."""
 LARGEST_TOLERANCE = 5e-3
-"""Largest gain of such a step for classes that are unlikely."""
+"""Gain of its last whole step up to which an unlikely class counts as solved."""
 STALLED_GAIN = 2e-5
 """Gain below which a problem is solved that no step improves: rounding hides it."""
 MOST_TRIALS, SHORTER = 5, 0.25
@@ -143,7 +143,7 @@ class Solver:
                 self._postpone(now)
 
     def _postpone(self, now: Iterates) -> None:
-        """Leave unlikely classes to the next prediction that stay so even if they gain several times what their QPs promise.
+        """Leave unlikely classes to the next prediction whose QPs promise little of what they lack to the best class.
 
         Where the wanted eta is a condition, every class is solved to its end: whether it meets eta decides, not what it costs.
         """
