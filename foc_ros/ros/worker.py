@@ -61,7 +61,7 @@ class Worker:
         self._is_stopped = True
         if self.present is not None:
             self.present.task.deadline.cancel()
-        self._threads.shutdown(wait=False, cancel_futures=True)
+        self._threads.shutdown(wait=False)  # a cancelled future that no thread has taken would never count as done
 
     def _announce(self, _: object) -> None:
         """Let the executor call `notify`; this happens in the thread of the computation."""
