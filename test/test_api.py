@@ -133,22 +133,6 @@ def test_goals_that_cannot_be_used_are_refused(goals):
         foc_ros.Predictor().set_goals(goals)
 
 
-@pytest.mark.parametrize(
-    ('field', 'values'),
-    [
-        ('centre', {'centre': (0.1, 0.2, 0.3)}),
-        ('radius', {'radius': 0.0}),
-        ('radius', {'radius': '3 cm'}),
-        ('radius_stddev', {'radius_stddev': -0.001}),
-        ('velocity', {'velocity': (float('nan'), 0.0)}),
-        ('name', {'name': 3}),
-    ],
-)
-def test_a_circle_is_checked_field_by_field(field, values):
-    with pytest.raises(foc_ros.SceneError, match=f'obstacle.{field}'):
-        foc_ros.Circle(**({'centre': (0.1, 0.0), 'radius': 0.02} | values))
-
-
 def test_an_outlier_is_refused_and_the_movement_goes_on():
     predictor, plain = foc_ros.Predictor(FAST), foc_ros.Predictor(FAST)
     for each in (predictor, plain):
@@ -251,28 +235,6 @@ def test_a_replay_yields_predictions_that_can_be_drawn():
     assert len(prediction.goals)
 
 
-def test_a_config_file_is_read_and_checked(tmp_path):
-    file = tmp_path / 'foc.yaml'
-    file.write_text('foc:\n  ros__parameters:\n    foc.eta: 0.95\n')
-    assert foc_ros.load_config(file).foc.eta == 0.95
-    file.write_text('foc:\n  ros__parameters:\n    foc.zeta: 0.95\n')
-    with pytest.raises(foc_ros.ParameterError, match=r'foc\.zeta'):
-        foc_ros.load_config(file)
-
-
-@pytest.mark.parametrize(
-    ('part', 'text'),
-    [
-        (lambda: predictor_of_one_cup(), '<Predictor with 1 goals, 1 obstacles>'),
-        (lambda: predictor_of_one_cup().update(1.0, (0, 0)).obstacles, '<Obstacles: 1 (cup)>'),
-        (lambda: FAST, '<Config budget_s=0.0, foc.steps=20>'),
-        (lambda: foc_ros.solve((0, 0), (0.3, 0), config=FAST), '<Solution solved, effort 1312, eta 1>'),
-    ],
-)
-def test_representations_are_short(part, text):
-    assert repr(part()).startswith(text)
-
-
 def test_a_strategy_from_outside_builds_on_another_one():
     def solve_with_less(problems, starts, settings, deadline):
         results = foc_ros.get_strategy('lv')(problems, starts, settings, deadline)
@@ -287,20 +249,6 @@ def test_a_strategy_from_outside_builds_on_another_one():
     assert min(etas) >= 0.9 - 1e-5
     with pytest.raises(foc_ros.InputError, match='strategy: expected one of lv'):
         foc_ros.get_strategy('shortest')
-
-
-def test_a_qp_backend_from_outside_is_used():
-    def solve_and_count(qp):
-        calls.append(qp)
-        return piqp(qp)
-
-    calls, piqp = [], QP_BACKENDS.get('piqp')
-    foc_ros.register_qp_backend('counted', solve_and_count)
-    solutions = [
-        foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST.with_values({'foc.qp_backend': name})) for name in ('piqp', 'counted')
-    ]
-    assert calls
-    np.testing.assert_allclose(solutions[0].mean, solutions[1].mean, atol=1e-9)
 
 
 def test_a_likelihood_rule_from_outside_is_used():

@@ -62,12 +62,6 @@ def test_a_goal_of_which_nothing_is_known_is_not_unlikely() -> None:
     assert repr(made.goals[1]) == '<PredictedGoal goal1 at (0.3, 0.1) m, likelihood unknown>'
 
 
-def test_solved_classes_have_the_names_of_their_goals() -> None:
-    candidates = foc_ros.solve_classes((0, 0), TWO, config=FAST)
-    assert {each.description for each in candidates} == {'bowl: direct', 'goal1: direct'}
-    assert foc_ros.solve((0, 0), Goal((0.3, 0.0), 'bowl'), config=FAST).status is Status.SOLVED
-
-
 def test_a_prediction_is_the_sequence_of_its_candidates(predicted: foc_ros.Prediction) -> None:
     assert list(predicted) == list(predicted.candidates)
     assert len(predicted) == len(predicted.candidates) == 4

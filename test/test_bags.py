@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bag_helpers import START_NS, TYPES, messages, write_bag, write_by_rosbags, write_mcap
+from bag_helpers import messages, write_bag, write_by_rosbags, write_mcap
 from rosbags.rosbag2 import StoragePlugin
 
 from foc_ros.analysis.recordings import BagRecording
 from foc_ros.core.errors import FocWarning, RecordingError
-from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
-from foc_ros.ros.messages.encode_inputs import encode_hand_pose
+from foc_ros.io.bags import TYPESTORE, BagReader
 
 
 def read(path: Path, chosen: dict[str, str] | None = None) -> list[Any]:
@@ -66,14 +65,6 @@ def test_channels_that_are_not_needed_may_be_anything(tmp_path: Path) -> None:
     assert_same(read(tmp_path / 'mixed.mcap'), messages())
 
 
-def test_the_hand_can_be_chosen(tmp_path: Path) -> None:
-    bag = write_bag(
-        tmp_path / 'arms', [*messages(), ('/left/measured_cp', START_NS, encode_hand_pose(TYPES, 1, 'world', (9, 9, 9)))]
-    )
-    chosen = [item for item in read(bag, {'hand_pose': '/left/measured_cp'}) if item.role == 'hand_pose']
-    assert [item.message.pose.position.x for item in chosen] == [9.0]
-
-
 def test_an_existing_path_is_not_overwritten(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / 'one')
     before = mcap(bag).read_bytes()
@@ -96,23 +87,6 @@ def test_a_path_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('not a directory')
     with pytest.raises(RecordingError, match=re.escape(str(tmp_path / 'file' / 'bag'))):
         write_bag(tmp_path / 'file' / 'bag')
-
-
-@pytest.mark.parametrize('topic', ['/hand_pose', '/obstacles', '/goals'])
-def test_a_missing_topic_is_named(tmp_path: Path, topic: str) -> None:
-    bag = write_bag(tmp_path / 'poor', rename={topic: ''})
-    with pytest.raises(RecordingError, match=f'^{re.escape(str(bag))}: no topic for {topic[1:]}'):
-        read(bag)
-
-
-def test_an_empty_hand_topic_is_refused(tmp_path: Path) -> None:
-    with BagWriter(tmp_path / 'none') as writer:
-        writer._writer.add_connection('/hand_pose', 'geometry_msgs/msg/PoseStamped', typestore=TYPESTORE)
-        for topic, stamp_ns, message in messages():
-            if topic != '/hand_pose':
-                writer.write(topic, message, stamp_ns)
-    with pytest.raises(RecordingError, match='topic /hand_pose holds no message'):
-        read(tmp_path / 'none')
 
 
 @pytest.mark.parametrize(

@@ -13,17 +13,14 @@ from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.other_goal import leave_goals_out
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask_all
+from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask_all
 from foc_ros.analysis.evaluation.report import find_label_mismatches
-from foc_ros.analysis.recordings import TableRecording, find_recordings
+from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
-from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError
 from foc_ros.io.bags import BagReader
 from foc_ros.ros.parameters import load_parameter_file
 
-SHARED = Path(__file__).parents[2] / 'shared' / 'data' / 'hlp_reaching'
-PICKS = SHARED.with_name('hlp_picks')
 HEADER = 'recording,object,x_m,y_m,z_m,width_m,depth_m,height_m\n'
 BOXES = (
     'a,Target,0.3,0,0,0.05,0.05,0.08\n'
@@ -149,29 +146,3 @@ def test_a_wrong_table_of_objects_is_named(picks: Path, text: str, words: str) -
     with pytest.raises(RecordingError) as caught:
         find_recordings(picks)
     assert words in str(caught.value)
-
-
-@pytest.mark.skipif(not PICKS.is_dir(), reason='optional data ../shared/data/hlp_picks is not there')
-def test_the_data_set_of_picks_is_read_as_it_is() -> None:
-    found = find_recordings(PICKS)
-    assert len(found) == 952
-    assert {len(each.scene.goals) for each in found.values()} == {5, 7}
-    assert all(0 <= each.goal < len(each.scene.goals) for each in found.values())
-
-
-@pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/hlp_reaching is not there')
-def test_every_recording_of_the_data_set_is_read() -> None:
-    found = find_recordings(SHARED)
-    assert len(found) == 209
-    for each in found.values():
-        assert isinstance(each, TableRecording)
-        assert len(each.scene.boxes) >= 6 and len(each.scene.goals) == 1
-
-
-@pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/hlp_reaching is not there')
-def test_the_sides_told_of_reaches_are_those_of_their_paths() -> None:
-    quick = {'rate_hz': 1.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0}
-    config = Config().with_values({'scene.hand_radius': 0.0125, **quick})
-    observed = [observe(each, config) for each in [*find_recordings(SHARED).values()][::20]]
-    assert find_label_mismatches(SHARED, observed) == {}
-    assert all(question.is_possible[question.truth] for each in observed for _, question in ask_all(each, GAP))

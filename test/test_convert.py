@@ -20,7 +20,6 @@ from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 RECORDINGS = 'recording,t_s,x_m,y_m\na,0.0,0.1,0.2\na,0.5,0.3,0.4\na,1.2,0.5,0.6\nb,3.25,-1,2e-3\n'
 OBSTACLES = 'name,x_m,y_m,radius_m\nleft,0.5,-0.1,0.03\nright,0.425,0.08,0.025\n'
 GOALS = 'goal,x_m,y_m\n0,0.28,0.35\n1,0.42,0.35\n'
-SHARED = Path(__file__).parents[2] / 'shared' / 'data' / 'd3il_avoiding'
 
 
 def convert(folder: Path, recordings: str = RECORDINGS, obstacles: str = OBSTACLES, goals: str | None = GOALS) -> int:
@@ -160,20 +159,6 @@ def test_what_is_wrong_is_said_in_one_line(
     assert not (tmp_path / 'bags').exists()
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
-def test_human_recordings(tmp_path: Path) -> None:
-    tables = {name: str(SHARED / f'{name}.csv') for name in ('recordings', 'obstacles', 'goals')}
-    options = ['--obstacles', tables['obstacles'], '--goals', tables['goals'], '--output', str(tmp_path / 'bags')]
-    assert main(['convert', tables['recordings'], *options]) == 0
-    bags = sorted((tmp_path / 'bags').iterdir())
-    assert len(bags) == 48
-    hands = 0
-    for bag in bags:
-        with BagReader(bag) as reader:
-            hands += sum(item.role == 'hand_pose' for item in reader)
-    assert hands == len(Path(tables['recordings']).read_text('utf-8').splitlines()) - 1
-
-
 def test_all_errors_of_a_table_are_found_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = 'recording,t_s,x_m,y_m\na,0,x,y\na,1,0\na,2,0,0\na,1,0,0\n'
     assert convert(tmp_path, rows) == 2
@@ -186,13 +171,6 @@ def test_all_errors_of_a_table_are_found_at_once(tmp_path: Path, capsys: pytest.
     assert [line.partition('o.csv: ')[2].partition(':')[0] for line in lines] == [
         'row 2, column radius_m', 'row 3, column y_m', 'row 5, column id',
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize('name', ['radius_stdev_m', 'radius_std_m'])
-def test_a_misspelt_column_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
-    assert convert(tmp_path, obstacles=f'x_m,y_m,radius_m,{name},yaw_deg\n0,0,1,0,0\n') == 2
-    error = capsys.readouterr().err
-    assert error.endswith(f'o.csv: row 1: unknown column {name} (did you mean radius_stddev_m?)\n')
 
 
 def write_folder(folder: Path, separator: str = ',', comma: bool = False, seconds: float = 1.0, metres: float = 1.0) -> Path:

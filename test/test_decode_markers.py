@@ -10,8 +10,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, marker, marker_array, message_types
 from scipy.spatial.transform import Rotation
 
@@ -149,11 +147,6 @@ def test_a_message_with_a_wrong_marker_is_refused(types: MessageTypes, changes: 
     assert ids(scene) == ('a/7',)
 
 
-def test_an_empty_table_accepts_another_frame() -> None:
-    scene = after(marker_array(BAGS, marker(BAGS)), marker_array(BAGS, marker(BAGS, action=3), marker(BAGS, frame_id='base')))
-    assert scene.frame_id == 'base'
-
-
 def test_the_number_of_markers_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decode_objects, 'MAX_ROWS', 3)
     scene = after(marker_array(BAGS, *[marker(BAGS, id=i) for i in range(3)]))
@@ -166,23 +159,3 @@ def test_ids_contain_no_separator_and_remain_distinct() -> None:
     found = ids(after(marker_array(BAGS, *[marker(BAGS, ns=ns) for ns in names])))
     assert len(set(found)) == 3
     assert not any(';' in name for name in found)
-
-
-numbers = st.floats(width=64) | st.floats(0, 1)
-
-
-@given(
-    st.lists(st.tuples(numbers, numbers, st.integers(-1, 4), st.integers(0, 4), st.integers(0, 3), st.floats(-1, 9)), max_size=6)
-)
-def test_any_markers_are_decoded_or_refused(rows: list[tuple[float, float, int, int, int, float]]) -> None:
-    made = [
-        marker(BAGS, (x, 0, 0), (scale,) * 3, action=action, type=kind, id=identity, lifetime=lifetime)
-        for x, scale, action, kind, identity, lifetime in rows
-    ]
-    try:
-        obstacles = after(marker_array(BAGS, *made)).obstacles(2 * SECOND)
-    except MessageError:
-        return
-    assert np.isfinite(obstacles.centre).all()
-    assert (obstacles.radius >= 0).all()
-    assert len(set(obstacles.ids)) == len(obstacles)

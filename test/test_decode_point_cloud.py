@@ -108,14 +108,6 @@ def test_rows_that_are_not_finite_are_dropped_and_counted(types: MessageTypes, c
     assert (scene.obstacles.ids, scene.dropped) == (('0', '2'), {'not_finite': 1})
 
 
-@pytest.mark.parametrize('order', ['<', '>'])
-def test_a_signalling_nan_is_dropped_without_a_warning(order: str) -> None:
-    table = np.zeros(2, dtype=[(name, f'{order}f4') for name in ('x', 'y', 'z', 'radius')])
-    table['x'].view(f'{order}u4')[1] = 0x7FA00000
-    scene = decode(table)
-    assert (scene.obstacles.ids, scene.dropped) == (('0',), {'not_finite': 1})
-
-
 def test_the_last_finite_row_of_an_id_is_used() -> None:
     table = np.zeros(5, dtype=FULL)
     table['id'] = [3, 1, 3, 2, 1]
@@ -139,15 +131,6 @@ def test_a_scene_with_a_number_out_of_bounds_is_refused(column: str, value: floa
     table = np.zeros(3, dtype=FULL)
     table[column][1] = value
     check_refusal(words, table)
-
-
-@both_kinds
-def test_rows_with_a_size_are_boxes_capsules_and_circles(types: MessageTypes) -> None:
-    rows = [(1, 2, 0, 0, 0.5, 0.25, 0), (3, 4, 0, 0.125, 0.5, 0, 0), (5, 6, 0, 0.125, 0, 0.5, 0), (7, 8, 0, 0.125, 0, 0, 1)]
-    obstacles = decode(obstacle_table(rows, BOX), types).obstacles
-    assert obstacles.corners.tolist() == [4, 2, 2, 1]
-    np.testing.assert_array_equal(obstacles.centre, [[1, 2], [3, 4], [5, 6], [7, 8]])
-    np.testing.assert_array_equal(obstacles.radius, [0, 0.125, 0.125, 0.125])
 
 
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10), st.floats(-7, 7)), min_size=1, max_size=6))
@@ -235,22 +218,6 @@ def test_a_field_of_the_wrong_kind_is_refused(field: str, attribute: str, value:
 def test_the_largest_scene_is_accepted() -> None:
     scene = decode(np.zeros(MAX_ROWS, dtype=FULL[:4]), stamp_ns=0)
     assert (len(scene.obstacles), scene.stamp_ns) == (MAX_ROWS, 0)
-
-
-finite = st.floats(-1e4, 1e4, width=32)
-size = st.floats(0, 1e4, width=32)
-rows = st.lists(st.tuples(finite, finite, finite, size, size, finite, finite, finite, st.integers(0, 2**32 - 1)), max_size=8)
-
-
-@given(rows)
-def test_every_table_in_bounds_is_decoded_as_it_was_encoded(table: list[tuple[float, ...]]) -> None:
-    obstacles = decode(obstacle_table(table, FULL)).obstacles
-    expected = {str(row[-1]): row for row in table}
-    assert set(obstacles.ids) == set(expected)
-    for i, name in enumerate(obstacles.ids):
-        row = expected[name]
-        assert (*obstacles.centre[i], obstacles.radius[i], obstacles.radius_stddev[i]) == (row[0], row[1], row[3], row[4])
-        assert tuple(obstacles.velocity[i]) == (row[5], row[6])
 
 
 NAMES = ['x', 'y', 'z', 'radius', 'radius_stddev', 'id', 'vx', 'size_x', 'yaw', 'rgb']

@@ -219,16 +219,6 @@ def test_a_domain_in_use_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
                 pass
 
 
-def test_environment_is_private(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv('ROS_DISCOVERY_SERVER', 'somewhere:11811')
-    monkeypatch.setenv('ROS_DOMAIN_ID', '0')
-    made = isolated_node.private_environment(42, tmp_path)
-    assert made['ROS_DOMAIN_ID'] == '42'
-    assert made['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
-    assert made['ROS_LOG_DIR'] == str(tmp_path)
-    assert 'ROS_DISCOVERY_SERVER' not in made
-
-
 def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> isolated_node.NodeProcess:
     """Return a process that runs another program in place of the node."""
     package = tmp_path / 'foc_ros'

@@ -136,22 +136,3 @@ def test_errors_in_a_library_file_name_the_field(tmp_path, break_it, words):
     file.write_text(json.dumps(document))
     with pytest.raises(FocError, match=words):
         load_library(str(file))
-
-
-@pytest.mark.parametrize(
-    ('text', 'words'),
-    [
-        (None, 'cannot be read'),
-        ('', 'not a JSON file'),
-        ('{"ways": 3}', 'a list of at most 500 ways, got int'),
-        ('[]', 'a list of at most 500 ways'),
-        (f'{{"ways": [{", ".join(["0"] * 501)}]}}', 'got 501 of them'),
-        ('{"ways": []}' + ' ' * 5_000_000, 'expected at most 5,000,000 bytes'),
-    ],
-)
-def test_files_that_are_no_library_are_refused(tmp_path, text, words):
-    file = tmp_path / 'ways.json'
-    if text is not None:
-        file.write_text(text)
-    with pytest.raises(FocError, match=words):
-        load_library(str(file))

@@ -91,17 +91,6 @@ def test_factors_scale_the_covariance_and_nothing_else() -> None:
     assert at_rest[0] and at_rest[-1] and not all(at_rest), 'the hand rests before and after the reach'
 
 
-def test_equal_messages_give_equal_factors_and_later_ones_change_no_earlier_prediction() -> None:
-    one, other = Pipeline(CONFIG), Pipeline(CONFIG)
-    whole, part = reach(one, 1.0) + reach(one, 11.0), reach(other, 1.0) + reach(other, 11.0, until_s=0.9)
-    assert one.learnt.dispersion.errors > other.learnt.dispersion.errors > 0
-    for before, after in zip(part, whole, strict=False):
-        np.testing.assert_array_equal(before.candidates[0].covariance, after.candidates[0].covariance)
-    again = Pipeline(CONFIG)
-    reach(again, 1.0), reach(again, 11.0)
-    np.testing.assert_array_equal(one.learnt.dispersion.posterior.logs, again.learnt.dispersion.posterior.logs)
-
-
 def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off() -> None:
     pipeline = Pipeline(CONFIG)
     reach(pipeline, 1.0)

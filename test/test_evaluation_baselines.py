@@ -22,7 +22,7 @@ from foc_ros.analysis.evaluation.baselines import (
     make_baselines,
     power_rule_shares,
 )
-from foc_ros.analysis.evaluation.positions import SINGER_SETTINGS, _discretise, forecast_singer
+from foc_ros.analysis.evaluation.positions import SINGER_SETTINGS, forecast_singer
 from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask, ask_main
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS_S
@@ -94,12 +94,6 @@ def test_straight_minimum_jerk_from_any_state_has_the_effort_of_its_own_jerk() -
         np.testing.assert_allclose((path[1] - path[0]) / t[1], [0.5, 0.3], atol=1e-2)
 
 
-def test_the_speed_of_a_hand_at_rest_is_noise_to_minimum_jerk_too() -> None:
-    np.testing.assert_allclose(
-        compute_straight_costs(reaching((0.0, 0.0, 1.0, 1.0, 9.0, 9.0), movement_age_s=0.0)), compute_straight_costs(reaching())
-    )
-
-
 def test_straight_minimum_jerk_weighs_goals_by_the_ratio_of_efforts() -> None:
     forecast = forecast_straight_minimum_jerk(reaching(), ask_of(reaching(), GOAL), (1.0, 0.99))
     np.testing.assert_allclose(forecast.probability, 0.99 * np.array([0.8, 0.2]) + 0.005)
@@ -118,17 +112,6 @@ def test_every_baseline_forecasts_every_setting() -> None:
 
 
 AHEAD = np.array(HORIZONS_S)
-
-
-@pytest.mark.parametrize('dt', [1e-3, 0.07, 1.0])
-def test_transition_and_added_covariance_are_the_closed_forms(dt: float) -> None:
-    transition, added = _discretise(dt)
-    for row, (stddev, _, tau) in enumerate(SINGER_SETTINGS):
-        decay = np.exp(-dt / tau)
-        expected = [[1.0, dt, tau**2 * (dt / tau - 1.0 + decay)], [0.0, 1.0, tau * (1.0 - decay)], [0.0, 0.0, decay]]
-        np.testing.assert_allclose(transition[row], expected, rtol=1e-6, atol=1e-12)
-        assert added[row, 2, 2] == pytest.approx(stddev**2 * (1.0 - decay**2))
-        np.testing.assert_allclose(added[row], added[row].T, rtol=1e-9, atol=1e-15)
 
 
 def test_a_steady_motion_is_continued_and_an_uncertain_one_has_its_error() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from evaluation_samples import TWO_CLASSES, H, make_candidates, observation, recorded
 
-from foc_ros.analysis.evaluation.baselines import UNCERTAINTY, Forecast, power_rule_shares, published_shares
+from foc_ros.analysis.evaluation.baselines import UNCERTAINTY, Forecast, published_shares
 from foc_ros.analysis.evaluation.positions import compute_position_scores, find_denser_share
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.evaluation.report import make_verdict
@@ -25,7 +25,6 @@ from foc_ros.analysis.evaluation.scores import (
     summarise,
 )
 from foc_ros.analysis.evaluation.truth import TIMES_S
-from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.solution import LEFT, RIGHT
 
 L, R = LEFT, RIGHT
@@ -85,14 +84,6 @@ def test_every_possible_answer_keeps_some_probability_and_all_sum_to_one() -> No
     assert by_shares.true_probability(question) == pytest.approx(UNCERTAINTY / 6.0)
     for forecast in (by_shares, Forecast.uniform(question), Forecast.from_answer((R, L, L), 0.4, question)):
         assert forecast.probability.sum() + question.unlisted * forecast.each_other == pytest.approx(1.0)
-
-
-def test_an_unsolved_candidate_counts_as_published() -> None:
-    observed = observation(
-        make_candidates([[L, L, L], [R, L, R], [R, L, L]], solved=[True, True, False], likelihood=[0.9, 0.1, 0.0]), **TWO_ROWS
-    )
-    np.testing.assert_allclose(published_shares(observed), [0.9, 0.1, 0.0])
-    assert power_rule_shares(observed, LikelihoodConfig())[2] == 0.0
 
 
 def make_scores(confidence, right, recording=None, progress=None, left_s=None) -> Scores:
@@ -209,16 +200,6 @@ def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is
     assert str(both['displacement_m']) == str(scores['displacement_m']), 'a movement that has ended does not count'
 
 
-def test_the_region_of_one_gaussian_is_its_ellipse() -> None:
-    covariance = np.array([[4.0, 1.0], [1.0, 2.0]])
-    root = np.linalg.cholesky(covariance)
-    for level in (0.5, 0.9):
-        border = root @ np.array([0.6, 0.8]) * np.sqrt(-2.0 * np.log(1.0 - level))
-        positions = np.array([3.0, -1.0]) + np.array([0.99, 1.01])[:, None] * border
-        found = find_denser_share(np.ones(1), np.full((1, 2, 2), [3.0, -1.0]), np.tile(covariance, (1, 2, 1, 1)), positions)
-        assert found[0] < level < found[1]
-
-
 @pytest.mark.parametrize('apart', [0.0, 1.5, 10.0])
 def test_the_region_holds_its_share_of_samples(apart: float) -> None:
     draws, count = np.random.default_rng(5), 4000
@@ -247,14 +228,3 @@ def test_a_position_in_a_less_likely_class_is_in_the_region_and_not_in_the_ellip
     assert scores['inside_taken']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
     assert scores['inside_all']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
     assert scores['inside_all']['0.5'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
-
-
-def test_positions_are_scored_given_what_is_known() -> None:
-    """The unknown share has no path, and so no part in the density of positions."""
-    scores = []
-    for known in (1.0, 0.5):
-        two = make_candidates([[LEFT], [RIGHT]], likelihood=[0.6 * known, 0.4 * known])
-        two = replace(two, mean=np.stack([np.zeros((H, 2)), np.full((H, 2), [1.0, 0.0])]))
-        scores.append(compute_position_scores([recorded(observation(two, positions=np.full((H, 2), [0.5, 0.2])))]))
-    for name in ('nlpd', 'inside_all', 'displacement_m'):
-        assert str(scores[0][name]) == str(scores[1][name])

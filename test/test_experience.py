@@ -14,7 +14,6 @@ from foc_ros.cli.main import main
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.classes.library import STEP_S, record_demonstration
 from foc_ros.core.config import Config
-from foc_ros.core.errors import InputError
 from foc_ros.core.learning.learnt import Knowledge
 from foc_ros.core.learning.recordings import (
     NO_LIBRARY,
@@ -25,7 +24,7 @@ from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
-from foc_ros.io.class_library import load_library, save_library
+from foc_ros.io.class_library import load_library
 
 CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_candidates': 24, 'likelihood.other_goal': 0.0})
 
@@ -92,18 +91,6 @@ def test_a_path_approaches_the_recordings_with_their_number():
     assert (np.diff(stddevs) < 0.0).all()
 
 
-def test_other_classes_effort_and_eta_stay_those_of_the_plan():
-    known, model = by_label(ask(make_library([ABOVE] * 20), MOVING)), by_label(ask(NO_LIBRARY, MOVING))
-    others = [label for label, each in model.items() if not dict(each.candidate.sides).items() <= sides_of(ABOVE).items()]
-    assert others
-    for label in others:
-        np.testing.assert_array_equal(known[label].mean, model[label].mean)
-        np.testing.assert_array_equal(known[label].covariance, model[label].covariance)
-    for label, each in model.items():
-        assert known[label].eta == each.eta and known[label].effort == each.effort
-        np.testing.assert_array_equal(known[label].motor_covariance, each.motor_covariance)
-
-
 @given(st.floats(0.012, 0.05), st.floats(-0.01, 0.01), st.floats(0.0, 0.9))
 @settings(max_examples=10, deadline=None)
 def test_a_pooled_path_stays_in_its_class_and_out_of_obstacles(height, beside, share):
@@ -136,16 +123,6 @@ def test_without_a_recording_that_agrees_it_is_the_model(library):
         assert one.label == other.label and one.likelihood == other.likelihood
         np.testing.assert_array_equal(one.mean, other.mean)
         np.testing.assert_array_equal(one.covariance, other.covariance)
-
-
-@pytest.mark.parametrize('states', ['[[0, 0, 0, 0]]', '1', '[[0, 0], [0, 0]]', '[[0, 0, 0, 0], [0, 0, 0, "x"]]'])
-def test_wrong_states_name_the_field(tmp_path, states):
-    file = tmp_path / 'ways.json'
-    save_library(file, [ABOVE])
-    text = file.read_text()
-    file.write_text(text[: text.index('"states": ') + 10] + states + '}]}')
-    with pytest.raises(InputError, match=r'ways\[0\]\.states'):
-        load_library(str(file))
 
 
 HEADS = {'goals.csv': 'goal,x_m,y_m\n0,0.3,0.0\n', 'obstacles.csv': 'obstacle,x_m,y_m,radius_m\na,0.15,0.0,0.015\n'}

@@ -23,12 +23,11 @@ from foc_ros.analysis.fitting.direct import (
     fit_fading,
     fit_max_candidates,
     fit_wait,
-    tabulate_innovations,
 )
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.hand.kalman import compute_gramian, compute_transition, update
+from foc_ros.core.hand.kalman import compute_gramian, compute_transition
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.types import Array, HandSample, SampleStatus
+from foc_ros.core.types import Array
 
 CONFIG = replace_values(Config(), {'estimator.acceleration_time_s': 0.0})
 GOAL = np.array([[0.3, 0.0]])
@@ -101,29 +100,6 @@ def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
             path.append(state[0] + rng.normal(0.0, stddev, 2))
         found.append(recorded_hand(f'{number}', times, np.array(path), make_obstacles(), GOALS))
     return found
-
-
-def test_innovations_are_those_of_the_estimator() -> None:
-    each = _drifting(1, 1e-3, 3.0, 1)[0]
-    gap = each.stamps_ns.copy()
-    gap[100:] += 1_000_000_000
-    jumped = each.positions + 0.5 * (np.arange(len(gap)) >= 50)[:, None]
-    each = recorded_hand('gap', gap * 1e-9, jumped, each.obstacles, each.goals)
-    config, total, state = Config().estimator, 0.0, None
-    for stamp_ns, position in zip(each.stamps_ns.tolist(), each.positions, strict=True):
-        updated = update(state, HandSample(stamp_ns, position), config)
-        following = updated.state
-        if state is not None and updated.status is SampleStatus.ACCEPTED:
-            dt = (stamp_ns - state.stamp_ns) * 1e-9
-            prior = compute_transition(dt) @ state.covariance[::2, ::2] @ compute_transition(
-                dt
-            ).T + config.jerk_density**2 * compute_gramian(dt)
-            S = prior[0, 0] + config.position_stddev**2
-            v = position - (compute_transition(dt) @ state.mean.reshape(3, 2))[0]
-            total -= np.log(2 * np.pi * S) + v @ v / (2 * S)
-        state = following
-    found = tabulate_innovations([each], config, [config.position_stddev], [config.jerk_density])
-    assert found.values[0] == pytest.approx([total], rel=1e-9)
 
 
 @pytest.mark.parametrize(('stddev', 'density'), [(1e-3, 3.0), (3e-4, 20.0)])
@@ -208,12 +184,6 @@ def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
     assert found.value == pytest.approx(fading_s, rel=0.25)
 
 
-def test_a_lasting_acceleration_is_recognised() -> None:
-    t = np.arange(0.0, 3.0, 0.02)
-    hands = [recorded_hand(str(a), t, np.outer(0.5 * a * t**2, [1.0, 0.0]), make_obstacles(), GOAL) for a in (0.3, 0.5)]
-    assert fit_fading(hands, replace_values(CONFIG, {'estimator.position_stddev': 1e-6})).values == {FADING: 0.0}
-
-
 def _make_resting(rest: float):
     return recorded_hand('one', *resting_reach(0.0, (0.3, 0.0), rest=rest), make_obstacles([], []), GOAL)
 
@@ -223,17 +193,6 @@ def test_half_of_the_wait_is_left_on_average_and_the_stay_at_the_goal_does_not_c
     # the wait includes the first 0.15 s of a movement, until its onset is detected
     assert found['duration.wait_s'].value == pytest.approx(0.4, abs=0.1)
     assert found['duration.wait_s'].low < found['duration.wait_s'].value < found['duration.wait_s'].high
-
-
-def test_hands_that_never_rest_give_no_wait_and_those_at_rest_no_fading_time() -> None:
-    times = np.arange(0.0, 1.0, 0.02)
-    moving, still = (
-        recorded_hand('one', times, np.outer(times, [speed, 0.0]), make_obstacles([], []), GOAL) for speed in (0.3, 0.0)
-    )
-    found = fit_wait([moving], Config()).estimates
-    assert not found or found['duration.wait_s'].value < 0.1
-    found = fit_fading([still], CONFIG)
-    assert found.estimates == {} and set(found.undetermined) == {FADING}
 
 
 def make_hand(centres, goals=((1.0, 0.0),)) -> RecordedHand:

@@ -18,7 +18,7 @@ from foc_ros.analysis.evaluation.truth import TIMES_S
 from foc_ros.analysis.fitting import Findings, race
 from foc_ros.analysis.fitting.direct import fit_duration, fit_other_models
 from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage, find_worse_positions, make_verdict
-from foc_ros.analysis.fitting.one_replay import compute_mean_densities, fit_widening, widen_covariances
+from foc_ros.analysis.fitting.one_replay import fit_widening
 from foc_ros.analysis.fitting.race import DURATIONS, Replays, make_eta_settings, make_movement_settings
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
@@ -80,14 +80,6 @@ def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_record
     many = KnownReplays(np.zeros((2, 500)))
     many.search(ARRIVALS)
     assert many.rounds[-1] == (2, race.MAX_RECORDINGS)
-
-
-def test_plainly_worse_settings_leave_at_once() -> None:
-    spread = 0.2 * np.random.default_rng(4).standard_normal((6, 24))
-    replays = KnownReplays(np.array([-1.0, 0.0, 0.05, -1.1, -1.2, 0.1])[:, None] + spread)
-    config, _ = replays.search([replace_values(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(6)])
-    assert replays.rounds == [(6, 6), (3, 12), (3, 24)]
-    assert config.foc.eta in (0.52, 0.54, 0.6)
 
 
 def test_classes_decide_and_positions_where_classes_are_alike() -> None:
@@ -219,7 +211,7 @@ def test_a_lower_coverage_is_told_in_one_sentence(
     assert len(found) == (words is not None) and all(each.endswith(words) for each in found)
 
 
-S, NONE = np.array(TIMES_S), (0.0, 0.0, 0.0)
+S = np.array(TIMES_S)
 TO_GOAL = 10 * S**3 - 15 * S**4 + 6 * S**5
 LATE = 9.0 * (S**3 * (1 - S) ** 2)[:, None] * [1.0, 0.0]
 CANDIDATES = replace(TWO_CLASSES, covariance=np.tile(1e-8 * np.eye(2), (2, H, 1, 1)), duration_sensitivity=np.stack([LATE, LATE]))
@@ -250,22 +242,6 @@ def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoin
     for kind in ('inside_90', 'inside_all_90'):
         assert scores[kind]['fitted'] == pytest.approx(0.9, abs=0.08)
         assert scores[kind]['without the recording'] == pytest.approx(0.9, abs=0.08)
-
-
-def test_the_density_is_that_of_the_widened_mixture() -> None:
-    observed, widening = _make_recordings(0.006, 0.3)[0].observations[0], (0.5, 0.004, 0.2)
-    found = compute_mean_densities(observed, np.array([0.3, 0.7]), Config(), [NONE, widening])
-    rows = [TIMES_S.index(each) for each in (0.25, 0.5, 1.0)]
-    for value, each in zip(found, (NONE, widening), strict=True):
-        covariance = widen_covariances(observed, [each], Config())[0, 0, rows]
-        offset = observed.truth.positions[rows]
-        squared = np.einsum('hi,hij,hj->h', offset, np.linalg.inv(covariance), offset)
-        logs = -0.5 * (squared + np.log(np.linalg.det(covariance))) - np.log(2 * np.pi)
-        assert value == pytest.approx(np.maximum(logs, -30.0).mean())
-
-
-def test_a_hand_at_rest_does_not_count() -> None:
-    assert compute_mean_densities(observation(CANDIDATES, movement_age_s=0.0), np.array([0.5, 0.5]), Config(), [NONE]) is None
 
 
 def test_a_value_at_the_end_of_those_tried_is_not_taken() -> None:

@@ -44,15 +44,6 @@ def test_one_silent_input_stops_predictions(times: dict[str, float], words: str 
     assert freshness.find_not_ready_reason(10.0, CONFIG, BOTH) is None, 'it is received again'
 
 
-def test_a_hand_whose_poses_are_refused_is_not_silent() -> None:
-    freshness = Freshness()
-    freshness.note(HAND, SampleStatus.ACCEPTED, 8.0)
-    freshness.note(HAND, SampleStatus.DUPLICATE, 9.9, 'hand_pose: stamps repeat')
-    found = freshness.find_not_ready_reason(10.0, CONFIG, ())
-    assert found == ('hand_refused', 'no hand_pose could be used for 2.0 s, the last: hand_pose: stamps repeat')
-    assert freshness.find_not_ready_reason(12.0, CONFIG, ()) == ('hand_silent', SILENT.format('4.0'))
-
-
 @pytest.mark.parametrize(
     'poses',
     [

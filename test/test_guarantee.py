@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from statistics import NormalDist
 
-import numpy as np
 import pytest
 from reach_helpers import solved
 from varied_reaches import STEPS, VariedReach, feasible_reaches
@@ -70,16 +69,6 @@ def test_a_mean_that_only_just_stays_clear_is_found_out():
     assert sum(largest_share_clear(each.problem, way) < each.problem.eta for each, way in zip(made, naive, strict=True)) >= 13
 
 
-def test_noise_that_was_not_planned_for_is_found_out():
-    """So can the sharper one: with twice the noise, k standard deviations are no longer what they were."""
-    found = 0
-    for made in feasible_reaches(REACHES)[::4]:
-        solution = solved(made.problem, made.guess, 'optimal')
-        noisier = replace(made.problem, noise=2 * made.problem.noise)
-        found += largest_share_clear(noisier, solution) < NormalDist().cdf(k_of_eta(solution.eta))
-    assert found >= 4
-
-
 @pytest.mark.parametrize('strategy', ['lv', 'hc'])
 def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised(strategy):
     """With Boole's inequality and the Gaussian bound; eta for each step alone does not promise it, and is found out."""
@@ -99,15 +88,3 @@ def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised
         missed += shares.get('step', 1.0) < made.problem.eta
     assert checked >= 9
     assert missed >= 1
-
-
-def test_reaches_are_of_every_kind():
-    problems = [made.problem for made in feasible_reaches(REACHES)]
-    moving = sum(bool(problem.obstacles.velocity.any()) for problem in problems)
-    uncertain = sum(bool(problem.obstacles.centre_covariance.any()) for problem in problems)
-    doubted = sum(bool(np.abs(problem.initial_covariance[0, 1:]).any()) for problem in problems)
-    plain = sum(
-        not (problem.obstacles.velocity.any() or problem.obstacles.centre_covariance.any() or problem.initial_covariance.any())
-        for problem in problems
-    )
-    assert min(moving, uncertain, doubted, plain) >= 12

@@ -3,14 +3,12 @@
 """The third axis: the height over the task plane, its variance, and the obstacles that it clears."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import foc_ros
-from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.height import predict_height, reach_along_axis
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
@@ -19,7 +17,6 @@ from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.plant.covariance import SharedCovariances
 from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.prediction import Prediction
-from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 
@@ -141,23 +138,6 @@ def test_an_obstacle_is_cleared_on_the_way_to_every_goal_or_blocks():
         prediction = predict(config, hand_at(0.3), table, goals, NO_TRACKS, goal_heights=np.array(heights))[0]
         assert prediction.cleared == (expected,)
         assert {each.height.mean[-1, 0].round(9) for each in prediction.candidates} == set(heights)
-
-
-def test_a_kept_answer_begins_where_the_hand_is(monkeypatch):
-    """The second prediction fails in all classes."""
-    obstacles = make_obstacles([[0.2, 0.01]], 0.03, 0.003)
-    _, tracks = predict(CONFIG, hand_at(0.1), obstacles, GOAL, NO_TRACKS, goal_heights=np.array([0.3]))
-    later = replace(hand_at(0.12), stamp_ns=100_000_000)
-    solve = candidates.solve_problems
-    fail = partial(replace, status=Status.ITERATION_LIMIT)
-    monkeypatch.setattr(candidates, 'solve_problems', lambda *given: [fail(each) for each in solve(*given)])
-    prediction, _ = predict(CONFIG, later, obstacles, GOAL, tracks, goal_heights=np.array([0.3]))
-    assert prediction.notes['kept'] == len(prediction.candidates) == 2
-    for each in prediction.candidates:
-        assert each.age_s == pytest.approx(0.1)
-        assert_allclose(each.mean[0, :2], later.mean[:2], atol=1e-12)
-        assert len(each.height.mean) == len(each.mean)
-        assert_allclose(each.height.mean[[0, -1], 0], [0.12, 0.3], atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -41,18 +41,6 @@ def test_hand_between_two_obstacles_too_near_to_each_other_gets_out():
     assert [one.label for one in found.candidates] == ['goal0:']
 
 
-def test_an_obstacle_that_holds_a_goal_does_not_block_the_paths_to_it_but_those_to_others():
-    obstacles = make_obstacles([[0.3, 0.01], [0.15, 0.0]], 0.03, ids=('bin', 'post'))
-    found = find(obstacles, goals=[[0.3, 0.0], [0.4, 0.0]], k=16)
-    assert {one.label for one in found.candidates if one.goal == 0} == {'goal0:+post', 'goal0:-post'}
-    assert {len(one.sides) for one in found.candidates if one.goal == 1} == {2}
-    assert found.notes == {'goal_inside': 1}
-    for one in found.candidates:
-        rows = [0, 1] if one.goal else [1]
-        assert gap_to_circles(one.guess, obstacles.take(rows)) > -1e-9
-        np.testing.assert_allclose(one.guess[-1], [[0.3, 0.0], [0.4, 0.0]][one.goal], atol=1e-12)
-
-
 def test_the_one_gap_in_a_ring_is_found_and_a_turn_back_is_long():
     angle = 2 * np.pi * np.arange(12) / 12
     ring = 0.1 * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -68,14 +56,6 @@ def test_obstacles_out_of_the_way_have_no_part_in_the_name():
     assert [one.label for one in find(make_obstacles(out, 0.02)).candidates] == ['goal0:']
     found = find(make_obstacles([*out, [0.15, 0.01]], 0.02))
     assert [one.label for one in found.candidates] == ['goal0:-3', 'goal0:+3']
-
-
-def test_a_turn_back_is_found_but_ranks_late():
-    obstacles = make_obstacles([[0.15, 0.01]], 0.03)
-    assert find(obstacles).candidates[0].label == 'goal0:-0'
-    turned = find(obstacles, velocity=(0.1, 0.5))
-    assert [one.label for one in turned.candidates] == ['goal0:+0', 'goal0:-0']
-    assert turned.candidates[0].length > turned.candidates[1].length
 
 
 def test_the_guess_begins_at_the_present_speed_and_ends_at_rest():

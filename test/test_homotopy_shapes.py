@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Homotopy classes among boxes, capsules, hulls and circles: brute force, equal shapes, invariances, walls, hands inside."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from homotopy_scenes import CLEARANCE, GOAL, find
@@ -18,7 +16,6 @@ BEST = 16
 """Number of classes to compare: the longest of 32 wind about obstacles, where limits of winding count."""
 TOLERANCE = 0.01
 """Lengths may be this much above those of the shortest paths, as outlines stand out of their shapes."""
-EXACT = {'rel': TOLERANCE}
 
 
 def make_scene(seed):
@@ -47,12 +44,6 @@ def compare(obstacles, seed, clearance=CLEARANCE):
 @pytest.mark.parametrize('batch', range(3))
 def test_brute_force_finds_no_class_that_the_search_misses(batch):
     for seed in range(20 * batch, 20 * (batch + 1)):
-        compare(make_scene(seed), seed)
-
-
-@pytest.mark.parametrize('batch', range(7))
-def test_brute_force_finds_none_in_many_more_scenes(batch):
-    for seed in range(60 + 20 * batch, 60 + 20 * (batch + 1)):
         compare(make_scene(seed), seed)
 
 
@@ -95,17 +86,6 @@ def test_turned_and_shifted_scenes_and_other_orders_have_the_same_classes(seed):
         np.testing.assert_allclose(turn(a.guess, angle) + shift, b.guess, atol=2e-3)
 
 
-@pytest.mark.parametrize('seed', range(10))
-def test_mirrored_scenes_have_the_mirrored_classes(seed):
-    obstacles, flip = make_scene(seed), np.array([1.0, -1.0])
-    polygons = [row[:corners][::-1] * flip for row, corners in zip(obstacles.vertices, obstacles.corners, strict=True)]
-    one, other = find(obstacles), find(make_obstacles(obstacles.centre * flip, obstacles.radius, polygons=polygons))
-    changed = str.maketrans('+-', '-+')
-    assert [a.label.translate(changed) for a in one.candidates] == [b.label for b in other.candidates]
-    for a, b in zip(one.candidates, other.candidates, strict=True):
-        np.testing.assert_allclose(a.guess * flip, b.guess, atol=1e-9)
-
-
 def measure_clear(path, obstacles, clearance=CLEARANCE):
     """Least distance of a path's points from the obstacles with the clearance [m]."""
     return float((measure_offsets(path, obstacles)[1] - obstacles.radius - clearance).min())
@@ -140,41 +120,11 @@ def test_in_a_closed_workspace_all_ways_stay_inside(yaw):
     assert find(obstacles, turn(np.array([[0.7, 0.0]]), yaw)).notes['no_way'] == 1
 
 
-def test_a_cross_of_two_bars_is_passed_on_two_sides_and_left_from_its_notches():
-    bars = [make_box(0.12, 0.01, 0.5), make_box(0.12, 0.01, 0.5 + np.pi / 2)]
-    obstacles = make_obstacles([[0.175, 0.005]] * 2, 0.0, polygons=bars)
-    found, expected = find(obstacles), shortest_by_pattern(obstacles)
-    assert [dict(one.sides) for one in found.candidates] == [{'0': -1, '1': -1}, {'0': 1, '1': 1}]
-    assert [one.length for one in found.candidates] == pytest.approx(sorted(expected.values()), **EXACT)
-    notch = np.array([0.175, 0.005]) + turn(np.array([[0.02, 0.02]]), 0.5)
-    inside = find(obstacles, notch)
-    assert len(inside.candidates) == 2
-    for one in inside.candidates:
-        assert measure_clear(one.guess, obstacles) > -1e-9
-
-
-def test_a_path_over_two_circles_and_back_between_them_and_a_third():
-    centre = np.array([[0.1866, 0.0914], [0.2434, 0.0164], [0.1862, 0.0495]])
-    obstacles = make_obstacles(centre, np.array([0.0355, 0.029, 0.0346]) - CLEARANCE)
-    found = {tuple(side for _, side in one.sides): one.length for one in find(obstacles, k=6).candidates}
-    expected = shortest_by_pattern(obstacles)
-    assert found.keys() == expected.keys()
-    assert found[1, -1, 1] == pytest.approx(0.511, rel=0.01)
-    assert found == pytest.approx(expected, **EXACT)
-
-
 def test_brute_force_agrees_with_the_closed_form_for_one_circle():
     arc = np.pi - 2 * np.arccos(0.05 / 0.175)
     exact = 2 * np.sqrt(0.175**2 - 0.05**2) + 0.05 * arc
     found = shortest_by_pattern(make_obstacles([[0.175, 0.0]], 0.05), clearance=0.0)
     assert found == {(1,): pytest.approx(exact, rel=1e-3), (-1,): pytest.approx(exact, rel=1e-3)}
-
-
-def test_a_chain_of_capsules_that_share_their_ends_is_one_obstacle():
-    corners = np.array([[0.1, 0.1], [0.18, 0.02], [0.16, -0.1], [0.25, -0.12]])
-    obstacles = collect_obstacles([Capsule(a, b, radius=0.01) for a, b in pairwise(corners)])
-    expected = shortest_by_pattern(obstacles)
-    assert [one.length for one in find(obstacles).candidates] == pytest.approx(sorted(expected.values()), **EXACT)
 
 
 def test_a_wall_across_the_way_is_named_though_its_centre_lies_beyond_the_goal():

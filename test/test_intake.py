@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 
@@ -102,59 +101,3 @@ def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:
     assert seen(intake) == ('a/2',)
     assert show(intake, marker(TYPES, id=3, frame_id='camera')) is None
     assert seen(intake) == ('a/2',) and "expected 'world'" in intake.last_refusal
-
-
-@pytest.mark.parametrize(
-    ('role', 'message', 'kind', 'words'),
-    [
-        ('hand_pose', pose_stamped(TYPES, (np.nan, 0, 0)), 'hand_lost', 'hand_pose: pose.position.x: expected a finite'),
-        ('goals', pose_array(TYPES, [(0, 0, 0), (0, np.inf, 0)]), 'goals_invalid', 'goals: poses[1].position.y: expected a'),
-        ('goal_pose', pose_stamped(TYPES, (0, 1e9, 0)), 'goal_pose_invalid', 'goal_pose: pose.position.y: expected'),
-        (
-            'goals',
-            pose_array(TYPES, [(0.3, 0.0, np.inf)]),
-            'goals_invalid',
-            'goals: poses[0].position.z: expected a finite number',
-        ),
-        ('obstacles', cloud(TYPES, obstacle_table([(0, 0, 0, -1)])), 'obstacles_invalid', 'obstacles: radius[0]: expected a'),
-        (
-            'obstacle_markers',
-            marker_array(TYPES, marker(TYPES, scale=(-1, 1, 1))),
-            'obstacle_markers_invalid',
-            'scale.x: expected',
-        ),
-    ],
-)
-def test_a_message_that_cannot_be_decoded_changes_nothing_and_is_counted(
-    intake: Intake, role: str, message: Any, kind: str, words: str
-) -> None:
-    move(intake, 1.0)
-    intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)])))
-    intake.take('goals', pose_array(TYPES, [(0.3, 0.0, 0.0)]))
-    scene, state = intake.pipeline.scene, intake.pipeline.hand_state
-    assert intake.take(role, message) is None
-    assert intake.pipeline.scene is scene and intake.pipeline.hand_state is state
-    assert intake.counts == {kind: 1} and words in intake.last_refusal
-
-
-def test_dropped_rows_are_counted(intake: Intake) -> None:
-    rows = obstacle_table([(0.1, 0.2, 0.0, 0.03), (np.nan, 0, 0, 0.1)])
-    assert intake.take('obstacles', cloud(TYPES, rows)) is SampleStatus.ACCEPTED
-    show(intake, marker(TYPES, type=0), marker(TYPES, (np.inf, 0, 0), id=3))
-    assert intake.counts == {
-        'obstacles_dropped_not_finite': 1,
-        'obstacle_markers_dropped_not_a_shape': 1,
-        'obstacle_markers_dropped_not_finite': 1,
-    }
-
-
-def test_a_refusal_of_the_pipeline_is_reported(intake: Intake) -> None:
-    move(intake, 1.0)
-    assert move(intake, 1.0) is SampleStatus.DUPLICATE
-    assert move(intake, 1.1, 'camera') is SampleStatus.WRONG_FRAME
-    assert intake.counts == {'hand_duplicate': 1, 'hand_wrong_frame': 1}
-    assert intake.last_refusal == intake.pipeline.last_refusal and 'camera' in intake.last_refusal
-    assert intake.take('goals', pose_array(TYPES, [(np.nan, 0.0, 0.0)])) is None
-    told = intake.last_refusal
-    assert move(intake, 60.0) is SampleStatus.RESTARTED_GAP
-    assert intake.last_refusal == told and 'poses[0]' in told, 'a restart is no refusal'

@@ -23,7 +23,6 @@ from foc_ros.core.config import list_parameters
 from foc_ros.io.topics import TYPES
 
 ROOT = Path(__file__).parents[1]
-FILES = sorted((ROOT / 'launch').iterdir())
 STARTER = (
     'import sys\n'
     'from launch import LaunchService\n'

@@ -39,28 +39,12 @@ def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs() -> None:
     np.testing.assert_allclose(p, np.array([6.0, 3.0, 2.0]) / 11.0, rtol=1e-14)
 
 
-def test_beta_zero_is_uniform_and_large_beta_picks_the_cheapest() -> None:
-    costs = np.array([3.0, 2.0, 5.0])
-    np.testing.assert_allclose(compute_likelihoods(costs, with_beta(0.0)), 1.0 / 3.0)
-    assert compute_likelihoods(costs, with_beta(100.0))[1] == pytest.approx(1.0)
-
-
 @given(ANY_COSTS, BETA)
 def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs: list[float], beta: float) -> None:
     p = compute_likelihoods(np.array(costs), with_beta(beta))
     assert np.all((p >= 0.0) & (p <= 1.0))
     assert p.sum() == pytest.approx(1.0)
     assert np.all(np.diff(p[np.argsort(costs, kind='stable')]) <= 0.0)
-
-
-@given(st.lists(st.floats(1e-3, 1e6), min_size=1, max_size=8), BETA, st.floats(1e-3, 1e3))
-def test_the_unit_of_effort_does_not_matter(costs: list[float], beta: float, unit: float) -> None:
-    np.testing.assert_allclose(
-        compute_likelihoods(unit * np.array(costs), with_beta(beta)),
-        compute_likelihoods(np.array(costs), with_beta(beta)),
-        rtol=1e-9,
-        atol=1e-12,
-    )
 
 
 @pytest.mark.parametrize('wrong', [-1.0, np.nan, np.inf])
@@ -128,13 +112,6 @@ def test_the_exponent_of_a_choice_fades_with_the_time_until_the_choice(after_s: 
         compute_likelihoods(THREE_COSTS, fading),
         rtol=1e-12,
     )
-
-
-def test_a_near_choice_follows_the_costs_and_a_far_one_is_open() -> None:
-    after_s = np.array([[np.inf, 50.0, 0.0], [50.0, np.inf, 0.0], [0.0, 0.0, np.inf]])
-    p = compute_likelihoods(THREE_COSTS, make_config(1.0), BranchTimes(after_s, np.arange(3)))
-    near = np.array([(1.0 + 0.25) / 2.0, (1.0 + 0.25) / 2.0, 0.04])
-    np.testing.assert_allclose(p, near / near.sum(), rtol=1e-12)
 
 
 @pytest.mark.parametrize(('horizon_s', 'share'), [(1000.0, 0.0), (4.0, norm.cdf(-math.log(2.0) / 0.5)), (2.0, 0.5), (0.0, 1.0)])
@@ -222,19 +199,3 @@ def test_a_class_that_misses_eta_takes_part_with_less_weight():
     likelihood = foc_ros.Config().likelihood
     weights = [each.cost**-likelihood.beta * math.exp(-likelihood.shortfall * each.solution.safety_shortfall) for each in found]
     np.testing.assert_allclose([each.likelihood for each in found], np.array(weights) / sum(weights))
-
-
-def test_with_an_infinite_shortfall_it_does_not():
-    found = classes(foc__eta=0.99, likelihood__shortfall=math.inf)
-    assert {each.status for each in found} == {Status.ETA_UNREACHABLE}
-    assert [each.likelihood for each in found] == [0.0, 0.0]
-
-
-@pytest.mark.parametrize('name', ['likelihood.beta', 'foc.eta', 'likelihood.shortfall'])
-@pytest.mark.parametrize('value', [math.nan, -math.inf, math.inf])
-def test_infinity_is_a_shortfall_and_nothing_else(name, value):
-    if (name, value) == ('likelihood.shortfall', math.inf):
-        assert foc_ros.Config().with_values({name: value}).likelihood.shortfall == value
-        return
-    with pytest.raises(foc_ros.ParameterError, match=name):
-        foc_ros.Config().with_values({name: value})

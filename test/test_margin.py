@@ -9,14 +9,14 @@ import pytest
 from reach_helpers import bowed, reach, solved
 
 from foc_ros.core.obstacles.geometry import Edges, find_offset
-from foc_ros.core.obstacles.risk import CERTAIN_K, compute_safety_factor
+from foc_ros.core.obstacles.risk import compute_safety_factor
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp import gradients
 from foc_ros.core.ocp.gradients import Gradients
 from foc_ros.core.ocp.margin import Contacts, Margins
 from foc_ros.core.ocp.minima import find_least_factors
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
-from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_damped_mass
+from foc_ros.core.plant.plants import condense, discretise_damped_mass
 from foc_ros.core.safety_preference import SafetyPreference
 
 STEPS, GOAL, K = 24, (0.3, 0.02), 2.0
@@ -66,32 +66,6 @@ def linearise(
     )
 
 
-def list_minima(margins: Margins, control: np.ndarray) -> list[float]:
-    """Return the times of the local minima of a margin, to a tenth of a step."""
-    times = np.arange(1.5, STEPS - 0.4, 0.1)
-    values = linearise(margins, control, times).value
-    return times[np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1].tolist()
-
-
-def find_least_factor(margins: Margins, control: np.ndarray, time: float) -> tuple[float, float]:
-    """Return the time near another at which the safety factor is least, and this factor."""
-    none, within, motion = np.zeros(21, dtype=np.intp), 0.3, margins.move(np.zeros(1, dtype=np.intp), control[None])
-    for _ in range(8):
-        times = time + within * np.linspace(-1, 1, 21)
-        factors = margins.measure(Contacts(none, none, times), none, motion, np.zeros(21)).factor
-        time, within = float(times[factors.argmin()]), within / 5
-    return time, float(factors.min())
-
-
-def find_least(margins: Margins, control: np.ndarray, time: float, within: float = 0.3) -> tuple[float, float]:
-    """Return the time near another at which the margin is least, and this margin."""
-    for _ in range(8):
-        times = time + within * np.linspace(-1, 1, 21)
-        values = linearise(margins, control, times).value
-        time, within = float(times[values.argmin()]), within / 5
-    return time, float(values.min())
-
-
 def random_directions(control: np.ndarray, count: int = 3) -> np.ndarray:
     return np.abs(control).max() * np.random.default_rng(2).standard_normal((count, len(control)))
 
@@ -119,82 +93,6 @@ def test_the_gradient_of_a_margin_is_its_derivative_at_any_time(case):
     np.testing.assert_allclose(-at.stddev_rate, (more - less) / (2 * h), rtol=1e-6)
 
 
-@EVERY
-def test_the_hessian_is_that_of_the_least_margin_which_slides(case):
-    """Second differences of G(u) = min_t g(u, t), minus those that a unit of the multiplier adds to the Lagrangian."""
-    make, *given = MADE[case]
-    problem, control = make(*given)
-    margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
-    for near in list_minima(margins, control):
-        time, least = find_least(margins, control, near)
-        if not is_smooth(margins, control, time):
-            continue
-        seen += 1
-        made = linearise(margins, control, np.array([time]))
-        assert made.value[0] == pytest.approx(least, abs=1e-9)
-        for direction in 1e-3 * random_directions(control):
-            more, less = (find_least(margins, control + sign * direction, time)[1] for sign in (1, -1))
-            along = made.factors[0] @ direction
-            added = made.diagonal[0] @ direction**2 + along @ made.weights[0] @ along
-            assert made.gradient[0] @ direction == pytest.approx((more - less) / 2, rel=1e-3, abs=1e-9)
-            assert added == pytest.approx(-(more - 2 * least + less), rel=2e-2, abs=1e-9)
-    assert seen or 'box' in case or 'hull' in case, 'a circle has a least margin where it is smooth'
-
-
-@EVERY
-def test_where_the_safety_factor_is_free_the_hessian_is_that_of_the_least_one(case):
-    """Second differences of min_t k(u, t), times the rate r by which a margin falls with k."""
-    make, *given = MADE[case]
-    problem, control = make(*given)
-    margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
-    for near in list_minima(margins, control):
-        time, k = find_least_factor(margins, control, near)
-        if abs(time - near) > 0.29 or k <= 0.0 or not is_smooth(margins, control, time):
-            continue
-        seen += 1
-        made = linearise(margins, control, np.array([time]), k, is_free=True)
-        assert made.value[0] == pytest.approx(0.0, abs=1e-9)
-        for direction in 1e-3 * random_directions(control):
-            more, less = (find_least_factor(margins, control + sign * direction, time)[1] for sign in (1, -1))
-            along = made.factors[0] @ direction
-            added = made.diagonal[0] @ direction**2 + along @ made.weights[0] @ along
-            assert made.gradient[0] @ direction == pytest.approx(made.stddev_rate[0] * (more - less) / 2, rel=1e-3, abs=1e-9)
-            assert added == pytest.approx(-made.stddev_rate[0] * (more - 2 * k + less), rel=2e-2, abs=2e-9)
-    assert seen or 'circle' not in case, 'a circle has a least safety factor where it is smooth'
-
-
-@pytest.mark.parametrize('name', ['box', 'sharp box', 'hull', 'moving capsule'])
-def test_the_gradient_of_a_margin_that_is_least_over_a_corner_of_its_course(name):
-    """Where the nearest point passes from an edge to a corner the margin has a kink in time: G is its least value there."""
-    found = 0
-    for tau in (1e-4, 3e-4, 1e-3, 3e-3):
-        problem, control = make_problem(name, tau=tau)
-        margins = Margins([problem], np.zeros(1), is_chance=True)
-        for near in list_minima(margins, control):
-            time, _ = find_least(margins, control, near)
-            if abs(time - near) > 0.2:
-                continue  # no minimum of its own
-            gradient = linearise(margins, control, np.array([time])).gradient[0]
-            pairs = []
-            for direction in 1e-5 * random_directions(control):
-                more, less = (find_least(margins, control + sign * direction, time)[1] for sign in (1, -1))
-                pairs.append((gradient @ direction, (more - less) / 2))
-            found_rates, expected = np.array(pairs).T
-            np.testing.assert_allclose(found_rates, expected, atol=0.1 * np.abs(expected).max())
-            found += not is_smooth(margins, control, time)
-    assert found or name in ('box', 'moving capsule')
-
-
-def test_the_response_is_that_of_a_simulation_at_every_time():
-    """A jerk that is constant within each step: ten finer steps in each, with the same jerk."""
-    coarse, fine = (build_triple_integrator_horizon(1.0 / n, n) for n in (STEPS, 10 * STEPS))
-    control = np.random.default_rng(0).standard_normal(2 * STEPS)
-    finer = np.repeat(control.reshape(2, -1), 10, axis=1).ravel()
-    times = np.arange(1, 10 * STEPS + 1) / 10.0
-    found = coarse.position_response.at(times) @ (control * coarse.gain)
-    np.testing.assert_allclose(found, (fine.response @ finer)[:, :2], atol=1e-12)
-
-
 def measure_factors(problem: Problem, control: np.ndarray, points: int = 100) -> np.ndarray:
     """Return the safety factors at `points` times a step, obstacle by obstacle, as the paper has them, for a certain start."""
     times = np.arange(points, points * problem.horizon.steps + 1) / points
@@ -213,17 +111,6 @@ def measure_factors(problem: Problem, control: np.ndarray, points: int = 100) ->
         along = nx * nx * (xx + fixed[0, 0]) + ny * ny * (yy + fixed[1, 1]) + 2 * nx * ny * (xy + fixed[0, 1])
         factors.append(compute_safety_factor(at.distance, along, *(each[row] for each in problem.size)))
     return np.array(factors)
-
-
-def test_a_problem_without_obstacles_is_certain_beside_one_with_some():
-    """The rows that fill up its table are no obstacles."""
-    problem, control = make_problem('circle')
-    empty = replace(problem, obstacles=collect_obstacles([]))
-    controls = np.stack((control, control))
-    k, _, _ = find_least_factors(Margins([problem, empty], np.zeros(2), is_chance=True), controls)
-    alone, _, _ = find_least_factors(Margins([problem], np.zeros(1), is_chance=True), controls[:1])
-    assert k[0] == pytest.approx(float(alone[0]), rel=1e-12)
-    assert k[1] == CERTAIN_K
 
 
 def narrow_scene(seed: int) -> tuple[Problem, np.ndarray]:

@@ -4,24 +4,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
-from bag_helpers import messages, write_bag
 from test_demonstrations import GOAL, OBSTACLES, bow
 
-from foc_ros.analysis.learn import learn_recording
-from foc_ros.analysis.recordings import find_recordings
-from foc_ros.analysis.replay import Replay
-from foc_ros.core.classes.library import MOST_STATES, is_same_recording
+from foc_ros.core.classes.library import MOST_STATES
 from foc_ros.core.config import Config
 from foc_ros.core.learning import movements as learning
 from foc_ros.core.learning.recordings import PRIOR_COUNT
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
-from foc_ros.io.bags import BagReader
 from foc_ros.ros.freshness import Freshness
 from foc_ros.ros.health import Monitor
 from foc_ros.ros.intake import Intake
@@ -137,17 +129,6 @@ def follow_one(path: np.ndarray):
     pipeline = Pipeline(CONFIG)
     follow(pipeline, reach(path), np.zeros((2, 2)))
     return pipeline.learnt.movements.learnt[0]
-
-
-def test_recording_replay_and_pipeline_learn_the_same(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'reach', messages(seconds=1.02))
-    (learnt,) = learn_recording(find_recordings(bag)['reach'], CONFIG)
-    replayed = Replay(CONFIG)
-    with BagReader(bag) as reader:
-        assert sum(step.prediction is not None for step in replayed.steps(reader)) > 0
-    (same,) = replayed.pipeline.learnt.movements.finish().learnt
-    assert is_same_recording(learnt, same)
-    assert not is_same_recording(learnt, replace(same, states=same.states + 1e-5))
 
 
 def test_the_diagnostics_count_movements() -> None:

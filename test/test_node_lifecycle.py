@@ -26,10 +26,8 @@ from node_helpers import (  # noqa: E402
     figures,
     hand_path,
     list_labels,
-    list_parameters,
     stamps,
 )
-from rcl_interfaces.srv import SetParametersAtomically  # noqa: E402
 from ros_helpers import Graph, graph  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
@@ -167,19 +165,3 @@ def test_a_refused_value_changes_nothing_and_names_the_reason(unchanged: Bench, 
     assert words in result.reason
     assert unchanged.node.pipeline.config is before
     assert {name: unchanged.node.get_parameter(name).value for name in flatten(before)} == flatten(before)
-
-
-def test_the_node_predicts_while_parameters_change_with_every_pose(ros: Graph) -> None:
-    bench, poses = begin(ros), hand_path(40)
-    client = bench.player.create_client(SetParametersAtomically, 'foc/set_parameters_atomically')
-    ros.spin_until(client.service_is_ready, 'parameter service')
-    futures = []
-    for i, pose in enumerate(poses):
-        given = list_parameters(foc__eta=0.5 + 0.01 * i if i % 3 else 5.0)
-        futures.append(client.call_async(SetParametersAtomically.Request(parameters=given)))
-        bench.move([pose])
-    ros.spin_until(lambda: all(future.done() for future in futures), 'answers')
-    assert [future.result().result.successful for future in futures] == [bool(i % 3) for i in range(40)]
-    bench.wait_for('prediction', 20)
-    assert told(bench) == (OK, 'predicting')
-    assert figures(bench.health())['hand_pose refused'] == '0 of 40'

@@ -103,19 +103,6 @@ def test_the_outputs_and_the_level_of_an_extreme_scene(ros: Graph, name: str) ->
     assert (rows[:, 3] >= bench.node.pipeline.config.foc.eta - 1e-5).sum() >= len(solved)
 
 
-def test_a_fault_is_reported_as_long_as_it_lasts(ros: Graph) -> None:
-    bench, poses = Bench(ros), hand_path(8)
-    bench.publish_scene(rows=[(0.01, 0.0, 0.0, 0.03)])
-    bench.move(poses[:4])
-    assert bench.health().level == WARN
-    bench.publish_scene()
-    bench.move(poses[4:])
-    bench.health()
-    bench.move(hand_path(2, start_s=10.08))
-    status = bench.health()
-    assert (status.level, status.message) == (OK, 'predicting')
-
-
 def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros: Graph) -> None:
     """Three messages of many markers for each pose: every pose is received, and predictions continue."""
     kept = enumerate(CROWD[:400])

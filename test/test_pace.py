@@ -9,8 +9,7 @@ import pytest
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.duration import compute_movement_time, scale_durations
-from foc_ros.core.height import reach_along_axis
-from foc_ros.core.learning.pace import Pace, find_free_positions
+from foc_ros.core.learning.pace import Pace
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import NANOSECONDS, HandSample
 
@@ -73,20 +72,6 @@ def test_the_present_movement_counts_by_the_distance_that_it_has_covered() -> No
     assert pipeline.learnt.pace.interrupt().find_best(CONFIG.duration) == ('rest', 1.0)
 
 
-def test_goals_that_change_during_movements_do_not_keep_the_pace_from_being_learnt() -> None:
-    pipeline, steady = Pipeline(CONFIG), follow(Pipeline(CONFIG), *[reach(4.0)] * 3)
-    for number in range(3):
-        for row, position in enumerate(reach(4.0)):
-            both = np.vstack([GOAL, [[0.0, -0.3]]])
-            pipeline.set_goals(both[:: 1 if row % 2 else -1] if row // 15 % 2 else GOAL.copy(), 'world')
-            stamp_ns = NANOSECONDS * (1 + 10 * number) + row * STEP_NS
-            pipeline.add_hand_sample(HandSample(stamp_ns, position, 0.0, 'world'))
-    assert pipeline.learnt.pace.movements == steady.learnt.pace.movements
-    assert pipeline.learnt.pace.find_best(CONFIG.duration)[1] == pytest.approx(
-        steady.learnt.pace.find_best(CONFIG.duration)[1], rel=0.1
-    )
-
-
 def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
     one, other = (follow(Pipeline(CONFIG), reach(4.0), reach(3.5), reach(4.2)) for _ in range(2))
     np.testing.assert_array_equal(one.learnt.pace.losses, other.learnt.pace.losses)
@@ -104,13 +89,3 @@ def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:
     assert pipeline.learnt.pace.movements > 0
     pipeline.reconfigure(pipeline.adapted_config)
     assert pipeline.learnt.pace.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
-
-
-@pytest.mark.parametrize('arrival', ['rest', 'passing'])
-def test_free_movements_are_those_that_predictions_without_obstacles_plan(arrival: str) -> None:
-    config = replace_values(Config(), {'duration.arrival': arrival, 'foc.steps': 100, 'foc.noise_x': 0.0})
-    plan = reach_along_axis(config, np.array([0.05, 0.2, 0.0]), 0.4, 0.02).mean[:, 0]
-    start, goal = np.array([0.05, 0.0, 0.2, 0.0]), np.array([0.4, 0.0])
-    for step in (25, 50, 75):
-        expected = find_free_positions(start, goal, np.array([2.0]), 0.02 * step, arrival == 'passing')
-        assert expected[0, 0] == pytest.approx(plan[step], abs=1e-3)

@@ -67,11 +67,6 @@ def test_an_argument_that_cannot_be_loaded_is_the_failure_of_its_item() -> None:
     assert found['good'] == 4 and isinstance(found['bad'], Failure)
 
 
-def test_workers_run_concurrently(tmp_path: Path) -> None:
-    with open_workers(2):
-        assert len({pid for _, pid in run(worker_tasks.meet, [(str(n), str(tmp_path)) for n in range(2)])}) == 2
-
-
 def test_an_exception_that_leaves_the_context_ends_the_work() -> None:
     began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):

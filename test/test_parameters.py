@@ -12,37 +12,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from ros_helpers import Graph
 
-from foc_ros.core.config import Config, flatten, list_parameters, replace_values
+from foc_ros.core.config import Config, list_parameters, replace_values
 from foc_ros.core.errors import FocError, FocWarning, ParameterError, RecordingError
 from foc_ros.ros import parameters as module
 from foc_ros.ros.parameters import check_parameter_files, dump_parameter_file, load_parameter_file
-
-ROOT = Path(__file__).parents[1]
-NAMES = [parameter.name for parameter in list_parameters()]
 
 
 def load(folder: Path, text: str) -> Config:
     file = folder / 'params.yaml'
     file.write_text(text, 'utf-8')
     return load_parameter_file(file)
-
-
-def test_the_shipped_file_holds_the_defaults() -> None:
-    assert load_parameter_file(ROOT / 'config' / 'foc.yaml') == Config()
-
-
-def test_the_file_describes_every_parameter() -> None:
-    lines = dump_parameter_file(Config()).splitlines()
-    for name in NAMES:
-        leaf = name.rpartition('.')[2]
-        above = [lines[i - 1] for i, line in enumerate(lines) if line.strip().startswith(f'{leaf}: ')]
-        assert above
-        assert all(re.match(r' +# \w', comment) for comment in above), leaf
 
 
 def values_of(parameter: Any) -> st.SearchStrategy[Any]:
@@ -225,11 +208,6 @@ def test_node_and_commands_refuse_the_same_files(tmp_path: Path, text: str, word
             read(file)
 
 
-def test_a_node_needs_no_parameters_in_a_file(tmp_path: Path) -> None:
-    (tmp_path / 'params.yaml').write_text('# nothing yet\n')
-    check_parameter_files(['--ros-args', '--params-file', str(tmp_path / 'params.yaml')])
-
-
 def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:
     file = tmp_path / 'foc.yaml'
     file.write_text('foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1, rate_hz: .5e2}}')
@@ -238,32 +216,6 @@ def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:
     file.write_text('foc: {ros__parameters: {rate_hz: 1_0}}')  # a text for ROS
     with pytest.raises(ParameterError, match=r"rate_hz: expected a finite number in .*, got '1_0'"):
         load_parameter_file(file)
-
-
-def test_a_node_declares_every_parameter_with_description_and_range(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import declare_parameters, read_config
-
-    node = node_with(ros)
-    assert declare_parameters(node, Config()) == Config() == read_config(node)
-    for parameter in list_parameters():
-        descriptor = node.describe_parameter(parameter.name)
-        assert node.get_parameter(parameter.name).value == parameter.default
-        assert descriptor.description.startswith(parameter.bound.meaning)
-        assert descriptor.read_only is parameter.bound.read_only
-        ranges = [*descriptor.integer_range, *descriptor.floating_point_range]
-        assert [(each.from_value, each.to_value) for each in ranges] == (
-            [] if parameter.bound.low is None else [(parameter.bound.low, parameter.bound.high)]
-        )
-        assert all(choice in descriptor.additional_constraints for choice in parameter.bound.choices)
-
-
-def test_a_node_starts_with_its_parameter_overrides(ros: Graph) -> None:
-    from foc_ros.ros.node_parameters import declare_parameters, read_config
-
-    node = node_with(ros, rate_hz=20, foc__eta=0.7, use_sim_time=False)
-    config = declare_parameters(node, Config())
-    assert config == replace_values(Config(), {'rate_hz': 20.0, 'foc.eta': 0.7}) == read_config(node)
-    assert isinstance(node.get_parameter('rate_hz').value, float)
 
 
 def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
@@ -276,13 +228,3 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
         assert declare_parameters(node_with(ros), Config()) == config == load_parameter_file(file)
-
-
-def test_names_in_the_file_are_the_names_of_the_node() -> None:
-    tree = yaml.safe_load(dump_parameter_file(Config()))['/**']['ros__parameters']
-    assert dict(module._flatten_group(tree)) == flatten(Config())
-
-
-def test_parameters_of_the_node_alone_may_stand_in_the_file(tmp_path: Path) -> None:
-    text = '/**: {ros__parameters: {autostart: false, use_sim_time: true, foc: {eta: 0.7}}}'
-    assert load(tmp_path, text) == replace_values(Config(), {'foc.eta': 0.7})

@@ -32,17 +32,6 @@ def test_without_an_obstacle_lambda_is_determined_and_tau_is_not() -> None:
     assert found.undetermined == ('tau',)
 
 
-def test_positions_between_the_steps_are_those_of_constant_jerk() -> None:
-    movement = trials.simulate(1e-3, 1e6, np.random.default_rng(1), 1)[0]
-    solution = plan(movement, 1e-3, 1e6, trials.CONFIG)
-    assert solution is not None
-    np.testing.assert_allclose(interpolate_plan(solution, solution.times), solution.path, atol=1e-12)
-    fine = np.linspace(0.0, 1.0, 20001)
-    jerk = np.diff(interpolate_plan(solution, fine), 3, axis=0) / (fine[1] - fine[0]) ** 3
-    middle = (np.arange(len(solution.control)) * 400) + 200
-    np.testing.assert_allclose(jerk[middle], solution.control, atol=0.05 * np.abs(solution.control).max())
-
-
 def test_a_movement_that_reaches_no_goal_is_rejected() -> None:
     times = np.arange(0.0, 1.0, 0.02)
     with pytest.raises(foc_ros.InputError, match=r'expected an end within 0.05 m of the goal, got 0.202 m'):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plants that `foc.plant` chooses: the damped mass, and plants from outside the package, in solve, predict and replay."""
 
-from itertools import islice
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -73,21 +71,6 @@ def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(re
     noise = make_plant_model(config.foc).compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
     exact = TRIPLE_INTEGRATOR.compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
     assert_allclose(noise, exact, atol=0.02 * exact.max())
-
-
-def test_a_plant_with_other_states_from_outside_is_solved_and_predicted(register):
-    """A double integrator, whose control is the acceleration: the least effort from rest to rest is 12 D^2 / T^3."""
-
-    def discretise(dt):
-        A = np.block([[np.eye(2), dt * np.eye(2)], [np.zeros((2, 2)), np.eye(2)]])
-        return Plant(A, np.vstack([dt**2 / 2 * np.eye(2), dt * np.eye(2)]), dt)
-
-    config = register('double', lambda settings: PlantModel(discretise))
-    solution = foc_ros.solve((0, 0), (0.3, 0), duration_s=1.0, config=config)
-    assert solution.effort * solution.dt == pytest.approx(12 * 0.3**2, rel=1e-3)
-    for prediction in islice(foc_ros.replay('foc_ros/recordings/reaching.mcap', config), 3):
-        assert prediction.solved_candidates
-        assert prediction.candidates[0].mean.shape[1] == 4
 
 
 def test_what_is_no_plant_model_is_refused(register):

@@ -110,19 +110,6 @@ def test_the_covariance_agrees_with_a_hand_that_replans_at_each_step() -> None:
         assert_allclose(error.var(axis=0), np.diag(expected[step + 1]), rtol=0.05)
 
 
-def test_predictions_widen_and_keep_means_and_likelihoods() -> None:
-    hand = HandState(0, np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
-    scene = make_obstacles([[0.15, 0.01]], 0.03), np.array([[0.3, 0.0]])
-    narrow = predict(Config(), hand, *scene, NO_TRACKS)[0]
-    wide = predict(replace_values(Config(), {'foc.process_noise': 2.0}), hand, *scene, NO_TRACKS)[0]
-    assert len(narrow.solved_candidates) == len(wide.solved_candidates) == 2
-    for before, after in zip(narrow.candidates, wide.candidates, strict=True):
-        assert_array_equal(before.solution.mean, after.solution.mean)
-        assert before.likelihood == after.likelihood
-        added = after.solution.covariance - before.solution.covariance
-        assert_allclose(added, 4.0 * triple_integrator_process_covariance(before.solution.dt, 50), atol=1e-15)
-
-
 STEPS = 50
 GOAL = np.array([0.3, 0.1])
 HAND = HandState(0, np.array([0.05, 0.0, 0.3, -0.1, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))

@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -15,17 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_mcap, write_parameters
-from report_samples import START_NS
-from report_samples import prediction as make_prediction
 
-from foc_ros.analysis.replay import Replay, Step, replay
+from foc_ros.analysis.replay import Replay, replay
 from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.cli.main import main
 from foc_ros.core.config import replace_values
-from foc_ros.core.scene import Scene
 from foc_ros.core.solution import Status
-from foc_ros.io.bags import BagReader, Item
-from foc_ros.io.topics import HAND
+from foc_ros.io.bags import BagReader
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import make_header
 
@@ -229,13 +224,6 @@ def test_the_output_bag_holds_inputs_and_predictions(tmp_path: Path, bag: Path, 
     assert without_times(replay_json(tmp_path / 'out')) == without_times(answer)
 
 
-def test_an_output_that_exists_is_left_alone(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(bag, '--output', str(bag)) == 2
-    assert 'exists already and is not overwritten' in capsys.readouterr().err
-    with BagReader(bag) as reader:
-        assert len(list(reader)) == len(messages(seconds=FEW))
-
-
 def test_a_damaged_recording_leaves_neither_json_nor_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / 'damaged.mcap'
     ends = write_mcap(file, messages(seconds=FEW), per_chunk=5)
@@ -272,16 +260,6 @@ def test_the_summary_names_what_is_compromised_or_not_solved_with_its_remedy() -
     assert shown['candidates estimated'] == '7 (unlikely or late)'
     assert shown['candidates not solved'] == f'deadline ({Status.DEADLINE.remedy}) 5'
     assert facts(Summary().answer({}, 0.0))['candidates compromised'] == 'none'
-
-
-def test_a_candidate_that_is_estimated_counts_as_such_and_not_as_compromised() -> None:
-    made = make_prediction(START_NS, np.zeros(2))
-    (first, *rest) = made.candidates
-    summary, kinds = Summary(), (Status.COMPROMISED, Status.ESTIMATED, Status.DEADLINE, Status.SOLVED)
-    for status in kinds:
-        candidates = replace(first, solution=replace(first.solution, status=status)), *rest
-        summary.add(Step(Item(HAND, '', 0, None, b''), None, replace(made, candidates=candidates), Scene()))
-    assert (summary.predictions, summary.compromised, summary.estimated) == (4, 1, 2)
 
 
 def camera_at(y: float, seconds: float, late_s: float = 0.02) -> tuple[str, int, Any]:
@@ -336,26 +314,3 @@ def test_what_was_refused_is_named(tmp_path: Path, capsys: pytest.CaptureFixture
     line = capsys.readouterr().err.splitlines()[-1]
     assert f'{count} of {count} messages of obstacles refused' in line
     assert "expected the working frame 'world', got 'camera'; no transform to world: camera and world are not connected" in line
-
-
-def test_the_recording_of_a_killed_recorder_is_replayed_with_a_warning(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / 'killed.mcap'
-    ends = write_mcap(file, messages(), per_chunk=10)
-    file.write_bytes(file.read_bytes()[: ends[1] + 50])
-    assert run(file) == 0
-    assert capsys.readouterr().err == (
-        f'foc_ros replay: {file}: killed.mcap: the recorder was killed; read up to the last whole chunk\n'
-    )
-
-
-def test_another_recording_begins_without_scene_frame_and_transforms(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'reach', messages())
-    replayed = Replay(CONFIG)
-    with BagReader(bag) as reader:
-        found = [each.prediction for each in replayed.steps(reader) if each.prediction is not None]
-    assert found and replayed.pipeline.frame_id is not None
-    replayed.forget_scene()
-    assert replayed.pipeline.frame_id is None and not replayed.pipeline.scene.sources and replayed.pipeline.scene.goals is None
-    assert replayed.describe_losses() == ''

@@ -26,15 +26,6 @@ def test_the_union_of_the_sources_holds_the_latest_row_of_an_id() -> None:
     assert dict(zip(again.ids, again.centre[:, 0], strict=True)) == {'a': 0.0, 'b': 1.0, 'c': 2.0}
 
 
-def test_obstacles_move_on_to_the_given_stamp() -> None:
-    moving = make_obstacles([[0.1, 0.2]], 0.1, velocity=[0.5, -1.0])
-    stamped = Scene().with_source('cloud', ObstacleSource(moving, NOW - NANOSECONDS // 5, 'w'))
-    np.testing.assert_allclose(stamped.obstacles(NOW).centre, [[0.2, 0.0]])
-    np.testing.assert_allclose(stamped.obstacles(NOW - 2 * NANOSECONDS // 5).centre, [[0.0, 0.4]])
-    unstamped = Scene().with_source('cloud', ObstacleSource(moving, None, 'w'))
-    np.testing.assert_array_equal(unstamped.obstacles(NOW).centre, [[0.1, 0.2]])
-
-
 @pytest.mark.parametrize(
     ('ages', 'timeout', 'words'),
     [

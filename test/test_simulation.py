@@ -17,7 +17,6 @@ from foc_ros.analysis.simulation.operators import (
     DT,
     FREE_M,
     Arm,
-    SimulatedArm,
     Task,
     draw_task,
     interpolate_minimum_jerk,
@@ -50,13 +49,6 @@ def cross(goal_row: int = 0) -> Task:
     return Task(Arm(noise=0.0), make_obstacles(), GOALS, GOALS[goal_row], goal_row, path)
 
 
-def test_a_path_of_minimum_jerk_between_two_points_is_the_known_polynomial() -> None:
-    path = interpolate_minimum_jerk(np.array([[0.0, 0.0], [0.3, 0.1]]), np.array([0.0, 1.0]), AT_REST)
-    s = np.linspace(0.0, 1.0, len(path.position))[:, None]
-    assert path.position == pytest.approx((10 * s**3 - 15 * s**4 + 6 * s**5) * np.array([0.3, 0.1]), abs=1e-9)
-    assert path.velocity[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
-
-
 def test_an_intended_path_avoids_the_obstacles_as_they_are_seen() -> None:
     seen = make_obstacles([(0.15, 0.0)], [0.03])
     path = plan_path(np.random.default_rng(1), np.zeros(2), np.array([0.3, 0.0]), seen)
@@ -72,17 +64,6 @@ def test_operators_intend_what_their_names_say(operator: str) -> None:
     assert is_announced == (operator != UNANNOUNCED_GOAL) == (task.goal_row >= 0)
     jumps = np.hypot(*np.diff(task.path.position, axis=0).T) / DT
     assert jumps.max() < 1.5, 'the path is continuous'
-
-
-def test_an_arm_without_noise_follows_its_path_and_sight_brings_it_back() -> None:
-    task = cross()
-    arm = SimulatedArm(task.arm, task.path, np.zeros((600, 2)))
-    for _ in range(len(task.path.position)):
-        arm.move(np.zeros(2))
-    assert arm.position == pytest.approx(task.goal, abs=0.005)
-    for step in range(200):
-        arm.move(np.array([0.0, 1.0 if step < 20 else 0.0]))
-    assert arm.position == pytest.approx(task.goal, abs=0.005)
 
 
 def test_measures_of_a_trial_with_known_answers() -> None:

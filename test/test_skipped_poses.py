@@ -96,28 +96,3 @@ def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_p
     assert (counts.get('hand_skipped'), none.get('hand_skipped')) == (len(dropped), None)
     assert whole and are_equal(whole, thinned)
     assert not are_equal(whole, predict(tmp_path / 'whole', replace_values(CONFIG, {'estimator.min_interval_s': 0.0}))[0])
-
-
-def estimate(step_ms: int, seed: int) -> tuple[float, float]:
-    """Return the errors (root mean square) of position and velocity of a reach with 1 mm of noise [m, m/s]."""
-    times = np.arange(-300, 1000) * 1e-3
-    s = np.clip(times, 0.0, 1.0)
-    positions, speeds = 0.3 * s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 9.0 * s**2 * (1.0 - s) ** 2
-    measured = positions + np.random.default_rng(seed).normal(0.0, 1e-3, len(times))
-    intake, errors = Intake(Pipeline(Config())), []
-    for i in range(0, len(times), step_ms):
-        assert intake.take('hand_pose', pose(i, measured[i])) is A
-        state = intake.pipeline.hand_state
-        assert state is not None
-        errors.append((state.mean[0] - positions[i], state.mean[2] - speeds[i]))
-    position, speed = np.sqrt(np.mean(np.array(errors)[len(errors) // 4 :] ** 2, axis=0)).tolist()
-    return position, speed
-
-
-def test_a_hand_that_is_thinned_out_is_estimated_nearly_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of 1 mm of noise, 0.5 mm remain of one pose in 4 ms, and 0.3 mm of four; of velocity 21 and 15 mm/s."""
-    thinned = np.mean([estimate(4, seed) for seed in range(4)], axis=0)
-    monkeypatch.setattr(Intake, 'is_skipped', lambda *_: False)
-    whole = np.mean([estimate(1, seed) for seed in range(4)], axis=0)
-    np.testing.assert_allclose(1e3 * whole, [0.3, 15.0], rtol=0.15)
-    np.testing.assert_allclose(1e3 * thinned, [0.5, 21.0], rtol=0.15)

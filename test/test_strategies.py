@@ -12,10 +12,8 @@ from reach_helpers import bowed, one_obstacle, reach, solved
 from foc_ros.core.config import FocConfig
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.risk import eta_of_k
-from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import rest_to_goal
-from foc_ros.core.ocp.solve import find_least_safety_factor, solve_problem
+from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.solution import Status
@@ -32,26 +30,6 @@ def test_without_obstacles_the_minimum_jerk_reach(strategy):
     assert solution.eta_at is None
     np.testing.assert_allclose(solution.path, bowed((0, 0), (0.3, 0), 200, 0.0), atol=3e-4)
     assert solution.effort * solution.dt == pytest.approx(720 * 0.3**2, rel=1e-2)
-
-
-@EVERY
-def test_result_is_consistent_with_itself(strategy):
-    problem = one_obstacle()
-    solution = solved(problem, BOWED, strategy)
-    control = solution.control.T.ravel()
-    k, row, moment = find_least_safety_factor(problem, control)
-    assert solution.effort == pytest.approx(control @ control)
-    assert solution.eta == pytest.approx(eta_of_k(k))
-    assert solution.eta >= 0.9 - 1e-6
-    assert solution.eta_at == ('0', pytest.approx(moment, abs=1e-3))
-    assert row == 0
-    assert solution.safety_factor == pytest.approx(k, rel=1e-9)
-    np.testing.assert_allclose(solution.path[1:], problem.positions(control), atol=1e-12)
-    np.testing.assert_allclose(solution.mean[0], problem.initial_mean)
-    np.testing.assert_allclose(solution.mean[-1], problem.goal, atol=1e-7)
-    assert solution.costs['effort'] == solution.effort
-    variances = solution.covariance[1:, [0, 1], [0, 1]].sum()
-    assert solution.costs['lambda_variance'] == pytest.approx(solution.lam * variances)
 
 
 def test_the_ratio_of_efforts_rises_through_one_with_much_noise_and_stays_near_it_with_little():
@@ -105,17 +83,6 @@ def test_a_hand_inside_a_margin_gets_out_of_it_in_the_recovery_time(strategy, st
     assert solution.status is Status.SOLVED
     assert 'near' in solution.message
     assert np.hypot(*solution.path[15:].T).min() > 0.02
-
-
-@EVERY
-def test_moving_and_uncertain_centres_are_avoided_where_they_will_be(strategy):
-    crossing = make_obstacles([[0.15, -0.2]], [0.03], [0.002], velocity=[[0.0, 0.4]], centre_covariance=np.eye(2) * 1e-5)
-    problem = reach(crossing, noise=(0.05, 0.05), eta=0.8)
-    solution = solved(problem, bowed((0, 0), (0.3, 0), 50, 0.06), strategy)
-    assert solution.status is Status.SOLVED
-    centre = problem.centres[0]
-    assert np.hypot(*(solution.path[1:] - centre).T).min() > 0.03
-    assert monte_carlo(problem, solution.control.T.ravel(), 4000).step[2] >= 0.8
 
 
 @EVERY

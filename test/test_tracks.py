@@ -43,7 +43,7 @@ def number(*predictions: tuple[Candidate, ...]) -> list[list[int]]:
     return numbers
 
 
-OVER, UNDER = make_class({'a': LEFT}), make_class({'a': RIGHT})
+OVER = make_class({'a': LEFT})
 
 
 def test_a_class_that_is_missing_for_a_short_time_keeps_its_number() -> None:

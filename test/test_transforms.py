@@ -29,16 +29,12 @@ from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures  # noqa: E402
 from ros_helpers import Graph  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 
-from foc_ros.core.config import Config, replace_values  # noqa: E402
 from foc_ros.core.errors import MessageError  # noqa: E402
 from foc_ros.core.obstacles.geometry import measure_offsets  # noqa: E402
 from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
-from foc_ros.core.pipeline import Pipeline  # noqa: E402
-from foc_ros.ros.intake import Intake  # noqa: E402
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud  # noqa: E402
-from foc_ros.ros.messages.decode_poses import decode_hand_sample  # noqa: E402
 from foc_ros.ros.messages.plane import Transform  # noqa: E402
-from foc_ros.ros.transforms import Transforms, TransformTree, TransformUnavailableError  # noqa: E402
+from foc_ros.ros.transforms import TransformTree, TransformUnavailableError  # noqa: E402
 
 BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
 
@@ -143,18 +139,6 @@ def test_what_cannot_be_transformed_is_refused_with_its_reason(ros: Graph) -> No
         decode_point_cloud(cloud(TYPES, obstacle_table([row], BOX)), 'xz', lambda _: ('world', turn))
 
 
-@pytest.mark.usefixtures('tf2')
-def test_rows_that_are_not_finite_are_dropped_from_a_transformed_scene(ros: Graph) -> None:
-    bench = begin(ros, 1)
-    table = obstacle_table([(0.2, 0.3, 0.0, 0.05), (np.inf, 0.0, 0.0, 0.05), (3e38, 3e38, 0.0, 0.05), (0.0, 0.0, 0.0, 0.05)])
-    table['y'].view('<u4')[3] = 0x7FA00000  # a signalling NaN
-    bench.deliver('obstacles', cloud(TYPES, table, 10 * SECOND, 'camera'))
-    assert 'expected a number in [-10000, 10000] m' in figures(bench.health())['last refusal']
-    bench.deliver('obstacles', cloud(TYPES, table[[0, 1, 3]], 10 * SECOND, 'camera'))
-    np.testing.assert_allclose(seen(bench), [[0.7, 0.2]])
-    assert figures(bench.health())['count obstacles_dropped_not_finite'] == '2'
-
-
 def test_without_tf2_other_frames_are_refused(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'tf2_ros', None)
     bench = begin(ros, 2)
@@ -165,65 +149,6 @@ def test_without_tf2_other_frames_are_refused(ros: Graph, monkeypatch: pytest.Mo
 
 HAND = [pose_stamped(TYPES, (0.0, 0.01 * i, 0.0), 10 * SECOND + i * SECOND // 100, 'camera') for i in range(8)]
 """Hand poses in the frame of a camera."""
-
-
-class Held:
-    """Messages of the hand on their way to the world, through transforms that the test adds; times in hundredths of a second."""
-
-    def __init__(self, tolerance_s: float) -> None:
-        self.tree = TransformTree()
-        config = replace_values(Config(), {'frames.tolerance_s': tolerance_s, 'frame_id': 'world'})
-        self.intake = Intake(Pipeline(config))
-        self.transforms = Transforms(self.tree, self.intake)
-
-    def move_camera(self, tick: float, x: float) -> None:
-        self.tree.add(SimpleNamespace(transforms=[camera(x, round((10 + tick / 100) * SECOND))]), is_static=False)
-
-    def release(self, tick: float) -> list[Any]:
-        return list(self.transforms.release('hand_pose', 10 + tick / 100))
-
-
-def test_messages_are_held_in_order_until_their_transform_arrives() -> None:
-    held = Held(0.1)
-    held.move_camera(-1, 1.0)
-    for i in range(4):
-        held.transforms.add('hand_pose', HAND[i], 10 + i / 100)
-        assert held.release(i) == []
-    held.move_camera(1, 1.2)
-    released = held.release(4)
-    assert [(each.received_s, each.error, each.is_inexact) for each in released] == [(10.0, '', False), (10.01, '', False)]
-    found = [decode_hand_sample(each.message, 'xy', each.place) for each in released]
-    assert {each.frame_id for each in found} == {'world'}
-    np.testing.assert_allclose([each.position[0] for each in found], [1.1, 1.2 - 0.01])
-    held.move_camera(3, 1.2)
-    assert len(held.release(5)) == 2
-    assert held.transforms.roles == []
-
-
-def test_a_pose_that_is_skipped_neither_waits_for_a_transform_nor_gets_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    held = Held(0.1)
-    monkeypatch.setattr(held.intake, 'is_skipped', {10 * SECOND + SECOND // 100}.__contains__)
-    held.move_camera(-1, 1.0)
-    for i in range(3):
-        held.transforms.add('hand_pose', HAND[i], 10 + i / 100)
-    assert held.release(3) == [] and held.transforms.roles, 'the first one waits, and those behind it'
-    held.move_camera(0, 1.0)
-    assert [each.place(HAND[i].header)[0] for i, each in enumerate(held.release(3))] == ['world', 'camera']
-    assert held.transforms.roles, 'the third one waits'
-
-
-def test_after_the_tolerance_the_newest_transform_is_taken_if_it_is_near_enough() -> None:
-    held = Held(0.05)
-    held.move_camera(-2, 1.0)
-    for i in (0, 7):
-        held.transforms.add('hand_pose', HAND[i], 10 + i / 100)
-    assert held.release(4.9) == []
-    (near,) = held.release(5.1)
-    assert (near.is_inexact, near.error) == (True, '')
-    assert decode_hand_sample(near.message, 'xy', near.place).position[0] == pytest.approx(1.0)
-    (far,) = held.release(12.1)
-    assert far.place(HAND[7].header)[0] == 'camera'
-    assert 'the newest one is 0.09 s older than the message (frames.tolerance_s is 0.05)' in far.error
 
 
 def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: None) -> None:

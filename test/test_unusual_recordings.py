@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import os
 import sqlite3
-import struct
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +16,7 @@ import zstandard
 from bag_helpers import STORE, messages, write_bag, write_mcap
 from mcap.writer import CompressionType, IndexType
 
-from foc_ros.analysis.recordings import BagRecording, find_recordings
+from foc_ros.analysis.recordings import BagRecording
 from foc_ros.cli.main import main
 from foc_ros.core.errors import FocWarning, MessageError, RecordingError
 from foc_ros.io import bags
@@ -105,24 +104,6 @@ def test_a_killed_sqlite_recorder_leaves_a_log_that_is_read_with_a_warning(tmp_p
 def test_every_record_of_a_summary_is_optional(tmp_path: Path, options: dict[str, Any]) -> None:
     write_mcap(tmp_path / 'lean.mcap', SHORT, per_chunk=7, **options)
     assert read(tmp_path / 'lean.mcap') == WHOLE
-
-
-def test_a_scan_counts_what_the_statistics_state(tmp_path: Path) -> None:
-    ends = write_mcap(tmp_path / 'whole.mcap', SHORT, per_chunk=6, index_types=IndexType.NONE)
-    data = (tmp_path / 'whole.mcap').read_bytes()
-    (tmp_path / 'less.mcap').write_bytes(data[: ends[0]] + data[ends[1] :])  # a chunk was left out
-    with pytest.raises(RecordingError, match=f'{len(WHOLE) - 6} of its {len(WHOLE)} messages can be read|damaged'):
-        read(tmp_path / 'less.mcap')
-
-
-def test_a_file_may_end_without_a_footer(tmp_path: Path) -> None:
-    """Its recorder has written the last bytes of a whole file, but neither summary nor footer before them."""
-    write_mcap(tmp_path / 'whole.mcap', SHORT, per_chunk=7)
-    data = (tmp_path / 'whole.mcap').read_bytes()
-    end = data.index(struct.pack('<BQ', 0x0F, 4)) + 13  # of the data section
-    (tmp_path / 'short.mcap').write_bytes(data[:end] + data[-8:])
-    with pytest.warns(FocWarning, match='the recorder was killed'):
-        assert read(tmp_path / 'short.mcap') == WHOLE
 
 
 @pytest.mark.parametrize(('kind', 'is_folder'), [('.mcap', True), ('.db3', False)])
@@ -224,19 +205,6 @@ def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(
 SHORT_KINDS = {topic: made.__msgtype__ for topic, _, made in SHORT}
 
 
-@pytest.mark.parametrize('zeros', [1, 4, 8])
-def test_zeros_after_a_message_are_padding(tmp_path: Path, zeros: int) -> None:
-    padded = [(topic, stamp_ns, raw + bytes(zeros)) for topic, stamp_ns, raw in WHOLE]
-    write_sqlite(tmp_path / 'one.db3', padded).close()
-    with BagReader(tmp_path / 'one.db3') as reader:
-        assert (
-            sorted(
-                (each.topic, each.log_ns, bytes(STORE.serialize_cdr(each.message, SHORT_KINDS[each.topic]))) for each in reader
-            )
-            == WHOLE
-        )
-
-
 def name_by_dds(name: str) -> str:
     return '::'.join([*name.split('/')[:-1], 'dds_', name.split('/')[-1] + '_'])
 
@@ -286,12 +254,6 @@ def test_definitions_may_be_those_of_another_system(tmp_path: Path, change: Call
         with BagReader(tmp_path / 'one.db3') as reader:
             assert not any(isinstance(item.message, MessageError) for item in reader)
     assert bool(issued) == is_told and all('cannot be read, and that of ROS is used' in str(each.message) for each in issued)
-
-
-def test_metadata_beside_folders_of_bags_hide_nothing(tmp_path: Path) -> None:
-    write_bag(tmp_path / 'one', SHORT)
-    write_metadata(tmp_path, ['one.mcap'], len(WHOLE))
-    assert list(find_recordings(tmp_path)) == ['one']
 
 
 def test_a_file_name_need_not_be_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,13 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from report_samples import START_NS, prediction, predictions, samples, scene, widen
+from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Status, describe_class
-from foc_ros.core.types import HandSample
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.received import is_same_prediction, read_snapshot
 from foc_ros.reporting.tracks import Slots, build_candidate_tracks
@@ -46,30 +45,6 @@ def test_a_snapshot_holds_the_numbers_of_its_prediction_and_names_classes_in_wor
     one = build_snapshot(replace(made, goal_positions=made.goal_positions[:1]))
     assert [each.description for each in (*one.candidates[:1], *one.unsolved)] == ['left of 1', 'left of 1, left of post']
     assert describe_class(()) == 'direct'
-
-
-def test_the_motor_noise_and_the_unknown_share_are_kept() -> None:
-    made = replace(prediction(START_NS, NOWHERE), unknown=0.25)
-    assert not build_snapshot(made).candidates[0].is_widened
-    snapshot = build_snapshot(widen(made))
-    assert snapshot.candidates[0].is_widened and snapshot.unknown_share == 0.25
-    np.testing.assert_array_equal(snapshot.candidates[0].covariance, 3.0 * snapshot.candidates[0].motor_covariance)
-
-
-def test_a_trajectory_leaves_late_samples_out() -> None:
-    made = samples()
-    hand = build_hand_trajectory([*made[:20], made[5], made[19], *made[20:]])
-    assert list(hand.stamps_ns) == [sample.stamp_ns for sample in made]
-    np.testing.assert_array_equal(hand.positions, [sample.position for sample in made])
-
-
-def test_velocity() -> None:
-    stamps = START_NS + np.cumsum(np.random.default_rng(1).integers(5, 80, 40)) * 1_000_000
-    positions = np.outer((stamps - START_NS) * 1e-9, [0.3, -0.2])
-    np.testing.assert_allclose(HandTrajectory(stamps, positions).velocity, np.tile([0.3, -0.2], (40, 1)), atol=1e-9)
-    np.testing.assert_array_equal(build_hand_trajectory([HandSample(5, np.ones(2))]).velocity, np.zeros((1, 2)))
-    empty = build_hand_trajectory([])
-    assert (empty.velocity.shape, empty.find_movements(0.05)) == ((0, 2), [])
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none() -> None:

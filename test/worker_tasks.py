@@ -37,15 +37,6 @@ class Unloadable:
         return (int, ('no number',))
 
 
-def meet(folder: str) -> int:
-    """Return the process id, once another process is here as well, or after 30 s."""
-    Path(folder, str(os.getpid())).touch()
-    deadline = time.monotonic() + 30.0
-    while len(list(Path(folder).iterdir())) < 2 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return os.getpid()
-
-
 def sleepy(seconds: float) -> float:
     time.sleep(seconds)
     return seconds
