@@ -12,13 +12,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import ros_helpers
-
-ros_helpers.require_ros()
-
-from rcl_interfaces.srv import SetParameters  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
-from std_srvs.srv import SetBool  # noqa: E402
+import ros_required  # noqa: F401
+from rcl_interfaces.srv import SetParameters
+from ros_helpers import Graph
+from std_srvs.srv import SetBool
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / 'doc' / 'examples' / 'teleoperation_loop.py'

@@ -13,12 +13,10 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import ros_required  # noqa: F401
 import pytest
-from ros_helpers import prepare_environment, require_ros
 from rosbags.highlevel import AnyReader
 
-prepare_environment()
-require_ros()
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 ROOT = Path(__file__).resolve().parents[1]

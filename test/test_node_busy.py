@@ -8,18 +8,15 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
+import ros_required  # noqa: F401
 import pytest
-import ros_helpers
+from node_helpers import OK, WARN, Bench, begin, figures, hand_path, list_labels, stamps
+from ros_helpers import Graph
+from std_srvs.srv import SetBool, Trigger
 
-ros_helpers.require_ros()
-
-from node_helpers import OK, WARN, Bench, begin, figures, hand_path, list_labels, stamps  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
-from std_srvs.srv import SetBool, Trigger  # noqa: E402
-
-from foc_ros.core import pipeline as computation  # noqa: E402
-from foc_ros.core.deadline import Deadline  # noqa: E402
-from foc_ros.ros import health  # noqa: E402
+from foc_ros.core import pipeline as computation
+from foc_ros.core.deadline import Deadline
+from foc_ros.ros import health
 
 
 class Gate:

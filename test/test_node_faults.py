@@ -10,30 +10,27 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import Any
 
+import ros_required  # noqa: F401
 import pytest
-import ros_helpers
-
-ros_helpers.require_ros()
-
-from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped  # noqa: E402
-from nav_msgs.msg import Path  # noqa: E402
-from node_helpers import ERROR, GOALS, OK, ROWS, TYPES, WARN, Bench, begin, figures, hand_path, stamps  # noqa: E402
-from rclpy.event_handler import PublisherEventCallbacks  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from rclpy.qos import (  # noqa: E402
+from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped
+from nav_msgs.msg import Path
+from node_helpers import ERROR, GOALS, OK, ROWS, TYPES, WARN, Bench, begin, figures, hand_path, stamps
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.parameter import Parameter
+from rclpy.qos import (
     QoSDurabilityPolicy,
     QoSLivelinessPolicy,
     QoSProfile,
     qos_profile_sensor_data,
 )
-from ros_helpers import Graph, graph  # noqa: E402
-from sensor_msgs.msg import PointCloud2  # noqa: E402
-from std_srvs.srv import Trigger  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from ros_helpers import Graph, graph
+from sensor_msgs.msg import PointCloud2
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
 
-from foc_ros.core import pipeline as computation  # noqa: E402
-from foc_ros.ros import node as module  # noqa: E402
-from foc_ros.ros.endpoints import describe_incompatible_subscriptions  # noqa: E402
+from foc_ros.core import pipeline as computation
+from foc_ros.ros import node as module
+from foc_ros.ros.endpoints import describe_incompatible_subscriptions
 
 NAN = math.nan
 EARLY = round(9.9 * SECOND)

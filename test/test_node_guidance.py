@@ -8,22 +8,19 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import ros_required  # noqa: F401
 import numpy as np
 import pytest
-import ros_helpers
+from geometry_msgs.msg import PoseStamped, TwistStamped, Wrench, WrenchStamped
+from message_helpers import SECOND, pose_stamped
+from node_helpers import TYPES, Bench, figures
+from rclpy.parameter import Parameter
+from ros_helpers import Graph
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import SetBool
 
-ros_helpers.require_ros()
-
-from geometry_msgs.msg import PoseStamped, TwistStamped, Wrench, WrenchStamped  # noqa: E402
-from message_helpers import SECOND, pose_stamped  # noqa: E402
-from node_helpers import TYPES, Bench, figures  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
-from std_msgs.msg import Float64MultiArray  # noqa: E402
-from std_srvs.srv import SetBool  # noqa: E402
-
-from foc_ros.core import pipeline as pipelines  # noqa: E402
-from foc_ros.ros import guidance  # noqa: E402
+from foc_ros.core import pipeline as pipelines
+from foc_ros.ros import guidance
 
 GUIDED = {'guidance.enabled': True, 'guidance.clearance': 0.0, 'rate_hz': 25.0}
 """Guidance everywhere, so that a hand that leaves its path feels a force."""

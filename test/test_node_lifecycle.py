@@ -8,15 +8,12 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import ros_required  # noqa: F401
 import pytest
-import ros_helpers
-
-ros_helpers.require_ros()
-
-from lifecycle_msgs.msg import Transition  # noqa: E402
-from lifecycle_msgs.srv import GetAvailableTransitions  # noqa: E402
-from message_helpers import SECOND, cloud, obstacle_table  # noqa: E402
-from node_helpers import (  # noqa: E402
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import GetAvailableTransitions
+from message_helpers import SECOND, cloud, obstacle_table
+from node_helpers import (
     OK,
     QUICK,
     ROWS,
@@ -28,11 +25,11 @@ from node_helpers import (  # noqa: E402
     list_labels,
     stamps,
 )
-from ros_helpers import Graph, graph  # noqa: E402
-from std_srvs.srv import SetBool, Trigger  # noqa: E402
+from ros_helpers import Graph, graph
+from std_srvs.srv import SetBool, Trigger
 
-from foc_ros.core.config import Config, flatten, replace_values  # noqa: E402
-from foc_ros.ros import endpoints  # noqa: E402
+from foc_ros.core.config import Config, flatten, replace_values
+from foc_ros.ros import endpoints
 
 
 def predicted(bench: Bench, poses: list[Any]) -> int:

@@ -7,24 +7,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import ros_required  # noqa: F401
 import numpy as np
 import pytest
-import ros_helpers
+from bag_helpers import CONFIG, messages, write_bag
+from bag_helpers import TYPES as BAG_TYPES
+from message_helpers import cloud, obstacle_table, pose_array
+from node_helpers import TYPES, Bench, figures
+from rclpy.serialization import deserialize_message, serialize_message
+from ros_helpers import Graph
 
-ros_helpers.require_ros()
-
-from bag_helpers import CONFIG, messages, write_bag  # noqa: E402
-from bag_helpers import TYPES as BAG_TYPES  # noqa: E402
-from message_helpers import cloud, obstacle_table, pose_array  # noqa: E402
-from node_helpers import TYPES, Bench, figures  # noqa: E402
-from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
-
-from foc_ros.analysis.replay import Replay  # noqa: E402
-from foc_ros.core.classes.library import is_same_recording  # noqa: E402
-from foc_ros.core.config import Config, flatten, replace_values  # noqa: E402
-from foc_ros.io.bags import BagReader  # noqa: E402
-from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs  # noqa: E402
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.classes.library import is_same_recording
+from foc_ros.core.config import Config, flatten, replace_values
+from foc_ros.io.bags import BagReader
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
 
 SECONDS = 0.3
 LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})

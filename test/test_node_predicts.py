@@ -6,14 +6,11 @@ from __future__ import annotations
 
 import time
 
+import ros_required  # noqa: F401
 import numpy as np
 import pytest
-import ros_helpers
-
-ros_helpers.require_ros()
-
-from message_helpers import SECOND, cloud, obstacle_table, pose_array  # noqa: E402
-from node_helpers import (  # noqa: E402
+from message_helpers import SECOND, cloud, obstacle_table, pose_array
+from node_helpers import (
     GOALS,
     OK,
     TYPES,
@@ -25,12 +22,12 @@ from node_helpers import (  # noqa: E402
     list_labels,
     stamps,
 )
-from ros_helpers import Graph  # noqa: E402
-from std_msgs.msg import Float64  # noqa: E402
+from ros_helpers import Graph
+from std_msgs.msg import Float64
 
-from foc_ros.ros import health, node  # noqa: E402
-from foc_ros.ros.endpoints import MOST_GOAL_TOPICS  # noqa: E402
-from foc_ros.ros.messages.encode_prediction import encode_outputs  # noqa: E402
+from foc_ros.ros import health, node
+from foc_ros.ros.endpoints import MOST_GOAL_TOPICS
+from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 
 def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros: Graph) -> None:

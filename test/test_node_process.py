@@ -11,24 +11,21 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import ros_required  # noqa: F401
 import pytest
-import ros_helpers
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition, TransitionEvent
+from lifecycle_msgs.srv import ChangeState, GetState
+from process_helpers import MODULE, ROOT, Player, ended, predict_once, running
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from ros_helpers import Graph, graph
 
-ros_helpers.require_ros()
-
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from lifecycle_msgs.msg import Transition, TransitionEvent  # noqa: E402
-from lifecycle_msgs.srv import ChangeState, GetState  # noqa: E402
-from process_helpers import MODULE, ROOT, Player, ended, predict_once, running  # noqa: E402
-from rcl_interfaces.msg import Parameter, ParameterValue  # noqa: E402
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters  # noqa: E402
-from ros_helpers import Graph, graph  # noqa: E402
-
-from foc_ros.core.config import list_parameters  # noqa: E402
-from foc_ros.ros.isolated_node import reserve_domain  # noqa: E402
-from foc_ros.ros.main import main  # noqa: E402
-from foc_ros.ros.messages.encode_prediction import OUTPUTS  # noqa: E402
-from foc_ros.ros.messages.types import find_message_class  # noqa: E402
+from foc_ros.core.config import list_parameters
+from foc_ros.ros.isolated_node import reserve_domain
+from foc_ros.ros.main import main
+from foc_ros.ros.messages.encode_prediction import OUTPUTS
+from foc_ros.ros.messages.types import find_message_class
 
 
 def entry_point(name: str) -> str:

@@ -8,15 +8,12 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+import ros_required  # noqa: F401
 import pytest
-import ros_helpers
-
-ros_helpers.require_ros()
-
-from message_helpers import SECOND, cloud, obstacle_table, pose_stamped  # noqa: E402
-from node_helpers import CROWD, TYPES, figures  # noqa: E402
-from process_helpers import Player, ended, parameters, running  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
+from message_helpers import SECOND, cloud, obstacle_table, pose_stamped
+from node_helpers import CROWD, TYPES, figures
+from process_helpers import Player, ended, parameters, running
+from ros_helpers import Graph
 
 OK, WARN = b'\x00', b'\x01'
 LIGHT = ['foc.steps:=20', 'homotopy.max_candidates:=1', 'rate_hz:=10.0', 'scene.timeout_s:=0.0', 'estimator.hand_timeout_s:=10.0']

@@ -13,15 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import ros_required  # noqa: F401
 import numpy as np
 import pytest
-import ros_helpers
-
-ros_helpers.require_ros()
-
-from bag_helpers import write_bag, write_parameters  # noqa: E402
-from message_helpers import SECOND, marker, marker_array, pose_array, pose_stamped  # noqa: E402
-from node_helpers import (  # noqa: E402
+from bag_helpers import write_bag, write_parameters
+from message_helpers import SECOND, marker, marker_array, pose_array, pose_stamped
+from node_helpers import (
     CROWD,
     GOALS,
     OK,
@@ -35,11 +32,11 @@ from node_helpers import (  # noqa: E402
     list_labels,
     stamps,
 )
-from ros_helpers import Graph  # noqa: E402
-from rosgraph_msgs.msg import Clock  # noqa: E402
+from ros_helpers import Graph
+from rosgraph_msgs.msg import Clock
 
-from foc_ros.core.config import Config  # noqa: E402
-from foc_ros.core.solution import Status  # noqa: E402
+from foc_ros.core.config import Config
+from foc_ros.core.solution import Status
 
 ROOT = Path(__file__).parents[1]
 TAKING_PART = tuple(f'{status.value}, likelihood ' for status in Status if status.has_likelihood)

@@ -10,12 +10,11 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import ros_required  # noqa: F401
 import numpy as np
 import pytest
-import ros_helpers
 from scipy.spatial.transform import Rotation
 
-ros_helpers.require_ros()
 tf2_ros = pytest.importorskip('tf2_ros', reason='optional message package: tf2_ros', exc_type=ImportError)
 
 from message_helpers import SECOND, cloud, obstacle_table, transform  # noqa: E402

@@ -9,13 +9,10 @@ import sys
 from types import SimpleNamespace
 from typing import Any
 
+import ros_required  # noqa: F401
 import numpy as np
 import pytest
-import ros_helpers
-
-ros_helpers.require_ros()
-
-from message_helpers import (  # noqa: E402
+from message_helpers import (
     SECOND,
     cloud,
     marker,
@@ -25,16 +22,16 @@ from message_helpers import (  # noqa: E402
     pose_stamped,
     transform,
 )
-from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
-from scipy.spatial.transform import Rotation  # noqa: E402
+from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures
+from ros_helpers import Graph
+from scipy.spatial.transform import Rotation
 
-from foc_ros.core.errors import MessageError  # noqa: E402
-from foc_ros.core.obstacles.geometry import measure_offsets  # noqa: E402
-from foc_ros.core.obstacles.shapes import make_box_polygon  # noqa: E402
-from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud  # noqa: E402
-from foc_ros.ros.messages.plane import Transform  # noqa: E402
-from foc_ros.ros.transforms import TransformTree, TransformUnavailableError  # noqa: E402
+from foc_ros.core.errors import MessageError
+from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.shapes import make_box_polygon
+from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
+from foc_ros.ros.messages.plane import Transform
+from foc_ros.ros.transforms import TransformTree, TransformUnavailableError
 
 BOX = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
 
