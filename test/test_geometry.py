@@ -6,11 +6,30 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.geometry import SMALLEST_DISTANCE, Offset, find_offset, measure_offsets, tabulate_edges
-from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles, make_box_polygon, make_hull_polygon
+from foc_ros.core.obstacles.geometry import (
+    SMALLEST_DISTANCE,
+    Offset,
+    find_limits,
+    find_offset,
+    measure_offsets,
+    tabulate_edges,
+    trace_obstacle,
+)
+from foc_ros.core.obstacles.shapes import (
+    Box,
+    Capsule,
+    Circle,
+    Hull,
+    Shape,
+    collect_obstacles,
+    make_box_polygon,
+    make_hull_polygon,
+)
+from foc_ros.ros.messages.plane import lift, project
 
 SEEDS = st.integers(0, 10_000)
 MANY = settings(max_examples=100, deadline=None, derandomize=True)
@@ -131,3 +150,59 @@ def test_shapes_refuse_by_the_name_of_the_field(case):
     make, field = REFUSED[case]
     with pytest.raises(SceneError, match=f'^{field}'):
         make()
+
+
+SHAPES = (
+    Circle((0.1, 0.2), radius=0.03),
+    Capsule((0.0, 0.0), (0.2, 0.1), radius=0.02),
+    Box((0.3, -0.1), (0.2, 0.05), 0.4),
+    Box((0.3, -0.1), (0.2, 0.05), -2.0, radius=0.01),
+    Hull([(0.0, 0.0), (0.3, 0.0), (0.1, 0.2), (0.05, 0.05)], radius=0.02),
+)
+
+
+def measure_area(points: np.ndarray) -> float:
+    (x, y), (after_x, after_y) = points.T, np.roll(points, -1, axis=0).T
+    return float((x * after_y - y * after_x).sum() / 2.0)
+
+
+@pytest.mark.parametrize('shape', SHAPES, ids=repr)
+@pytest.mark.parametrize('growth', [0.0, 0.015])
+def test_every_point_is_at_the_radius_and_the_area_is_that_of_steiner(shape: Shape, growth: float) -> None:
+    obstacles = collect_obstacles([shape])
+    outline, radius = trace_obstacle(obstacles, 0, growth, points=400), shape.radius + growth
+    np.testing.assert_array_equal(outline[0], outline[-1])
+    np.testing.assert_allclose(measure_offsets(outline, obstacles)[1], radius, atol=2e-9)
+    edges = np.roll(shape.polygon, -1, axis=0) - shape.polygon
+    expected = measure_area(shape.polygon) + np.hypot(*edges.T).sum() * radius + np.pi * radius**2
+    assert measure_area(outline) == pytest.approx(expected, rel=1e-3)
+
+
+@given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=12), st.floats(1e-3, 0.1))
+def test_the_limits_are_those_of_the_outline(points: list[tuple[float, float]], radius: float) -> None:
+    obstacles = collect_obstacles([Hull(points, radius), Circle((2.0, 2.0), radius=1.0)])
+    low, high = find_limits(obstacles, np.array([0.01, 0.0]))
+    outline = trace_obstacle(obstacles, 0, 0.01, points=2000)
+    np.testing.assert_allclose([low[0], high[0]], [outline.min(axis=0), outline.max(axis=0)], atol=1e-6)
+    np.testing.assert_array_equal([low[1], high[1]], [[1.0, 1.0], [3.0, 3.0]])
+
+
+PLANES = ('xy', 'xz', 'yz')
+points = arrays(np.float64, st.tuples(st.integers(0, 5), st.just(3)), elements=st.floats(-1e4, 1e4))
+
+
+@pytest.mark.parametrize(
+    ('plane', 'position', 'height'), [('xy', (1.0, 2.0), 3.0), ('xz', (1.0, 3.0), 2.0), ('yz', (2.0, 3.0), 1.0)]
+)
+def test_axes_of_each_plane(plane: str, position: tuple[float, float], height: float) -> None:
+    projected, above = project((1.0, 2.0, 3.0), plane)
+    assert tuple(projected) == position
+    assert above == height
+    assert tuple(lift(projected, above, plane)) == (1.0, 2.0, 3.0)
+
+
+@given(points, st.sampled_from(PLANES))
+def test_lift_is_the_inverse_of_project(table: np.ndarray, plane: str) -> None:
+    positions, heights = project(table, plane)
+    assert positions.shape == (len(table), 2)
+    np.testing.assert_array_equal(lift(positions, heights, plane), table)

@@ -4,12 +4,16 @@
 
 import numpy as np
 import pytest
-from homotopy_scenes import find, gap_to_circles
+from homotopy_scenes import CLEARANCE, find, gap_to_circles
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from foc_ros.core.classes import find_path_sides, search
+from foc_ros.core.classes import Turn, compute_swept_angles, find_path_sides, search
 from foc_ros.core.config import HomotopyConfig
+from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.solution import LEFT, RIGHT
 
 NOTHING = make_obstacles()
 
@@ -88,3 +92,83 @@ def test_arguments_that_do_not_fit_are_named():
         search(np.zeros(2), np.array([[0.3, 0.0]]), NOTHING, settings, [1.0], 50)
     with pytest.raises(SceneError, match='duration_s: expected one for each of the 1 goals, got 2'):
         search(np.zeros(6), np.array([[0.3, 0.0]]), NOTHING, settings, [1.0, 1.0], 50)
+
+
+ABEAM = make_obstacles([[0.5, 0.0]], 0.1, ids=('post',))
+
+
+def bowed(amplitude: float, m: int = 101) -> np.ndarray:
+    share = np.linspace(0.0, 1.0, m)
+    return np.column_stack([share, amplitude * np.sin(np.pi * share)])
+
+
+def test_swept_angle_of_a_quarter_circle_and_of_two_turns():
+    angle = np.linspace(0.0, np.pi / 2, 50)
+    assert compute_swept_angles(np.column_stack([np.cos(angle), np.sin(angle)]), np.zeros((1, 2))) == pytest.approx([np.pi / 2])
+    twice = np.column_stack([np.cos(8 * angle), -np.sin(8 * angle)])
+    assert compute_swept_angles(twice, np.array([[0.0, 0.0], [3.0, 0.0]])) == pytest.approx([-4 * np.pi, 0.0])
+
+
+def test_obstacles_behind_the_start_and_beyond_the_end_are_not_passed():
+    obstacles = make_obstacles([[-0.1, 0.05], [1.2, 0.0], [0.5, 0.0]], 0.05)
+    assert find_path_sides(bowed(0.3), obstacles) == {'2': LEFT}
+
+
+def test_a_moving_obstacle_counts_where_it_is_at_each_step():
+    path = bowed(0.0)
+    crossing = np.stack([np.full(101, 0.5), np.linspace(0.4, -0.4, 101) + 0.1], axis=1)[:, None]
+    # half way, when the hand passes, it has come no nearer than 0.1 m to the left
+    assert find_path_sides(path, ABEAM, crossing) == {'post': RIGHT}
+    assert find_path_sides(path, ABEAM, crossing - [0.0, 0.2]) == {'post': LEFT}
+
+
+def test_centres_of_another_number_of_points_are_refused():
+    with pytest.raises(SceneError, match='centres: expected one row for each of the 101 points, got 3 rows'):
+        find_path_sides(bowed(0.1), ABEAM, np.zeros((3, 1, 2)))
+    with pytest.raises(SceneError, match='path: expected points'):
+        find_path_sides(np.zeros((3, 3)), ABEAM)
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@given(st.floats(-0.9, 0.9), st.floats(-3.0, 3.0), st.floats(0.05, 0.95), st.floats(-0.8, 0.8))
+def test_side_of_a_bowed_path_is_that_of_the_line_above_or_below(amplitude, angle, x, y):
+    path = bowed(amplitude, 400)
+    height = amplitude * np.sin(np.pi * x)
+    if abs(y - height) < 1e-3:
+        return
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    obstacles = make_obstacles([turn @ [x, y]], 0.01)
+    assert find_path_sides(path @ turn.T, obstacles) == {'0': LEFT if height > y else RIGHT}
+
+
+GOALS = np.column_stack([np.full(6, 0.4), np.linspace(-0.2, 0.2, 6)])
+CROWD = np.random.default_rng(2).uniform([0.05, -0.2], [0.35, 0.2], (40, 2))
+
+
+def search_within(seconds, obstacles, goals=GOALS, previous=(), first_goal=0, k=6, hand=(0.0, 0.0)):
+    settings = HomotopyConfig(max_candidates=k, clearance=CLEARANCE)
+    turn = Turn(Deadline(seconds), first_goal)
+    return search(np.array([*hand, 0.0, 0.0, 0.0, 0.0]), goals, obstacles, settings, [1.0] * len(goals), 20, previous, turn)
+
+
+def test_without_time_each_goal_has_a_candidate_at_once_and_one_goal_after_the_other_is_searched_again():
+    obstacles, next_goals, previous, goal = make_obstacles(CROWD[:12], 0.012), [], (), 0
+    for _ in range(7):
+        found = search_within(-1.0, obstacles, previous=previous, first_goal=goal)
+        searched = len({id(each) for each in found.candidates} - {id(each) for each in previous})
+        assert searched == (1 if previous else 6), 'the others are as they were'
+        previous, goal = found.candidates, found.next_goal
+        next_goals.append(goal)
+        assert {each.goal for each in previous} == set(range(6))
+    assert next_goals == [0, 1, 2, 3, 4, 5, 0]
+
+
+def test_without_time_previous_candidates_stay_unless_their_obstacles_or_goals_are_gone():
+    before = find(make_obstacles(CROWD[:4], 0.02), GOALS, k=12).candidates
+    assert {each.goal for each in before} == set(range(6))
+    same = search_within(-1.0, make_obstacles(CROWD[:4], 0.02), previous=before, k=12)
+    assert {each.label for each in same.candidates} >= {each.label for each in before if each.goal}
+    fewer = search_within(-1.0, make_obstacles(CROWD[:4], 0.02), goals=GOALS[:3], previous=before, k=12)
+    assert {each.goal for each in fewer.candidates} == {0, 1, 2}
+    without = search_within(-1.0, make_obstacles(CROWD[1:4], 0.02, ids=('1', '2', '3')), previous=before, k=12)
+    assert not any(identity == '0' for each in without.candidates for identity, _ in each.sides)

@@ -4,10 +4,10 @@
 
 import numpy as np
 import pytest
-from homotopy_scenes import CLEARANCE, GOAL, find
+from homotopy_scenes import AVOIDING, CLEARANCE, GOAL, avoiding, find, random_scene
 from homotopy_shapes import HAND, make_box, random_shapes, shortest_by_pattern, turn
 
-from foc_ros.core.classes import find_path_sides
+from foc_ros.core.classes import find_path_sides, scene
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Capsule, collect_obstacles, make_box_polygon
@@ -168,3 +168,114 @@ def test_a_gap_that_was_taken_stays_open_while_it_is_a_little_too_narrow():
     narrow = make_obstacles([[0.15, y - 2e-3], [0.15, -y]], 0.0, polygons=boxes)
     assert {'0': -1, '1': 1} not in [dict(one.sides) for one in find(narrow, k=3).candidates]
     assert {'0': -1, '1': 1} in [dict(one.sides) for one in find(narrow, k=3, previous=before.candidates).candidates]
+
+
+VELOCITY = np.array([0.1, 0.05])
+
+
+def crowd(seed, n, size, wide):
+    rng = np.random.default_rng(seed)
+    centre = rng.uniform([-wide, -wide], [0.35 + wide, wide], (n, 2))
+    radius = rng.uniform(0.3 * size, size, n)
+    keep = np.all([np.hypot(*(centre - end).T) > radius + 0.006 for end in (np.zeros(2), GOAL)], axis=0)
+    return make_obstacles(centre[keep], radius[keep])
+
+
+@pytest.mark.parametrize('angle', np.linspace(0.0, np.pi, 5))
+@pytest.mark.parametrize(('gap', 'through'), [(2 * CLEARANCE - 1e-5, False), (2 * CLEARANCE + 1e-5, True)])
+def test_a_gap_in_any_direction_is_open_from_twice_the_clearance(angle, gap, through):
+    apart = turn(np.array([[0.0, 0.03 + gap / 2]]), 0.8 * (angle - np.pi / 2))[0]
+    obstacles = make_obstacles(np.array([0.17, 0.0]) + np.array([apart, -apart]), 0.03)
+    sides = [tuple(side for _, side in one.sides) for one in find(obstacles, k=4).candidates]
+    assert ((1, -1) in sides or (-1, 1) in sides) is through
+
+
+def test_an_obstacle_in_no_name_still_blocks():
+    # a screen beside the hand blocks the path round the one obstacle in front; it is behind the hand, so no name contains it
+    screen = [[-0.012, 0.02 + 0.02 * k] for k in range(20)]
+    obstacles = make_obstacles([[0.1, 0.0], *screen], [0.05] + [0.012] * 20)
+    found = find(obstacles)
+    assert {one.label for one in found.candidates} == {'goal0:+0', 'goal0:-0'}
+    for one in found.candidates:
+        apart = np.hypot(*(one.guess[:, None] - obstacles.centre).transpose(2, 0, 1)) - obstacles.radius - 0.005
+        assert apart.min() > -1e-6
+
+
+def test_the_search_ends_at_the_largest_number_of_states_and_says_so(monkeypatch):
+    obstacles = crowd(3, 30, 0.03, 0.15)
+    whole = find(obstacles, velocity=VELOCITY, k=32)
+    monkeypatch.setattr(scene, 'STATES', 100)
+    monkeypatch.setattr(scene, 'STATES_PER_CANDIDATE', 0)
+    few = find(obstacles, velocity=VELOCITY, k=32)
+    assert few.notes == {'search_cut': 1} and 0 < len(few.candidates) < len(whole.candidates)
+    assert [one.label for one in few.candidates] == [one.label for one in whole.candidates][: len(few.candidates)]
+
+
+@pytest.mark.parametrize('seed', range(10))
+def test_guesses_are_as_smooth_as_hands_on_exact_paths(seed):
+    rng = np.random.default_rng(seed)
+    for one in find(random_scene(rng, int(rng.integers(1, 6))), steps=50).candidates:
+        bend = np.hypot(*np.diff(one.guess, 2, axis=0).T).max() * 50**2
+        # minimum jerk on a straight line has 5.8 L / T^2; a circle of radius r adds v^2 / r
+        assert bend < 5.8 * one.length + 1.4 * (1.875 * one.length) ** 2 / 0.015
+
+
+TICKS = 400
+
+
+def count_changes(centre, radius, goals, hand=(0.0, 0.0), k=4, remember=True):
+    """How often the set of labels changes under 1 mm of noise on hand and obstacles."""
+    rng = np.random.default_rng(5)
+    centre = np.array(centre, dtype=float)
+    previous, count, last = (), 0, None
+    for _ in range(TICKS):
+        obstacles = make_obstacles(centre + rng.normal(0.0, 0.001, centre.shape), radius)
+        noisy = np.asarray(hand) + rng.normal(0.0, 0.001, 2)
+        found = find(obstacles, goals, noisy, rng.normal(0.0, 0.02, 2), k=k, previous=previous)
+        labels = {one.label for one in found.candidates}
+        count += last is not None and labels != last
+        previous, last = found.candidates if remember else (), labels
+    return count
+
+
+@pytest.mark.parametrize(
+    ('centre', 'radius', 'k'),
+    [
+        pytest.param([(0.0, 0.05), (0.15, 0.0)], 0.02, 4, id='obstacle abeam of the hand'),
+        pytest.param([(0.15, 0.035), (0.15, -0.035)], 0.03, 4, id='gap about to close'),
+        pytest.param([(0.08, 0.0), (0.15, 0.0), (0.22, 0.0)], 0.02, 3, id='room for one of two equally long classes'),
+    ],
+)
+def test_candidates_stay_under_noise(centre, radius, k):
+    loose = count_changes(centre, radius, (0.3, 0.0), k=k, remember=False)
+    assert loose > 100, 'the scene is no test'
+    assert count_changes(centre, radius, (0.3, 0.0), k=k) <= 8
+
+
+def test_a_clearly_better_class_replaces_one_that_was_there():
+    centre, radius = np.array([[0.1, 0.0], [0.2, 0.05], [0.2, -0.05]]), 0.02
+    before = find(make_obstacles(centre, radius), (0.3, 0.0), k=2)
+    moved = make_obstacles(centre + np.array([0.0, 0.06]), radius)
+    after = find(moved, (0.3, 0.0), k=2, previous=before.candidates)
+    fresh = find(moved, (0.3, 0.0), k=2)
+    assert {one.label for one in after.candidates} == {one.label for one in fresh.candidates}
+
+
+def find_gaps(path, obstacles):
+    """Gap taken in each row, from low x, of a path upwards through rows at three heights."""
+    taken = []
+    for y in np.unique(obstacles.centre[:, 1]):
+        crossed = np.flatnonzero((path[:-1, 1] < y) & (path[1:, 1] >= y))
+        row = np.sort(obstacles.centre[obstacles.centre[:, 1] == y, 0])
+        taken.append(tuple(np.searchsorted(row, path[crossed, 0]).tolist()))
+    return tuple(taken)
+
+
+@pytest.mark.skipif(not AVOIDING.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
+@pytest.mark.parametrize('line', ['its four goals', 'one goal beyond'])
+def test_all_24_classes_of_the_avoiding_task_are_found(line):
+    obstacles, goals = avoiding()
+    found = find(obstacles, goals if line == 'its four goals' else [[0.5, 0.6]], hand=(0.525, -0.28), k=24, steps=400)
+    taken = {find_gaps(one.guess, obstacles) for one in found.candidates}
+    assert len(found.candidates) == 24 == len(taken)
+    assert all(len(row) == 1 for rows in taken for row in rows)

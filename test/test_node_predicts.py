@@ -4,13 +4,20 @@
 
 from __future__ import annotations
 
+import re
 import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import ros_required  # noqa: F401
 import numpy as np
 import pytest
-from message_helpers import SECOND, cloud, obstacle_table, pose_array
+from bag_helpers import CONFIG, messages, write_bag
+from bag_helpers import TYPES as BAG_TYPES
+from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
 from node_helpers import (
+    CROWD,
     GOALS,
     OK,
     TYPES,
@@ -22,12 +29,18 @@ from node_helpers import (
     list_labels,
     stamps,
 )
+from process_helpers import Player, ended, parameters, running
+from rclpy.serialization import deserialize_message, serialize_message
 from ros_helpers import Graph
 from std_msgs.msg import Float64
 
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.classes.library import is_same_recording
+from foc_ros.core.config import Config, flatten, replace_values
+from foc_ros.io.bags import BagReader
 from foc_ros.ros import health, node
 from foc_ros.ros.endpoints import MOST_GOAL_TOPICS
-from foc_ros.ros.messages.encode_prediction import encode_outputs
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
 
 
 def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros: Graph) -> None:
@@ -164,3 +177,141 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros: Graph) -> None:
     assert len({each.key for each in goals.values} - {'unknown', 'other'}) == MOST_GOAL_TOPICS + 2
     bench.change('deactivate', 'cleanup')
     assert not list_goal_topics(bench)
+
+
+SECONDS = 0.3
+LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
+LEARNING = {'experience.learning': 'online', 'foc.steps': 20, 'homotopy.max_candidates': 2}
+NO_LIMITS = {'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0, 'budget_s': 0.0}
+
+
+def messages_in_space() -> list[tuple[str, int, Any]]:
+    """Return a reach that goes down to a goal, over a low obstacle and past one of any height."""
+    columns = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'size_z')]
+    scene = obstacle_table([(0.15, 0.0, 0.02, 0.03, 0.04), (0.2, 0.02, 0.0, 0.02, 0.0)], columns)
+    found = []
+    for topic, stamp_ns, message in messages(SECONDS):
+        if topic == '/obstacles':
+            message = cloud(BAG_TYPES, scene, stamp_ns)
+        elif topic == '/goals':
+            message = pose_array(BAG_TYPES, [(0.3, 0.0, 0.2)])
+        else:
+            message.pose.position.z = 0.4 - 0.5 * message.pose.position.x
+        found.append((topic, stamp_ns, message))
+    return found
+
+
+CASES = {
+    'lv': (LV, lambda: messages(SECONDS)),
+    'heights': (CONFIG, messages_in_space),
+    '1 kHz': (CONFIG, lambda: messages(0.1, rate_hz=1000.0)),
+    'learning': (replace_values(Config(), LEARNING), lambda: messages(1.0)),
+}
+"""Parameters, and the messages of a recording."""
+
+
+def sent(message: Any) -> Any:
+    """Return the message after serialisation, with its float32 fields rounded."""
+    return deserialize_message(serialize_message(message), type(message))
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, case: str) -> None:
+    config, make_messages = CASES[case]
+    config = replace_values(config, NO_LIMITS)
+    bench, replay, expected = Bench(ros, **flatten(config)), Replay(config), []
+    with BagReader(write_bag(tmp_path / 'reach', make_messages())) as reader:
+        for step in replay.steps(reader):
+            bench.deliver(step.item.role, bytes(step.item.raw))
+            if step.prediction is not None:
+                obstacles = step.scene.obstacles(step.prediction.stamp_ns)
+                expected.append(encode_outputs(step.prediction, obstacles, 'xy', TYPES))
+    count = len(expected)
+    assert count > 3
+    assert max(each['prediction'].width for each in expected) == 2 * (config.foc.steps + 1)
+    for name in ('prediction', 'path', 'markers'):
+        assert bench.wait_for(name, count) == [sent(each[name]) for each in expected]
+    for received, each in zip(bench.wait_for('likelihoods', count), expected, strict=True):
+        assert received.layout == sent(each['likelihoods']).layout
+        assert np.array_equal(received.data, each['likelihoods'].data, equal_nan=True)  # of shares without a candidate
+    skipped = figures(bench.health()).get('count hand_skipped', '0')
+    assert skipped == str(replay.intake.counts.get('hand_skipped', 0))
+    assert (skipped != '0') == (case == '1 kHz')
+    live, learnt = (each.learnt.movements.finish().learnt for each in (bench.node.pipeline, replay.pipeline))
+    assert (len(live) > 0) == (case == 'learning')
+    assert all(is_same_recording(*each) for each in zip(live, learnt, strict=True))
+
+
+def test_the_case_with_heights_has_heights(tmp_path: Path) -> None:
+    """The low obstacle, number 0, is cleared, and the height and its variance change along the path."""
+    bag = write_bag(tmp_path / 'reach', messages_in_space())
+    for is_named, config in ((False, CONFIG), (True, replace_values(CONFIG, {'predict_height': False}))):
+        with BagReader(bag) as reader:
+            made = [step.prediction for step in Replay(config).steps(reader) if step.prediction is not None]
+        assert made
+        for each in made:
+            answer = encode_outputs(each, each.obstacles, 'xy', TYPES)
+            label = answer['likelihoods'].layout.dim[0].label
+            assert ('+0' in label or '-0' in label) == is_named
+            rows = np.frombuffer(bytes(answer['prediction'].data), CLOUD_ROW)
+            assert is_named or (np.ptp(rows['z']) > 0.1 and np.ptp(rows['vz']) > 0.1 and np.ptp(rows['zz']) > 1e-5)
+
+
+LIGHT = ['foc.steps:=20', 'homotopy.max_candidates:=1', 'rate_hz:=10.0', 'scene.timeout_s:=0.0', 'estimator.hand_timeout_s:=10.0']
+RELIABLE = [f'qos_overrides./{name}.subscription.reliability:=reliable' for name in ('hand_pose', 'obstacles')]
+UNTIMED = 'budget_s:=0.0'
+"""While 500,000 rows are decoded a second, a prediction on two busy cores may miss its budget."""
+
+
+@pytest.fixture
+def player(ros: Graph) -> Iterator[Player]:
+    """Yield the player of a node that knows the scene, and stop the node; its text on standard error is `errors`."""
+    made = Player(ros)
+    with running(ros, *parameters(*LIGHT, *RELIABLE, UNTIMED)) as process:
+        made.connect()
+        made.publish_scene()
+        ros.spin_until(made.is_scene_known, 'the scene')
+        made.stop = lambda: ended(process)
+        yield made
+
+
+def check(player: Player, least: int) -> None:
+    """Stop the node, and check that it took every pose, predicted often enough, and complained of nothing."""
+    player.ros.spin_until(lambda: player.figure('hand_pose refused') == f'0 of {player.sent}', 'all poses in the diagnostics')
+    assert player.stop()[0] == 0
+    stamps = [each.header.stamp.sec * SECOND + each.header.stamp.nanosec for each in player.predictions]
+    assert stamps == sorted(set(stamps))
+    assert len(stamps) + int(player.figure('dropped cycles') or 0) >= least
+    assert player.figure('count internal_errors') is None
+    told = [each for each in player.statuses if 'count predictions' in figures(each)]
+    assert told
+    # a slow machine may drop cycles
+    assert [each.message for each in told if not re.fullmatch(r'predicting|hand_superseded \d+', each.message)] == []
+
+
+def test_ten_thousand_obstacles_at_50_hz(player: Player) -> None:
+    """Every pose is received, predictions are made from the newest, and the level is OK."""
+    flood = cloud(TYPES, obstacle_table(CROWD), 10 * SECOND)
+    player.play_in_time(3.0, 100.0, lambda i: i % 2 or player.publishers['obstacles'].publish(flood))
+    check(player, 6)
+    assert len(player.predictions) > 5
+    assert player.figure('obstacles of cloud') == '10000'
+    assert int(player.figure('note culled') or 0) > 9000
+
+
+def test_poses_at_1_khz(player: Player) -> None:
+    player.play_in_time(2.0, 1000.0)
+    assert player.sent == 2000
+    check(player, 15)
+
+
+def test_bad_poses_at_1_khz_write_few_lines_to_the_log(player: Player) -> None:
+    nowhere: Any = pose_stamped(TYPES, (float('nan'), 0.0, 0.0), 10 * SECOND)
+    player.play_in_time(2.0, 0.0, lambda _: [player.publishers['hand_pose'].publish(nowhere) for _ in range(10)])
+    player.ros.spin_until(lambda: player.figure('hand_pose refused') == '2000 of 2000', 'all poses in the diagnostics')
+    code, errors = player.stop()
+    lines = [line for line in errors.splitlines() if 'expected a finite number' in line]
+    assert code == 0 and 1 <= len(lines) <= 5, f'{len(lines)} lines'
+    assert '(1 of 1 refused so far)' in lines[0]
+    assert WARN in {each.level for each in player.statuses}
+    assert player.predictions == []

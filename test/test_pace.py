@@ -4,17 +4,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from test_demonstrations import GOAL, OBSTACLES, bow
 
-from foc_ros.core.config import Config, replace_values
+from foc_ros.core.classes.library import MOST_STATES
+from foc_ros.core.config import Config, CovarianceConfig, replace_values
 from foc_ros.core.hand.duration import compute_movement_time, scale_durations
+from foc_ros.core.learning import movements as learning
+from foc_ros.core.learning.dispersion import REST_SHARE, Dispersion
 from foc_ros.core.learning.pace import Pace
+from foc_ros.core.learning.recordings import PRIOR_COUNT
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, HandSample
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import Candidate, Solution, Status
+from foc_ros.core.types import NANOSECONDS, HandSample, HandState
+from foc_ros.ros.freshness import Freshness
+from foc_ros.ros.health import Monitor
+from foc_ros.ros.intake import Intake
 
 CONFIG = replace_values(Config(), {'estimator.position_stddev': 1e-4})
-GOAL = np.array([[0.4, 0.0]])
+FAR_GOAL = np.array([[0.4, 0.0]])
 STEP_NS = NANOSECONDS // 50
 
 
@@ -24,7 +38,7 @@ def reach(duration_s: float, distance: float = 0.4) -> np.ndarray:
     return np.outer(distance * (10 * s**3 - 15 * s**4 + 6 * s**5), [1.0, 0.0])
 
 
-def follow(pipeline: Pipeline, *movements: np.ndarray, goal: np.ndarray = GOAL) -> Pipeline:
+def follow(pipeline: Pipeline, *movements: np.ndarray, goal: np.ndarray = FAR_GOAL) -> Pipeline:
     """Pass movements, and back to the start in between by a jump of time, to a pipeline."""
     for positions in movements:
         pipeline.set_goals(goal, 'world')
@@ -63,7 +77,7 @@ def test_without_a_movement_nothing_changes() -> None:
 def test_the_present_movement_counts_by_the_distance_that_it_has_covered() -> None:
     slow, pipeline, found = reach(4.0), Pipeline(CONFIG), [1.0]
     for row, position in enumerate(slow[:130]):
-        pipeline.set_goals(GOAL, 'world')
+        pipeline.set_goals(FAR_GOAL, 'world')
         pipeline.add_hand_sample(HandSample(NANOSECONDS + row * STEP_NS, position, 0.0, 'world'))
         found.append(pipeline.learnt.pace.find_best(CONFIG.duration)[1])
     assert pipeline.learnt.pace.movements == 0 and found[40] == 1.0 and found[-1] > 1.5
@@ -89,3 +103,217 @@ def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:
     assert pipeline.learnt.pace.movements > 0
     pipeline.reconfigure(pipeline.adapted_config)
     assert pipeline.learnt.pace.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
+
+
+STDDEV = 0.02
+FIXED = {'duration.adaptation': 'none'}
+DISPERSION_CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4} | FIXED)
+
+
+def make_candidate(likelihood: float = 1.0, duration_s: float = 2.0, place: Sequence[float] = (0.0, 0.0)) -> PredictedCandidate:
+    """Return a candidate that stays at a place with a standard deviation of `STDDEV` along each axis."""
+    mean, covariance = np.zeros((9, 6)), np.tile(STDDEV**2 * np.eye(6), (9, 1, 1))
+    mean[:, :2] = place
+    solution = Solution(Status.SOLVED, '', duration_s / 8.0, mean, covariance, np.zeros((8, 2)), 1.0, {}, 0.0, 0.0, 1.0)
+    return PredictedCandidate(Candidate('goal0', 0, (), mean[:, :2], 0.0), solution, {}, 1.0, likelihood)
+
+
+def place_hand(stamp_ns: int, position: Sequence[float]) -> HandState:
+    """Return a moving hand at a position."""
+    mean = np.array([*position, 0.0, 0.0, 0.0, 0.0])
+    return HandState(stamp_ns, mean, np.eye(6), onset_ns=0, onset_position=np.zeros(2))
+
+
+def judge(ahead_s: float, factor: float, duration_s: float, count: int = 60) -> Dispersion:
+    """Return what is learnt if the hand is beside the candidate by `factor` standard deviations in 2D some time later."""
+    generator, dispersion, candidates = np.random.default_rng(3), Dispersion(), [make_candidate(duration_s=duration_s)]
+    for position in factor * STDDEV * generator.standard_normal((count, 2)):
+        dispersion = dispersion.interrupt().follow(place_hand(0, (0.0, 0.0))).add(0, candidates, CovarianceConfig())
+        due = [replace(each, count=1.0) for each in dispersion.forecasts if each.due_ns == round(ahead_s * NANOSECONDS)]
+        dispersion = replace(dispersion, forecasts=tuple(due))
+        dispersion = dispersion.follow(place_hand(round(ahead_s * NANOSECONDS), position))
+    return dispersion
+
+
+@pytest.mark.parametrize('factor', [0.25, 3.0])
+@pytest.mark.parametrize(('ahead_s', 'duration_s', 'share'), [(0.25, 10.0, 0.025), (1.0, 2.0, 0.5), (1.0, 0.8, 1.0)])
+def test_the_factor_of_gaussian_errors_is_recovered(factor: float, ahead_s: float, duration_s: float, share: float) -> None:
+    dispersion = judge(ahead_s, factor, duration_s)
+    assert dispersion.errors == 60
+    near, far = dispersion.factors
+    assert near ** (1.0 - share) * far**share == pytest.approx(factor, rel=0.15)
+    if share == 1.0:
+        assert near == pytest.approx(1.0, abs=0.1)
+
+
+def reach_around(pipeline: Pipeline, start_s: float, until_s: float = 1.6) -> list[Prediction]:
+    """Pass a reach_around around an obstacle through a pipeline that predicts; return the predictions."""
+    pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03, 0.001), int(start_s * NANOSECONDS), 'world')
+    pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
+    made = []
+    for t in np.arange(0.0, until_s, 0.05):
+        s = np.clip((t - 0.3) / 0.8, 0.0, 1.0)
+        x = 0.3 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+        stamp_ns = int((start_s + t) * NANOSECONDS)
+        pipeline.add_hand_sample(HandSample(stamp_ns, np.array([x, 0.06 * np.sin(np.pi * x / 0.3)]), 0.0, 'world'))
+        prediction = pipeline.predict() if pipeline.is_due else None
+        made += [prediction] if prediction is not None else []
+    return made
+
+
+def test_factors_scale_the_covariance_and_nothing_else() -> None:
+    off = {'covariance.adaptation': 'none'}
+    plain = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off)), 1.0)
+    scaled = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off | {'covariance.near': 2.0, 'covariance.far': 2.0})), 1.0)
+    assert len(plain) == len(scaled) > 10
+    at_rest = list[bool]()
+    for one, other in zip(plain, scaled, strict=True):
+        for before, after in zip(one.candidates, other.candidates, strict=True):
+            at_rest.append(bool(after.covariance[0, 0, 0] < 3.9 * before.covariance[0, 0, 0]))
+            factors = 2.0 ** np.linspace(REST_SHARE if at_rest[-1] else 1.0, 1.0, len(after.mean))
+            np.testing.assert_allclose(after.covariance, factors[:, None, None] ** 2 * before.covariance, rtol=1e-12)
+            np.testing.assert_array_equal(after.mean, before.mean)
+            np.testing.assert_array_equal(after.motor_covariance, before.motor_covariance)
+            assert after.likelihood == before.likelihood
+    assert at_rest[0] and at_rest[-1] and not all(at_rest), 'the hand rests before and after the reach'
+
+
+def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off() -> None:
+    pipeline = Pipeline(DISPERSION_CONFIG)
+    reach_around(pipeline, 1.0)
+    assert (
+        pipeline.adapted_config.covariance
+        == pipeline.learnt.dispersion.adapt(DISPERSION_CONFIG.covariance)
+        != DISPERSION_CONFIG.covariance
+    )
+    pipeline.reconfigure(replace_values(DISPERSION_CONFIG, {'rate_hz': 20.0}))
+    assert pipeline.learnt.dispersion.errors > 0
+    pipeline.reconfigure(replace_values(DISPERSION_CONFIG, {'foc.endpoint_stddev': 0.1}))
+    assert pipeline.learnt.dispersion.errors == 0
+    reach_around(pipeline, 11.0)
+    pipeline.reset()
+    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config.covariance == DISPERSION_CONFIG.covariance
+    off = replace_values(DISPERSION_CONFIG, {'covariance.adaptation': 'none'})
+    pipeline = Pipeline(off)
+    reach_around(pipeline, 1.0)
+    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config is off
+
+
+MOVEMENT_CONFIG = Config().with_values(
+    {'experience.learning': 'online', 'rate_hz': 4.0, 'foc.steps': 20, 'estimator.position_stddev': 1e-4}
+)
+STEP_S = 0.01
+ABOVE, BELOW = bow(0.03), bow(-0.03)
+TURNS = [0.1, 0.0] - 0.2 * np.column_stack([each(np.pi * np.linspace(0.0, 11.0, 400)) for each in (np.cos, np.sin)])
+"""A circle through the goal, around which a path goes five and a half times."""
+
+
+def move_along(path: np.ndarray, seconds: float = 1.5, rest_s: float = 0.4, after_s: float = 0.4) -> np.ndarray:
+    """Return positions at 100 Hz of a minimum-jerk movement along a path, at rest before and after."""
+    s = np.clip((np.arange(0.0, seconds + rest_s + after_s, STEP_S) - rest_s) / seconds, 0.0, 1.0)
+    along, at = 10 * s**3 - 15 * s**4 + 6 * s**5, np.linspace(0.0, 1.0, len(path))
+    return np.column_stack([np.interp(along, at, axis) for axis in path.T])
+
+
+def follow_paths(pipeline: Pipeline, *paths: np.ndarray, goals: np.ndarray = GOAL, is_predicting: bool = False) -> list:
+    """Pass movements to a pipeline, with a gap in time before each; return the predictions."""
+    predictions = []
+    for positions in paths:
+        pipeline.set_obstacles('cloud', OBSTACLES, None, 'world')
+        pipeline.set_goals(goals, 'world')
+        start_ns = (0 if pipeline.hand_state is None else pipeline.hand_state.stamp_ns) + 2 * NANOSECONDS
+        for row, position in enumerate(positions):
+            pipeline.add_hand_sample(HandSample(start_ns + round(row * STEP_S * NANOSECONDS), position, 0.0, 'world'))
+            if is_predicting and pipeline.is_due:
+                predictions.append(pipeline.predict())
+    return predictions
+
+
+def likelihood_above(prediction) -> float:
+    return sum(each.likelihood for each in prediction.candidates if dict(each.candidate.sides).get(OBSTACLES.ids[0]) == 1)
+
+
+def test_a_repeated_way_becomes_more_likely() -> None:
+    ways = [move_along(ABOVE)] * 4
+    first, last = [], []
+    for learning_ in ('none', 'online'):
+        pipeline = Pipeline(MOVEMENT_CONFIG.with_values({'experience.learning': learning_, 'likelihood.other_goal': 0.0}))
+        predicted = follow_paths(pipeline, *ways, is_predicting=True)
+        of_each = len(predicted) // len(ways)
+        first.append(likelihood_above(predicted[0]))
+        last.append(likelihood_above(predicted[3 * of_each]))
+    assert first[0] == first[1], 'nothing is known before the first movement'
+    prior = PRIOR_COUNT
+    assert last[1] == pytest.approx((prior * last[0] + 3.0) / (prior + 3.0), abs=0.02)
+
+
+def test_a_movement_is_learnt_when_it_has_ended() -> None:
+    pipeline, path = Pipeline(MOVEMENT_CONFIG), move_along(ABOVE, after_s=2.0)
+    ended = round((0.4 + 1.5) / STEP_S)
+    follow_paths(pipeline, path[:ended])
+    assert not pipeline.learnt.movements.learnt
+    pipeline = Pipeline(MOVEMENT_CONFIG)
+    follow_paths(pipeline, path)
+    (found,) = pipeline.learnt.movements.learnt
+    assert found.states is not None
+    around = np.hypot(*(found.states[-1, :2] - GOAL[0])), np.hypot(*found.states[0, :2])
+    assert max(around) < 0.005
+    assert len(found.states) == pytest.approx((0.4 + 1.5 + learning.AROUND_S) / learning.STEP_S, abs=8)
+
+
+def test_a_rest_on_the_way_is_part_of_a_movement_and_one_at_a_goal_ends_it() -> None:
+    halfway = ABOVE[: len(ABOVE) // 2 + 1]
+    paused = np.concatenate([move_along(halfway, after_s=0.1), move_along(ABOVE[len(ABOVE) // 2 :], rest_s=0.1)[1:]])
+    pipeline = Pipeline(MOVEMENT_CONFIG)
+    follow_paths(pipeline, paused, paused[:2])
+    (found,) = pipeline.learnt.movements.learnt
+    assert np.hypot(*found.path[0]) < 0.01
+    there_and_back = np.concatenate([move_along(ABOVE), move_along(ABOVE[::-1])[1:]])
+    pipeline = Pipeline(MOVEMENT_CONFIG)
+    follow_paths(pipeline, there_and_back, paused[:2], goals=np.array([[0.3, 0.0], [0.0, 0.0]]))
+    there, back = pipeline.learnt.movements.learnt
+    assert np.hypot(*(there.path[-1] - [0.3, 0.0])) == 0.0 and np.hypot(*back.path[-1]) == 0.0
+    assert there.sides == tuple(-side for side in back.sides)
+
+
+@pytest.mark.parametrize(
+    ('path', 'goals', 'reason'),
+    [
+        (move_along(0.7 * ABOVE), GOAL, 'm from the nearest'),
+        (move_along(0.1 * ABOVE, seconds=0.4), np.array([[0.03, 0.0]]), 'at least 0.05 m'),
+        (move_along(TURNS, seconds=25.0), GOAL, 'at most 19 s'),
+        (move_along(ABOVE), np.zeros((0, 2)), 'without goals'),
+    ],
+    ids=['no goal reached', 'short', 'long', 'no goals'],
+)
+def test_what_is_no_demonstration_is_refused(path: np.ndarray, goals: np.ndarray, reason: str) -> None:
+    pipeline = Pipeline(MOVEMENT_CONFIG)
+    follow_paths(pipeline, path, goals=goals)
+    movements = pipeline.learnt.movements.finish()
+    assert not movements.learnt and movements.refused == 1 and reason in movements.refusal
+    assert len(movements.states) <= MOST_STATES
+
+
+def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library() -> None:
+    given = follow_one(ABOVE)
+    for forget in (Pipeline.reset, lambda each: each.reconfigure(MOVEMENT_CONFIG.with_values({'estimator.jerk_density': 3.0}))):
+        pipeline = Pipeline(MOVEMENT_CONFIG, [given])
+        follow_paths(pipeline, move_along(BELOW), np.zeros((2, 2)))
+        assert len(pipeline.learnt.movements.learnt) == 1 and len(pipeline._library.recordings) == 2
+        pipeline.reconfigure(MOVEMENT_CONFIG.with_values({'rate_hz': 5.0, 'likelihood.beta': 3.0}))
+        assert len(pipeline.learnt.movements.learnt) == 1
+        forget(pipeline)
+        assert not pipeline.learnt.movements.learnt and pipeline._library.recordings == (given,)
+
+
+def follow_one(path: np.ndarray):
+    pipeline = Pipeline(MOVEMENT_CONFIG)
+    follow_paths(pipeline, move_along(path), np.zeros((2, 2)))
+    return pipeline.learnt.movements.learnt[0]
+
+
+def test_the_diagnostics_count_movements() -> None:
+    intake = Intake(Pipeline(MOVEMENT_CONFIG))
+    follow_paths(intake.pipeline, move_along(ABOVE), move_along(0.7 * BELOW), np.zeros((2, 2)))
+    health = Monitor(intake, Freshness(), 0.0).report(1.0, 'active', None, 0.0, [])
+    assert any('1 movements recorded, 1 refused' in value for value in health.values.values())

@@ -2,19 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """What pip and colcon install: consistent metadata, and every file that the program needs."""
 
+import json
 import os
 import re
 import runpy
 import shutil
 import subprocess
 import sys
+import tomllib
 import xml.etree.ElementTree as ET
 import zipfile
 from email.parser import HeaderParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
+from test_optional_packages import read_requirements
 
 import foc_ros
 from foc_ros.cli.main import list_commands
@@ -139,3 +143,273 @@ def test_no_file_contains_a_path_of_one_machine() -> None:
         file = ROOT / name
         if file.is_file() and file.suffix not in ('.png', '.mcap') and file != Path(__file__):
             assert not wrong.search(file.read_bytes()), f'{name} contains a path of one machine'
+
+
+PIXI = tomllib.loads((ROOT / 'pixi.toml').read_text('utf-8'))
+CONDA = {'matplotlib-base': 'matplotlib'}
+"""Packages whose names on conda-forge differ."""
+
+
+def read_yaml(name: str) -> Any:
+    return yaml.safe_load((ROOT / name).read_text('utf-8'))
+
+
+def test_pixi_names_the_package_the_channels_and_the_platforms() -> None:
+    workspace, package = PIXI['workspace'], ET.parse(ROOT / 'package.xml').getroot()
+    assert {key: workspace[key] for key in ('name', 'version', 'license', 'description')} == {
+        key: package.findtext(key) for key in ('name', 'version', 'license', 'description')
+    }
+    assert workspace['version'] == foc_ros.__version__
+    assert workspace['channels'] == ['robostack-jazzy', 'conda-forge'], 'RoboStack has to come first'
+    assert workspace['platforms'] == ['linux-64', 'linux-aarch64', 'osx-arm64']
+
+
+def test_pixi_has_every_ros_package_of_package_xml() -> None:
+    keys = {node.text for node in ET.parse(ROOT / 'package.xml').getroot().findall('exec_depend')}
+    wanted = {f'ros-jazzy-{key.replace("_", "-")}' for key in keys if not key.startswith('python3-')}
+    found = {name for name in PIXI['dependencies'] if name.startswith('ros-jazzy-')}
+    assert wanted <= found
+    assert {name for name in found - wanted if not name.startswith('ros-jazzy-ros2')} == set(), 'not a command line of ROS'
+
+
+def test_pixi_has_the_python_packages_of_setup_py() -> None:
+    """Those of conda-forge are requirements with the same bounds; all others are installed with foc_ros itself."""
+    text = (ROOT / 'setup.py').read_text('utf-8')
+    bounds = {name.lower(): bound for name, bound in re.findall(r"'([\w-]+)(>=[\d.]+)'", text)}
+    (package,) = PIXI['pypi-dependencies'].values()
+    assert package['path'] == '.' and not package.get('editable'), 'ros2 run finds nothing in an editable installation'
+    required = read_requirements()
+    names = required[''].union(*(required[extra] for extra in package['extras']))
+    for name, bound in PIXI['dependencies'].items():
+        if name == 'python':
+            assert f"python_requires='{bound}'" in text
+        elif not name.startswith('ros-'):
+            assert CONDA.get(name, name) in names
+            assert bound == bounds[CONDA.get(name, name)], name
+
+
+def test_the_tasks_of_pixi_are_commands() -> None:
+    from foc_ros.cli.main import list_commands
+
+    for task in PIXI['tasks'].values():
+        program, command = task.split()
+        assert program == 'foc_ros' and command in list_commands()
+    launch = PIXI['feature']['rviz']['tasks']['show'].split()
+    assert launch[:3] == ['ros2', 'launch', 'foc_ros'] and (ROOT / 'launch' / launch[3]).exists()
+
+
+def test_the_workflow_runs_what_decides_over_a_change() -> None:
+    jobs = read_yaml('.github/workflows/ci.yml')['jobs']
+    assert {'run': '.ci/run'} in jobs['all']['steps']
+    assert (ROOT / '.ci' / 'run').stat().st_mode & 0o111
+    image = re.fullmatch(r'python:(3\.\d+)-\w+', jobs['all']['container'])
+    versions = {image[1], *jobs['check']['strategy']['matrix']['python']}
+    setup = (ROOT / 'setup.py').read_text('utf-8')
+    assert versions == set(re.search(r'for version in \((.*?)\)', setup)[1].replace("'", '').split(', '))
+    first, *_, last = sorted(versions)
+    assert f'Python {first} to {last}' in (ROOT / 'Makefile').read_text('utf-8')
+
+
+@pytest.mark.parametrize('name', ['bug', 'wish'])
+def test_a_template_of_an_issue_asks_for_something(name: str) -> None:
+    form = read_yaml(f'.github/ISSUE_TEMPLATE/{name}.yml')
+    assert form['name'] and form['description']
+    fields = [field for field in form['body'] if field['type'] != 'markdown']
+    assert any(field.get('validations', {}).get('required') for field in fields)
+    assert len({field['id'] for field in fields}) == len(fields)
+
+
+def test_the_hooks_are_those_of_make_lint() -> None:
+    (repository,) = read_yaml('.pre-commit-config.yaml')['repos']
+    assert repository['repo'] == 'local'
+    hooks = {hook['entry'].replace(' --force-exclude', '') for hook in repository['hooks']}
+    recipe = re.search(r'^lint:.*\n((?:\t.*\n)+)', (ROOT / 'Makefile').read_text('utf-8'), re.MULTILINE)[1]
+    assert hooks == {line.strip().replace('$(BIN)', '.venv/bin') for line in recipe.splitlines()}
+
+
+pytestmark = pytest.mark.skipif(shutil.which('make') is None, reason='make is not installed')
+
+
+@pytest.fixture
+def clone(tmp_path: Path) -> Path:
+    """Return a folder with the files that `make setup` reads."""
+    folder = tmp_path / 'clone'
+    folder.mkdir()
+    for name in ('Makefile', 'setup.py', 'setup.cfg', 'pyproject.toml'):
+        shutil.copy(ROOT / name, folder)
+    return folder
+
+
+def make(clone: Path, *arguments: str, path: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run make; path: a folder in which programs are found first."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(('MAKE', 'MFLAGS', 'VIRTUAL_ENV'))}
+    environment['PATH'] = os.pathsep.join([*([] if path is None else [str(path)]), environment['PATH']])
+    command = ['make', '--no-print-directory', *arguments]
+    return subprocess.run(command, cwd=clone, env=environment, capture_output=True, text=True, timeout=100, check=False)
+
+
+def write_program(file: Path, text: str) -> Path:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(f'#!/bin/sh\n{text}\n')
+    file.chmod(0o755)
+    return file
+
+
+def test_a_python_that_is_not_there_is_named(clone: Path) -> None:
+    result = make(clone, 'setup', 'PYTHON=no_such_python')
+    assert result.returncode != 0
+    assert 'make: there is no no_such_python; choose another, as in make setup PYTHON=python3.12\n' in result.stderr
+    assert not (clone / '.venv').exists()
+
+
+def test_an_inactive_shim_of_pyenv_is_named_with_what_to_do(clone: Path, tmp_path: Path) -> None:
+    shim = write_program(tmp_path / 'shims' / 'python3.99', 'exit 127')
+    write_program(tmp_path / 'shims' / 'pyenv', 'echo 3.99.1')
+    result = make(clone, 'setup', 'PYTHON=python3.99', path=shim.parent)
+    assert result.returncode != 0
+    words = 'make: python3.99 is a shim of pyenv, and no active version has it; activate one that has: pyenv shell 3.99.1\n'
+    assert words in result.stderr
+    assert not (clone / '.venv').exists()
+
+
+def test_an_old_python_is_refused_before_anything_is_made(clone: Path, tmp_path: Path) -> None:
+    old = write_program(tmp_path / 'bin' / 'python3', 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.10.2;; esac')
+    result = make(clone, 'setup', f'PYTHON={old}')
+    assert result.returncode != 0
+    assert f'make: foc_ros needs Python 3.11 to 3.14, and {old} is Python 3.10.2; choose another' in result.stderr
+    assert not (clone / '.venv').exists()
+
+
+def list_recipe(clone: Path, target: str) -> str:
+    """Return what a target would run."""
+    result = make(clone, '--dry-run', target)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_it_says_what_it_does(clone: Path) -> None:
+    told = re.findall(r'echo [\'"](setup: \w+)', list_recipe(clone, 'setup'))
+    assert told == ['setup: creating', 'setup: installing', 'setup: ready']
+    assert 'setup: ready; next: make demo' in list_recipe(clone, 'setup')
+
+
+def test_linters_and_peers_are_installed_by_their_targets_only(clone: Path) -> None:
+    extras = {target: re.findall(r"'\.\[([\w,]+)\]'", list_recipe(clone, target)) for target in ('setup', 'lint', 'doc', 'bench')}
+    setup = 'ros,report,play,test'
+    assert extras == {'setup': [setup], 'lint': [setup, 'lint'], 'doc': [setup, 'doc'], 'bench': [setup, 'bench']}
+
+
+COMMANDS = ['make setup', 'make demo']
+
+
+def parse_dockerfile() -> list[dict[str, str]]:
+    dockerfile_parse = pytest.importorskip('dockerfile_parse', reason='dockerfile-parse is not installed')
+    parser = dockerfile_parse.DockerfileParser(str(ROOT / 'Dockerfile'), cache_content=True, env_replace=False)
+    return [each for each in parser.structure if each['instruction'] != 'COMMENT']
+
+
+def test_the_readme_starts_the_demo_by_two_commands() -> None:
+    section = (ROOT / 'README.md').read_text('utf-8').partition('## Try it')[2]
+    assert re.search(r'```console\n(.*?)```', section, re.DOTALL).group(1).splitlines() == COMMANDS
+
+
+def test_the_image_is_built_and_started_by_the_same_commands() -> None:
+    instructions = parse_dockerfile()
+    assert [each['instruction'] for each in instructions] == ['FROM', 'RUN', 'WORKDIR', 'COPY', 'RUN', 'CMD']
+    assert re.fullmatch(r'python:3\.1[12]-slim-bookworm', instructions[0]['value'])
+    assert instructions[4]['value'] == COMMANDS[0]
+    assert ' '.join(json.loads(instructions[5]['value'])) == COMMANDS[1]
+
+
+def test_the_development_container_runs_the_same_commands() -> None:
+    container = json.loads((ROOT / '.devcontainer' / 'devcontainer.json').read_text('utf-8'))
+    assert [container['postCreateCommand'], container['postAttachCommand']] == COMMANDS
+    assert re.fullmatch(r'mcr\.microsoft\.com/devcontainers/python:3\.1[12]-bookworm', container['image'])
+    assert set(container) == {'name', 'image', 'postCreateCommand', 'postAttachCommand'}
+
+
+HEADER = ['SPDX-FileCopyrightText: 2026 the foc_ros developers', 'SPDX-License-Identifier: Apache-2.0']
+COMMENTS = {'.py': '#', '.sh': '#', '.js': '//', '': '#'}
+"""How a comment begins, by the ending of the file; without one, only what begins with `#!` is a source."""
+
+
+def list_sources() -> list[Path]:
+    """Return the sources that git knows; a link to another file is none."""
+    listed = subprocess.run(['git', 'ls-files', '-z', '--cached'], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode:
+        pytest.skip('not a git checkout: the list of files is unknown')
+    files = [ROOT / name for name in listed.stdout.split('\0') if name]
+    files = [file for file in files if file.suffix in COMMENTS and file.is_file() and not file.is_symlink()]
+    return [file for file in files if file.suffix or file.read_bytes()[:2] == b'#!']
+
+
+def test_every_source_begins_with_its_licence() -> None:
+    sources = list_sources()
+    assert {'setup.py', 'run', 'player.js', 'colcon_check', '__main__.py'} <= {file.name for file in sources}
+    for file in sources:
+        lines = [line for line in file.read_text('utf-8').splitlines()[:3] if not line.startswith('#!')]
+        header = [f'{COMMENTS[file.suffix]} {line}' for line in HEADER]
+        assert lines[:2] == header, f'{file.relative_to(ROOT)} does not begin with {HEADER}'
+
+
+BLOCKED = ('rclpy', 'ament_index_python', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs')
+
+BLOCK = f"""
+import sys
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        root = name.partition('.')[0]
+        if root in BLOCKED or root.endswith('_msgs'):
+            raise ModuleNotFoundError(f'{{name}} is blocked', name=name)
+
+BLOCKED = {{*{BLOCKED!r}}}
+sys.meta_path.insert(0, Blocker())
+"""
+
+IMPORT_ALL = """
+import importlib, pkgutil
+import foc_ros.core
+names = [module.name for module in pkgutil.walk_packages(foc_ros.core.__path__, 'foc_ros.core.')]
+for name in names:
+    importlib.import_module(name)
+assert 'foc_ros.core.predict' in names, names
+"""
+
+PREDICT = """
+import numpy as np
+from foc_ros.core.config import Config
+from foc_ros.core.tracks import NO_TRACKS
+from foc_ros.core.predict import predict
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.types import HandState
+hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
+scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)
+prediction, _ = predict(Config(), hand, scene, np.array([[0.3, 0.0]]), NO_TRACKS)
+sides = sorted(outcome.sides['0'] for outcome in prediction.solved_candidates)
+assert sides == [-1, 1], sides
+"""
+
+
+def run(program: str, *blocked: str) -> subprocess.CompletedProcess[str]:
+    """Run a program in a Python in which ROS and the packages `blocked` cannot be imported."""
+    block = BLOCK + f'BLOCKED |= {set(blocked)!r}\n' if blocked else BLOCK
+    return subprocess.run([sys.executable, '-c', block + program], capture_output=True, text=True, timeout=100, check=False)
+
+
+def test_core_imports_and_predicts_without_ros_and_rosbags() -> None:
+    result = run(IMPORT_ALL + PREDICT, 'rosbags', 'rich', 'matplotlib')
+    assert result.returncode == 0, result.stderr
+
+
+def test_replay_runs_without_ros(tmp_path: Path) -> None:
+    (tmp_path / 'slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}', 'utf-8')
+    program = f"""
+from foc_ros.cli.main import main
+from importlib.resources import files
+bag = files('foc_ros') / 'recordings' / 'reaching.mcap'
+sys.exit(main(['replay', str(bag), '--params', {str(tmp_path / 'slow.yaml')!r}, '--json']))
+"""
+    result = run(program)
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)['summary']['predictions'] >= 20

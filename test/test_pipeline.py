@@ -2,9 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pipeline: when a prediction is due, what is rejected and why, and that no outdated input is used as a new one."""
 
+import math
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
+from bag_helpers import CONFIG as BAG_CONFIG
+from bag_helpers import messages, write_bag
+from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 
+from foc_ros.analysis.replay import Replay
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
@@ -15,6 +23,8 @@ from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState
+from foc_ros.io.bags import BagReader
+from foc_ros.ros.intake import Intake
 
 START = 1000 * NANOSECONDS
 MS = NANOSECONDS // 1000
@@ -196,3 +206,170 @@ def test_a_prediction_that_was_begun_before_an_event_is_neither_returned_nor_rem
     pipeline.add_hand_sample(hand(100.0))
     assert pipeline.is_due and pipeline.predict() is not None
     assert recorder.calls[0][4].stamp_ns is None
+
+
+TYPES = message_types('rosbags')
+
+
+@pytest.fixture
+def intake() -> Intake:
+    return Intake(Pipeline(replace_values(Config(), {'scene.marker_radius_stddev': 0.004})))
+
+
+def move(intake: Intake, seconds: float, frame_id: str = 'world') -> SampleStatus | None:
+    return intake.take('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.2), round(seconds * SECOND), frame_id))
+
+
+def show(intake: Intake, *markers: Any) -> SampleStatus | None:
+    return intake.take('obstacle_markers', marker_array(TYPES, *markers))
+
+
+def seen(intake: Intake) -> tuple[str, ...]:
+    state = intake.pipeline.hand_state
+    assert state is not None
+    return intake.pipeline.scene.obstacles(state.stamp_ns).ids
+
+
+def test_every_input_reaches_the_pipeline(intake: Intake) -> None:
+    assert move(intake, 1.0) is SampleStatus.ACCEPTED
+    assert intake.sample is not None and intake.sample.height == 0.2
+    assert intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)]))) is SampleStatus.ACCEPTED
+    assert show(intake, marker(TYPES, (0.3, 0.1, 0.0), id=5)) is SampleStatus.ACCEPTED
+    assert seen(intake) == ('0', 'a/5')
+    assert intake.pipeline.scene.obstacles(SECOND).radius_stddev.tolist() == [0.0, 0.004]
+    assert intake.take('goals', pose_array(TYPES, [(0.3, 0.0, 0.0), (0.3, 0.1, 0.0)])) is SampleStatus.ACCEPTED
+    assert intake.pipeline.scene.goals.tolist() == [[0.3, 0.0], [0.3, 0.1]]
+    assert intake.take('goal_pose', pose_stamped(TYPES, (0.4, 0.0, 0.0))) is SampleStatus.ACCEPTED
+    assert intake.pipeline.scene.goals.tolist() == [[0.4, 0.0]]
+    assert intake.counts == {} and intake.last_refusal is None
+
+
+def test_a_marker_expires_by_the_stamp_of_the_hand(intake: Intake) -> None:
+    move(intake, 1.0)
+    show(intake, marker(TYPES, id=1, lifetime=0.5), marker(TYPES, id=2))
+    for seconds, expected in ((1.1, ('a/1', 'a/2')), (1.4, ('a/1', 'a/2')), (1.6, ('a/2',))):
+        move(intake, seconds)
+        assert seen(intake) == expected
+
+
+def test_markers_of_publishers_with_different_delays_are_all_used(intake: Intake) -> None:
+    move(intake, 1.0)
+    for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
+        assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is SampleStatus.ACCEPTED
+    assert seen(intake) == ('a/0', 'b/0', 'c/0')
+    assert intake.pipeline.scene.sources['markers'].stamp_ns == SECOND
+
+
+def test_a_table_that_never_held_a_marker_is_no_source(intake: Intake) -> None:
+    """One that did, and holds none any more, is an empty scene."""
+    move(intake, 1.0)
+    nothing = marker(TYPES, action=3, ns='', frame_id='')
+    for message in ((), (nothing,)):
+        assert show(intake, *message) is SampleStatus.ACCEPTED
+        assert intake.pipeline.scene.sources == {}
+    show(intake, marker(TYPES))
+    assert seen(intake) == ('a/0',)
+    assert show(intake, nothing) is SampleStatus.ACCEPTED
+    assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
+
+
+def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake: Intake) -> None:
+    move(intake, 1.0)
+    show(intake, marker(TYPES, id=1, lifetime=5.0))
+    intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)])))
+    intake.remove_source('markers')
+    assert seen(intake) == ('0',)
+    move(intake, 1.1)
+    assert seen(intake) == ('0',), 'the markers do not come back with the next pose'
+    show(intake, marker(TYPES, id=2))
+    assert seen(intake) == ('0', 'a/2')
+    intake.remove_source('cloud')
+    assert seen(intake) == ('a/2',)
+
+
+def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:
+    """They are received before the hand pose that fixes another working frame."""
+    show(intake, marker(TYPES, id=1, frame_id='camera'))
+    move(intake, 1.0)
+    assert intake.counts == {'obstacles_wrong_frame': 1}
+    assert show(intake, marker(TYPES, id=2)) is SampleStatus.ACCEPTED
+    assert seen(intake) == ('a/2',)
+    assert show(intake, marker(TYPES, id=3, frame_id='camera')) is None
+    assert seen(intake) == ('a/2',) and "expected 'world'" in intake.last_refusal
+
+
+POSE_MS = SECOND // 1000
+A, S, R = SampleStatus.ACCEPTED, SampleStatus.SKIPPED, SampleStatus.RESTARTED_BACKWARD
+
+
+def pose(ms: float, x: float = 0.0, frame_id: str = 'world') -> Any:
+    return pose_stamped(TYPES, (x, 0.0, 0.1), 10 * SECOND + round(ms * POSE_MS), frame_id)
+
+
+@pytest.mark.parametrize(
+    ('interval_s', 'stamps_ms', 'expected'),
+    [
+        pytest.param(0.0035, (0, 1, 2, 3, 4, 5, 6, 7, 8), (A, S, S, S, A, S, S, S, A), id='1 kHz'),
+        pytest.param(0.0035, (0, 4, 8.2, 11.7, 16), (A, A, A, A, A), id='250 Hz with jitter'),
+        pytest.param(0.003, (0, 0, 1, 1, -1, 3), (A, SampleStatus.DUPLICATE, S, S, SampleStatus.LATE, A), id='out of order'),
+        pytest.param(0.003, (0, 1, -2000, -1999, -1997), (A, S, R, S, A), id='a jump back'),
+        pytest.param(0.003, (0, 1000, 1001), (A, SampleStatus.RESTARTED_GAP, S), id='a gap'),
+        pytest.param(0.0, (0, 1, 1.001), (A, A, A), id='switched off'),
+    ],
+)
+def test_poses_are_skipped_by_their_stamps(
+    interval_s: float, stamps_ms: tuple[float, ...], expected: tuple[SampleStatus, ...]
+) -> None:
+    intake = Intake(Pipeline(replace_values(Config(), {'estimator.min_interval_s': interval_s})))
+    assert tuple(intake.take('hand_pose', pose(ms)) for ms in stamps_ms) == expected
+    assert intake.counts.get('hand_skipped', 0) == expected.count(S)
+
+
+def test_only_the_stamp_of_a_skipped_pose_is_looked_at() -> None:
+    """Bad poses between good ones count as skipped; where no good one is near, they are refused with their reason."""
+    intake = Intake(Pipeline(Config()))
+    intake.take('hand_pose', pose(0))
+    state, sample = intake.pipeline.hand_state, intake.sample
+    for skipped in (pose(1, math.nan), pose(2, 0.0, 'camera'), pose(2, x=0.5)):
+        assert intake.take('hand_pose', skipped) is S
+    assert (intake.pipeline.hand_state, intake.sample, intake.last_refusal, intake.pipeline.refused) == (state, sample, None, 0)
+    assert intake.take('hand_pose', pose(3.6, math.nan)) is None
+    assert intake.last_refusal == 'hand_pose: pose.position.x: expected a finite number [m], got nan'
+    assert intake.take('hand_pose', pose(4, 0.0, 'camera')) is SampleStatus.WRONG_FRAME
+    assert intake.take('hand_pose', pose(4.5)) is A, 'a refused pose keeps no good one away'
+    wrong = pose(5)
+    wrong.header.stamp.nanosec = SECOND
+    assert intake.take('hand_pose', wrong) is None
+
+
+def test_a_publisher_in_a_wrong_frame_does_not_keep_the_right_one_away() -> None:
+    intake = Intake(Pipeline(replace_values(Config(), {'frame_id': 'world'})))
+    found = [intake.take('hand_pose', pose(2 * i, 0.0, 'camera' if i % 2 else 'world')) for i in range(100)]
+    assert found.count(A) == 50
+
+
+def predict(bag: Path, config: Config) -> tuple[list[Prediction], dict[str, int]]:
+    replayed = Replay(config)
+    with BagReader(bag) as reader:
+        return [each.prediction for each in replayed.steps(reader) if each.prediction is not None], replayed.intake.counts
+
+
+def are_equal(one: list[Prediction], other: list[Prediction]) -> bool:
+    """Whether predictions are the same to the last bit."""
+    return len(one) == len(other) and all(
+        a.stamp_ns == b.stamp_ns
+        and [c.likelihood for c in a.candidates] == [c.likelihood for c in b.candidates]
+        and all(np.array_equal(c.mean, d.mean) for c, d in zip(a.candidates, b.candidates, strict=True))
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_path: Path) -> None:
+    items = messages(0.2, rate_hz=1000.0)
+    hands = [item for item in items if item[0] == '/hand_pose']
+    dropped = {id(item) for i, item in enumerate(hands) if i % 4}
+    whole, counts = predict(write_bag(tmp_path / 'whole', items), BAG_CONFIG)
+    thinned, none = predict(write_bag(tmp_path / 'thinned', [item for item in items if id(item) not in dropped]), BAG_CONFIG)
+    assert (counts.get('hand_skipped'), none.get('hand_skipped')) == (len(dropped), None)
+    assert whole and are_equal(whole, thinned)
+    assert not are_equal(whole, predict(tmp_path / 'whole', replace_values(BAG_CONFIG, {'estimator.min_interval_s': 0.0}))[0])

@@ -4,21 +4,43 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from reach_helpers import bowed, one_obstacle, reach, solved
 from scipy.interpolate import CubicHermiteSpline
 
+from foc_ros.core.config import FocConfig
 from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.obstacles.geometry import Edges, find_offset
+from foc_ros.core.obstacles.risk import (
+    RiskBound,
+    compute_safety_factor,
+    eta_of_k,
+    k_of_eta,
+    size_moments,
+)
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
+from foc_ros.core.ocp import gradients
+from foc_ros.core.ocp.gradients import Gradients
+from foc_ros.core.ocp.margin import Contacts, Margins
+from foc_ros.core.ocp.minima import find_least_factors
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.ocp.solve import solve_problem
+from foc_ros.core.ocp.start import cold_start
+from foc_ros.core.plant.plants import condense, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.safety_preference import SafetyPreference
 from foc_ros.core.solution import Status
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
-EVERY = ['lv', 'hc', 'optimal', 'fixed', 'algorithm1']
+FIVE_STRATEGIES = ['lv', 'hc', 'optimal', 'fixed', 'algorithm1']
 WALL = make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03], ids=('left', 'right'))
 
 
-@pytest.mark.parametrize('strategy', EVERY)
+@pytest.mark.parametrize('strategy', FIVE_STRATEGIES)
 def test_an_infeasible_geometry_says_how_much_it_lacks_and_where(strategy):
     solution = solved(reach(WALL), bowed((0, 0), (0.3, 0), 50, 0.0), strategy)
     assert solution.status is Status.INFEASIBLE
@@ -67,3 +89,234 @@ def test_the_rows_of_optimal_have_a_tau_and_a_lambda_each():
     assert sum(lam for _, lam in middle.equivalent_weights) == pytest.approx(
         (more.effort - less.effort) / (2 * variance), rel=1e-2
     )
+
+
+STEPS, LAMBDA = 12, 3e4
+PLANTS = {'jerk': discretise_triple_integrator(0.05), 'force': discretise_damped_mass(0.05, 1.5, 4.0)}
+EVERY_PLANT = pytest.mark.parametrize('plant', PLANTS)
+
+
+def weighted_problem(plant: str, seed: int = 0) -> Problem:
+    """Return a problem with every term of the cost: positions reach the goal exactly, others by weights at every step."""
+    generator = np.random.default_rng(seed)
+    n = len(PLANTS[plant].A)
+    root = 1e-2 * generator.standard_normal((n, n))
+    made = rest_to_goal(
+        condense(PLANTS[plant], STEPS),
+        0.1 * generator.standard_normal(n),
+        np.array([0.3, 0.1]),
+        make_obstacles(),
+        np.array([0.1, 0.2]),
+        0.9,
+        initial_covariance=root @ root.T,
+    )
+    terminal, stage = 10 ** generator.uniform(3, 6, n), 10 ** generator.uniform(1, 3, n)
+    return replace(made, at_goal=np.arange(n) < 2, terminal_weights=terminal, stage_weights=stage)
+
+
+def simulated(problem: Problem, plant: str, control: np.ndarray) -> tuple[np.ndarray, float]:
+    """Step mean and covariance on, and return the last mean and J_aug."""
+    A, B = PLANTS[plant].A, PLANTS[plant].B
+    mean, covariance, cost = problem.initial_mean, problem.initial_covariance, float(control @ control)
+    for t, u in enumerate(control.reshape(2, -1).T, start=1):
+        mean = A @ mean + B @ u
+        covariance = A @ covariance @ A.T + B @ np.diag((problem.noise * u) ** 2) @ B.T
+        variances = covariance.diagonal()
+        weights = problem.terminal_weights if t == STEPS else problem.stage_weights
+        cost += weights @ ((mean - problem.goal) ** 2 + variances) + LAMBDA * variances[:2].sum()
+    return mean, float(cost)
+
+
+@EVERY_PLANT
+def test_terms_reported_for_a_solution_sum_to_the_simulated_cost(plant):
+    problem = weighted_problem(plant)
+    solution = solve_problem(problem, cold_start(np.zeros((STEPS + 1, 2))), FocConfig(strategy='fixed', tau=0.0, lam=LAMBDA))
+    end, cost = simulated(problem, plant, solution.control.T.ravel())
+    assert sum(solution.costs.values()) == pytest.approx(cost, rel=1e-9)
+    np.testing.assert_allclose(end[:2], problem.goal[:2], atol=1e-9)
+    assert solution.costs['effort'] == pytest.approx(solution.effort)
+    nudge = np.random.default_rng(3).standard_normal(2 * STEPS)
+    rows = problem.goal_rows[0][problem.goal_rows[2] == 0]
+    nudge -= rows.T @ np.linalg.solve(rows @ rows.T, rows @ nudge)
+    for size in (-1e-2, 1e-2):
+        assert simulated(problem, plant, solution.control.T.ravel() + size * nudge)[1] > cost, 'it is the least'
+
+
+MARGIN_STEPS, GOAL, K = 24, (0.3, 0.02), 2.0
+SHAPES: dict[str, list[Shape]] = {
+    'circle': [Circle((0.15, 0.0), radius=0.03)],
+    'moving uncertain circle': [Circle((0.14, -0.02), 0.03, 0.003, velocity=(0.03, 0.02), centre_stddev=0.002)],
+    'box': [Box((0.15, 0.0), size=(0.06, 0.04), yaw=0.4, radius=0.01, radius_stddev=0.002)],
+    'sharp box': [Box((0.14, -0.01), size=(0.08, 0.03), yaw=-0.3)],
+    'moving capsule': [Capsule((0.12, -0.01), (0.17, 0.02), 0.015, 0.002, velocity=(0.02, -0.03), centre_stddev=0.002)],
+    'hull': [Hull([(0.11, -0.03), (0.17, -0.04), (0.19, 0.0), (0.14, 0.02)], radius=0.01)],
+}
+STARTS = {'certain': np.zeros((6, 6)), 'uncertain': 1e-6 * (np.eye(6) + 0.3)}
+STRATEGY_NAMES = ('lv', 'hc', 'optimal', 'fixed', 'algorithm1')
+
+
+def make_problem(name: str, start: str = 'certain', tau: float = 1e-3) -> tuple[Problem, np.ndarray]:
+    """Return a problem, and a control (2N,) in units of `Horizon.gain` that passes near its obstacle."""
+    obstacles = collect_obstacles(SHAPES[name])
+    made = reach(obstacles, goal=GOAL, steps=MARGIN_STEPS, noise=(0.1, 0.15), initial_covariance=STARTS[start])
+    solution = solved(made, bowed((0, 0), GOAL, MARGIN_STEPS, 0.08), 'fixed', tau=tau, lam=1e4)
+    return made, solution.control.T.ravel() * made.horizon.gain
+
+
+def make_mass_problem(name: str) -> tuple[Problem, np.ndarray]:
+    """Return the same for a damped mass."""
+    horizon = condense(discretise_damped_mass(1.0 / MARGIN_STEPS, 1.5, 4.0), MARGIN_STEPS)
+    made = rest_to_goal(horizon, np.zeros(4), np.array(GOAL), collect_obstacles(SHAPES[name]), np.array([0.1, 0.15]), 0.9)
+    solution = solved(made, bowed((0, 0), GOAL, MARGIN_STEPS, 0.08), 'fixed', tau=1e-3, lam=10.0)
+    return made, solution.control.T.ravel() * horizon.gain
+
+
+MADE = {
+    **{f'{name}, {start} start': (make_problem, name, start) for name in SHAPES for start in STARTS},
+    **{f'{name}, damped mass': (make_mass_problem, name) for name in ('circle', 'box')},
+}
+EVERY_MARGIN = pytest.mark.parametrize('case', MADE)
+
+
+def linearise(
+    margins: Margins, control: np.ndarray, times: np.ndarray, k: float = K, slides: bool = True, is_free: bool = False
+) -> Gradients:
+    count = len(times)
+    none = np.zeros(count, dtype=np.intp)
+    controls, is_held = np.tile(control, (count, 1)), np.full(count, slides)
+    return gradients.linearise(
+        margins, Contacts(none, none, times), controls, np.full(count, k), is_held, np.full(count, is_free)
+    )
+
+
+def random_directions(control: np.ndarray, count: int = 3) -> np.ndarray:
+    return np.abs(control).max() * np.random.default_rng(2).standard_normal((count, len(control)))
+
+
+def is_smooth(margins: Margins, control: np.ndarray, time: float) -> bool:
+    """Return whether the nearest point is on one side or one corner around a time."""
+    none, times = np.zeros(5, dtype=np.intp), time + np.linspace(-0.1, 0.1, 5)
+    found = margins.measure(Contacts(none, none, times), none, margins.move(none[:1], control[None]), np.full(5, K))
+    return len(set(found.is_on_edge.tolist())) == 1
+
+
+@EVERY_MARGIN
+def test_the_gradient_of_a_margin_is_its_derivative_at_any_time(case):
+    make, *given = MADE[case]
+    problem, control = make(*given)
+    margins = Margins([problem], np.zeros(1), is_chance=True)
+    times = np.array([time for time in np.arange(2.3, MARGIN_STEPS - 1, 0.7) if is_smooth(margins, control, time)])
+    assert len(times) > 8
+    at, h = linearise(margins, control, times), 1e-4
+    for direction in 1e-6 * random_directions(control):
+        more, less = (linearise(margins, control + sign * direction, times).value for sign in (1, -1))
+        expected = (more - less) / 2
+        np.testing.assert_allclose(at.gradient @ direction, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
+    more, less = (linearise(margins, control, times, K + sign * h).value for sign in (1, -1))
+    np.testing.assert_allclose(-at.stddev_rate, (more - less) / (2 * h), rtol=1e-6)
+
+
+def measure_factors(problem: Problem, control: np.ndarray, points: int = 100) -> np.ndarray:
+    """Return the safety factors at `points` times a step, obstacle by obstacle, as the paper has them, for a certain start."""
+    times = np.arange(points, points * problem.horizon.steps + 1) / points
+    response = problem.horizon.position_response.at(times)
+    scaled = control * problem.horizon.gain
+    free = np.stack([np.interp(times, np.arange(problem.horizon.steps + 1), problem.free[:, axis]) for axis in (0, 1)], axis=1)
+    position = free + response @ scaled
+    spread = problem.noise_variance * scaled**2
+    xx, yy, xy = (response[:, a] * response[:, b] @ spread for a, b in ((0, 0), (1, 1), (0, 1)))
+    factors = []
+    for row in range(len(problem.obstacles)):
+        centre = problem.obstacles.centre[row] + times[:, None] * problem.drift[row]
+        at = find_offset(*(position - centre).T, Edges(*(each[row] for each in problem.edges)))
+        fixed = problem.obstacles.centre_covariance[row]
+        nx, ny = at.normal_x, at.normal_y
+        along = nx * nx * (xx + fixed[0, 0]) + ny * ny * (yy + fixed[1, 1]) + 2 * nx * ny * (xy + fixed[0, 1])
+        factors.append(compute_safety_factor(at.distance, along, *(each[row] for each in problem.size)))
+    return np.array(factors)
+
+
+def narrow_scene(seed: int) -> tuple[Problem, np.ndarray]:
+    """Return a problem with two random shapes with a gap of 1 to 20 mm, at times a third one, and a guess through the gap."""
+    generator = np.random.default_rng(seed)
+    gap, x, y = 10 ** generator.uniform(-3, -1.7), generator.uniform(0.12, 0.18), generator.uniform(-0.02, 0.02)
+    shapes: list[Shape] = []
+    for side in (-1, 1):
+        radius, stddev = generator.uniform(0.004, 0.02), generator.choice([0.0, 0.001])
+        width, height = generator.uniform(0.01, 0.06, 2)
+        at = np.array([x, y + side * (gap / 2 + radius)])
+        far = np.add(at, (0.0, side * height))
+        velocity = (0.02, 0.0) if seed % 4 == 3 else (0.0, 0.0)
+        shapes.append(
+            (
+                Circle(at, radius, stddev, velocity=velocity),
+                Capsule(at, np.add(far, (width / 2, 0.0)), radius, stddev, velocity=velocity),
+                Box(np.add(at, (0.0, side * height / 2)), (width, height), 0.0, radius, stddev, velocity=velocity),
+            )[generator.integers(3)]
+        )
+    if seed % 3 == 0:
+        shapes.append(Box((0.23, generator.uniform(-0.03, 0.03)), (0.02, 0.03), generator.uniform(-3, 3)))
+    preference = SafetyPreference(beta=1.0, shortfall=3.0, dt=0.025)
+    problem = reach(collect_obstacles(shapes), steps=40, noise=(0.05, 0.05), preference=preference)
+    straight = bowed((0, 0), (0.3, 0), 40, 0.0)
+    return problem, straight + np.array([0.0, y]) * np.sin(np.pi * straight[:, :1] / 0.3)
+
+
+@pytest.mark.parametrize('strategy', STRATEGY_NAMES)
+def test_nothing_is_below_the_least_safety_factor_that_is_reported(strategy):
+    """At a hundred times a step, in scenes with gaps down to 1 mm."""
+    wrong = {}
+    for seed in range(30 if strategy in ('optimal', 'fixed') else 8):
+        problem, guess = narrow_scene(seed)
+        solution = solved(problem, guess, strategy, tau=1e-5, algorithm1_growth=1.5)
+        least, reported = measure_factors(problem, solution.control.T.ravel()).min(), solution.safety_factor
+        if reported > 0.0 and not reported - 1e-3 * max(reported, 0.01) <= least <= reported + 0.02 * max(reported, 0.1):
+            wrong[seed] = (solution.status.value, reported, least)
+    assert wrong == {}
+
+
+def test_times_before_the_hand_has_to_be_out_of_a_margin_do_not_count():
+    near = collect_obstacles([Circle((0.0, 0.021), 0.02, 0.002)])
+    problem = reach(near, recovery_s=0.3)
+    control = solved(problem, bowed((0, 0), (0.3, 0), 50, -0.02), 'optimal').control.T.ravel() * problem.horizon.gain
+    counted, all_times = (Margins([replace(problem, recovery_s=each)], np.zeros(1), is_chance=True) for each in (0.3, 0.0))
+    (k,), _, (time,) = find_least_factors(counted, control[None])
+    (least,), _, (first,) = find_least_factors(all_times, control[None])
+    assert k > least
+    assert time >= 15.0 > first
+
+
+@given(st.floats(0.0, 0.999))
+def test_eta_and_k_are_inverse(eta):
+    assert eta_of_k(k_of_eta(eta)) == pytest.approx(eta, abs=1e-12)
+
+
+@given(st.floats(0.55, 0.999), st.sampled_from(['cantelli', 'gaussian']), st.integers(1, 20_000))
+def test_the_safety_factor_of_a_bound_gives_its_probability_back(eta, bound, events):
+    risk = RiskBound(bound, events)
+    assert risk.find_probability(risk.find_safety_factor(eta)) == pytest.approx(eta, abs=1e-9)
+
+
+def test_what_bounds_and_events_cost_in_standard_deviations():
+    wanted = [RiskBound(bound, events).find_safety_factor(0.9) for bound in ('cantelli', 'gaussian') for events in (1, 150)]
+    np.testing.assert_allclose(wanted, [3.0, np.sqrt(1499.0), 1.281552, 3.208707], rtol=1e-6)
+    assert RiskBound('gaussian').find_safety_factor(0.3) == 0.0, 'the mean keeps out of a circle whatever eta is'
+    assert RiskBound('cantelli', 150).find_probability(2.0) == 0.0, 'a sum of risks above one says nothing'
+
+
+def test_the_safety_factor_is_that_of_samples_for_correlated_axes_and_uncertain_centres():
+    generator = np.random.default_rng(5)
+    samples = 400_000
+    covariance = np.array([[4e-4, 1.5e-4], [1.5e-4, 2e-4]])
+    centre_covariance = np.array([[1e-4, -5e-5], [-5e-5, 9e-5]])
+    obstacle = make_obstacles([[0.1, 0.05]], [0.03], [0.004], centre_covariance=centre_covariance)
+    d = np.array([0.06, -0.03])
+    distance = np.hypot(*d)
+    along = d @ (covariance + centre_covariance) @ d / distance**2
+    k = float(compute_safety_factor(distance, along, *size_moments(obstacle))[0])
+    position = d + generator.multivariate_normal(np.zeros(2), covariance, samples)
+    centre = generator.multivariate_normal(np.zeros(2), centre_covariance, samples)
+    radius = generator.normal(0.03, 0.004, samples)
+    C = radius**2 - d @ d - 2 * (position - centre - d) @ d
+    assert k == pytest.approx(-C.mean() / C.std(), rel=0.01)
+    assert np.mean(C <= 0) >= eta_of_k(k)

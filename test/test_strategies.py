@@ -2,21 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """The promises of each strategy."""
 
+import math
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from reach_helpers import bowed, one_obstacle, reach, solved
+from reach_helpers import bowed, case_guess, case_problem, one_obstacle, random_scene, reach, reference_cases, solved
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.ocp.problem import rest_to_goal
+from foc_ros.core.obstacles.risk import eta_of_k
+from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
-from foc_ros.core.solution import Status
+from foc_ros.core.safety_preference import HARD, SafetyPreference
+from foc_ros.core.solution import Solution, Status
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.05)
 EVERY = pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
@@ -120,3 +123,143 @@ def test_a_problem_that_is_not_finite_is_refused_by_name(field, values):
     given = {'initial_mean': np.zeros(6), 'goal_position': np.array([0.3, 0.0]), 'noise': np.array([0.1, 0.1])}
     with pytest.raises(SceneError, match=f'{field}: expected finite numbers'):
         rest_to_goal(build_triple_integrator_horizon(0.02, 50), obstacles=make_obstacles(), eta=0.9, **(given | values))
+
+
+DT = 0.02
+SEEDS = (1, 2, 4, 8, 9)  # in others a gap is so narrow that the wanted k is out of reach
+QUARTER_SHORTFALL = SafetyPreference(beta=0.5, shortfall=0.25, fixed_cost=20.0, dt=DT)
+OPTIMAL = FocConfig(strategy='optimal')
+
+
+def make_reach(seed: int, preference: SafetyPreference = HARD, **rest) -> tuple[Problem, np.ndarray]:
+    """Return a problem among circles, and a guess."""
+    obstacles, goal, amplitude = random_scene(np.random.default_rng(seed))
+    problem = reach(obstacles, goal=goal, **{'noise': (0.1, 0.1), 'preference': preference, **rest})
+    return problem, bowed((0, 0), goal, problem.horizon.steps, amplitude)
+
+
+def solve_optimal(problem: Problem, guess: np.ndarray) -> Solution:
+    return solve_problem(problem, cold_start(guess), OPTIMAL)
+
+
+def find_effort(problem: Problem, guess: np.ndarray, k: float) -> Solution:
+    """Return the solution with the least effort at k."""
+    found = solve_optimal(replace(problem, preference=HARD, eta=eta_of_k(k)), guess)
+    assert found.status is Status.SOLVED
+    return found
+
+
+@pytest.mark.parametrize('seed', SEEDS)
+def test_a_soft_margin_gives_the_least_loss_of_all_k(seed):
+    problem, guess = make_reach(seed, QUARTER_SHORTFALL, noise=(0.15, 0.15))
+    solution = solve_optimal(problem, guess)
+    assert solution.status in (Status.SOLVED, Status.COMPROMISED)
+    loss = QUARTER_SHORTFALL.compute_loss(solution.effort, min(solution.safety_factor, problem.wanted_k), problem.wanted_k)
+    for k in np.linspace(0.3, solution.safety_factor, 6):
+        assert (
+            loss
+            <= QUARTER_SHORTFALL.compute_loss(find_effort(problem, guess, float(k)).effort, float(k), problem.wanted_k) + 1e-4
+        )
+
+
+WHOLE_SHORTFALL = SafetyPreference(beta=0.5, shortfall=1.0, dt=0.02)
+SETTINGS = {name: FocConfig(strategy=name) for name in ('lv', 'hc')}
+SAMPLED_STRATEGIES = pytest.mark.parametrize('strategy', SETTINGS)
+
+
+def soft_scenes(count: int, seed: int = 1) -> list[tuple[Problem, np.ndarray]]:
+    """Return soft problems of three noises with their guesses."""
+    generator, made = np.random.default_rng(seed), []
+    for number in range(count):
+        obstacles, goal, amplitude = random_scene(generator)
+        noise = (0.05, 0.15, 0.3)[number % 3]
+        problem = replace(reach(obstacles, goal=goal, noise=(noise, noise)), preference=WHOLE_SHORTFALL)
+        made.append((problem, bowed((0, 0), goal, 50, amplitude)))
+    return made
+
+
+def loss(solution: Solution, problem: Problem) -> float:
+    return problem.preference.compute_loss(solution.effort, max(solution.safety_factor, 0.0), problem.wanted_k)
+
+
+@SAMPLED_STRATEGIES
+@pytest.mark.parametrize('case', reference_cases()[:4])
+def test_an_infinite_shortfall_is_the_rule_of_the_paper(case, strategy):
+    problem, start = case_problem(case), cold_start(case_guess(case))
+    paper = solve_problem(problem, start, SETTINGS[strategy])
+    hard = solve_problem(replace(problem, preference=replace(WHOLE_SHORTFALL, shortfall=math.inf)), start, SETTINGS[strategy])
+    assert (hard.status, hard.message, hard.effort, hard.lam) == (paper.status, paper.message, paper.effort, paper.lam)
+    np.testing.assert_array_equal(hard.mean, paper.mean)
+
+
+@SAMPLED_STRATEGIES
+def test_a_cheap_eta_is_met_with_the_same_effort_and_a_compromise_costs_no_more_than_what_it_gains(strategy):
+    """log J / J_0 <= shortfall / beta (k_wanted - k_0), J_0 and k_0 those of the least effort."""
+    kinds = []
+    for problem, guess in soft_scenes(12):
+        hard = solve_problem(
+            replace(problem, preference=replace(WHOLE_SHORTFALL, shortfall=math.inf)), cold_start(guess), SETTINGS[strategy]
+        )
+        soft = solve_problem(problem, cold_start(guess), SETTINGS[strategy])
+        kinds.append((hard.status, soft.status))
+        if soft.status is Status.SOLVED:
+            assert soft.effort == pytest.approx(hard.effort, rel=1e-6)
+        elif hard.status is Status.SOLVED:
+            assert loss(soft, problem) < loss(hard, problem)
+        if soft.status is Status.COMPROMISED:
+            least = solve_problem(problem, cold_start(guess), FocConfig(strategy='fixed', tau=0.0, lam=1.0))
+            gained = problem.wanted_k - least.safety_factor
+            assert math.log(soft.effort / least.effort) <= WHOLE_SHORTFALL.shortfall / WHOLE_SHORTFALL.beta * gained + 1e-6
+    assert {soft for hard, soft in kinds if hard is Status.ETA_UNREACHABLE} == {Status.COMPROMISED}
+    assert kinds.count((Status.SOLVED, Status.SOLVED)) >= 4
+    assert kinds.count((Status.SOLVED, Status.COMPROMISED)) >= 1
+
+
+def dense(seed: int):
+    """Return a problem that asks for much among many obstacles, and a guess."""
+    generator = np.random.default_rng(seed)
+    obstacles, goal, amplitude = random_scene(generator)
+    noise, eta = generator.uniform(0.05, 0.15), generator.uniform(0.6, 0.95)
+    return reach(obstacles, goal=goal, steps=30, noise=(noise, noise), eta=eta), bowed((0, 0), goal, 30, amplitude)
+
+
+def test_lambda_beyond_what_numbers_hold_is_said():
+    problem, guess = dense(21)
+    solution = solved(problem, guess, 'algorithm1')
+    assert solution.status is Status.ITERATION_LIMIT
+    assert 'the surrogate is still violated' in solution.message
+    assert 1e148 < solution.lam < 1e151
+    assert 140 < solution.iterations < 160
+    assert solution.qp_solves >= solution.iterations
+    assert solution.eta < problem.eta
+    assert np.isfinite(solution.mean).all()
+    assert np.isfinite(solution.covariance).all()
+
+
+def test_what_it_calls_solved_meets_eta_and_lambda_is_a_power_of_the_growth():
+    met = 0
+    for seed in range(12):
+        problem, guess = dense(seed)
+        solution = solved(problem, guess, 'algorithm1')
+        assert solution.lam == pytest.approx(10.0 ** round(solution.tau / 5e-5), rel=1e-9)
+        if solution.status is Status.SOLVED:
+            assert solution.eta >= problem.eta
+            met += 1
+    assert met >= 8, 'of the other four, two are out of reach of `optimal` too, and two are stepped over'
+
+
+STRATEGIES = ('lv', 'hc', 'optimal')
+EVERY_ETA = pytest.mark.parametrize('strategy', STRATEGIES)
+LOW = 0.5
+
+
+@EVERY_ETA
+@pytest.mark.parametrize('case', reference_cases()[:6])
+def test_effort_does_not_fall_with_eta(case, strategy):
+    etas = np.linspace(LOW, 0.95, 12 if strategy == 'optimal' else 6)
+    solutions = [solved(case_problem(case, float(eta)), case_guess(case), strategy) for eta in etas]
+    reached = [each.status is Status.SOLVED for each in solutions]
+    assert reached == sorted(reached, reverse=True), 'an unreachable eta is below a reachable one'
+    assert sum(reached) >= 0.75 * len(etas)
+    efforts = np.log([each.effort for each in solutions if each.status is Status.SOLVED])
+    assert np.diff(efforts).min() > -1e-4

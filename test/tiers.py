@@ -24,8 +24,8 @@ FOLDER = Path(__file__).resolve().parent
 
 LONG = (
     # studies of the solver over many scenes
-    'test_effort_over_eta.py::test_effort_is_continuous*',
-    'test_flicker.py::test_*symmetric_obstacle*',
+    'test_strategies.py::test_effort_is_continuous*',
+    'test_tracks.py::test_*symmetric_obstacle*',
     'test_guarantee.py::*',
     'test_homotopy_shapes.py::test_brute_force_finds_none_in_many_more_scenes',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
@@ -49,7 +49,7 @@ LONG = (
     'test_node_scenes.py::test_the_node_keeps_its_promises_in_a_hostile_scene',
     'test_node_process.py::test_a_node_that_is_killed_and_started_again',
     'test_node_process.py::test_a_*work*without_an_error',
-    'test_node_rates.py::*',
+    'test_node_predicts.py::*',
 )
 
 PROCESS = (
