@@ -21,6 +21,8 @@ mpl = pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
+SLOW = ('plot_08_replay_bag', 'plot_09_custom_strategy', 'plot_11_many_scenes')
+"""They take more than ten seconds each."""
 EXAMPLE_S = 280
 """Time limit: an example takes a few seconds, and minutes on a busy machine."""
 
@@ -56,8 +58,18 @@ def test_there_are_examples_with_titles() -> None:
 
 
 @pytest.mark.timeout(EXAMPLE_S)
-@pytest.mark.parametrize('example', EXAMPLES, ids=lambda example: example.stem)
+@pytest.mark.parametrize('example', [each for each in EXAMPLES if each.stem not in SLOW], ids=lambda example: example.stem)
 def test_the_example_runs_and_makes_a_figure(example: Path, pyplot: object) -> None:
+    run_example(example, pyplot)
+
+
+@pytest.mark.timeout(EXAMPLE_S)
+@pytest.mark.parametrize('example', [each for each in EXAMPLES if each.stem in SLOW], ids=lambda example: example.stem)
+def test_the_slow_example_runs_and_makes_a_figure(example: Path, pyplot: object) -> None:
+    run_example(example, pyplot)
+
+
+def run_example(example: Path, pyplot: object) -> None:
     runpy.run_path(str(example), run_name='__main__')
     figures = pyplot.get_fignums()
     assert figures, f'{example.name} makes no figure'

@@ -25,7 +25,7 @@ from foc_ros.io import topics
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 
-COUNT = int(os.environ.get('FOC_ROS_FUZZ', '2000'))
+COUNT = int(os.environ.get('FOC_ROS_FUZZ', '1000'))
 LENGTH = 20
 TYPES = RosbagsTypes(STORE)
 CONFIG = replace_values(Config(), {'foc.steps': 10, 'homotopy.max_candidates': 2, 'rate_hz': 1000.0})

@@ -220,7 +220,7 @@ def test_guesses_are_as_smooth_as_hands_on_exact_paths(seed):
         assert bend < 5.8 * one.length + 1.4 * (1.875 * one.length) ** 2 / 0.015
 
 
-TICKS = 400
+TICKS = 150
 
 
 def count_changes(centre, radius, goals, hand=(0.0, 0.0), k=4, remember=True):
@@ -248,7 +248,7 @@ def count_changes(centre, radius, goals, hand=(0.0, 0.0), k=4, remember=True):
 )
 def test_candidates_stay_under_noise(centre, radius, k):
     loose = count_changes(centre, radius, (0.3, 0.0), k=k, remember=False)
-    assert loose > 100, 'the scene is no test'
+    assert loose > 40, 'the scene is no test'
     assert count_changes(centre, radius, (0.3, 0.0), k=k) <= 8
 
 

@@ -58,9 +58,7 @@ class Case:
 OUT_OF_REACH = {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0}
 CASES = {
     'empty scene': Case([], (1, 1), OK, 'predicting'),
-    'hand deep inside an obstacle': Case([(0.01, 0.0, 0.0, 0.03)], (1, 2), WARN, 'scene_hand_inside 1'),
     'hand just inside an obstacle': Case([(0.0, 0.028, 0.0, 0.03)], (1, 2), WARN, 'scene_hand_inside 1'),
-    'goal inside an obstacle': Case([(0.3, 0.01, 0.0, 0.03)], (1, 1), OK, 'predicting'),
     'one goal of two inside': Case([(0.3, 0.01, 0.0, 0.03)], (2, 4), OK, 'predicting', goals=[(0.3, 0.0, 0.0), (0.0, 0.3, 0.0)]),
     'no way through': Case(RING, (0, 0), WARN, 'predict_nothing_solved 1; scene_no_way 1'),
     'ten thousand obstacles': Case(CROWD, (1, 2), OK, 'predicting'),

@@ -12,7 +12,7 @@ import foc_ros
 UNSETTLED = 'the fixed strategy creeps along the steps, and tau comes out 15 % too large'
 
 
-@pytest.mark.parametrize('seed', [pytest.param(1, marks=pytest.mark.xfail(reason=UNSETTLED)), 2, 3])
+@pytest.mark.parametrize('seed', [pytest.param(1, marks=pytest.mark.xfail(reason=UNSETTLED)), 3])
 def test_recovered_from_mean_trajectories_with_1_mm_of_sensor_noise(seed: int) -> None:
     tau, lam, count, found = trials.run_trial(seed, repeats=1)
     assert count >= 4

@@ -99,7 +99,7 @@ def add_vertices(corners: np.ndarray, each: int) -> np.ndarray:
 
 
 @EVERY
-@pytest.mark.parametrize(('yaw', 'radius'), [(0.0, 0.01), (0.5, 0.0), (-1.1, 0.01)])
+@pytest.mark.parametrize(('yaw', 'radius'), [(0.5, 0.0), (-1.1, 0.01)])
 def test_a_box_and_the_same_box_as_a_polygon_of_64_vertices(strategy, yaw, radius):
     corners, rest = make_box_polygon((0.06, 0.04), yaw), ([[0.14, -0.01]], [radius], [0.1 * radius])
     box = reach(collect_obstacles([Box((0.14, -0.01), (0.06, 0.04), yaw, radius, 0.1 * radius)]), noise=(0.1, 0.1))
@@ -127,11 +127,9 @@ def test_a_box_that_moves_and_the_same_problem_in_its_frame(strategy):
     )
 
 
-CONTINUOUS = pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
-KINDS = pytest.mark.parametrize('kind', ['circles', 'shapes'])
 TOLERANCES = {'circles': (1e-3, 5e-4), 'shapes': (2e-2, 4e-3)}
 """Relative difference of the effort and distance of paths [m] that the samples of the curves of `lv` and `hc` leave open."""
-COUNTS = {'lv': 2, 'hc': 2, 'optimal': 5}
+COUNTS = {'lv': 1, 'hc': 1, 'optimal': 2}
 """Scenes of each kind: `lv` and `hc` take many times as long."""
 Scene = tuple[Obstacles, np.ndarray, np.ndarray]
 
@@ -207,8 +205,9 @@ def transform(obstacles: Obstacles, turn: np.ndarray, shift: float = 0.0) -> Obs
     return replace(obstacles, centre=obstacles.centre @ turn.T + shift, velocity=obstacles.velocity @ turn.T, vertices=vertices)
 
 
-@CONTINUOUS
-@KINDS
+@pytest.mark.parametrize(
+    ('kind', 'strategy'), [('circles', 'optimal'), ('circles', 'hc'), ('shapes', 'optimal'), ('shapes', 'lv')]
+)
 def test_mirror_quarter_turns_shift_order_and_duplicates_do_not_matter(kind, strategy):
     """Only quarter turns: the model's noise acts along two axes, c_x|u_x| and c_y|u_y|, and has no covariance in between."""
     for seed, (obstacles, goal, guess), first in find_well_posed(kind, strategy):
@@ -222,7 +221,7 @@ def test_mirror_quarter_turns_shift_order_and_duplicates_do_not_matter(kind, str
         same_but_for_samples(kind, first, solve(obstacles.take(rows), goal, guess, strategy))
 
 
-@CONTINUOUS
+@pytest.mark.parametrize('strategy', ['lv', 'optimal'])
 def test_units_of_length_and_time_do_not_matter(strategy):
     """Lengths times a unit: tau and effort times its square. Times: jerk by its -3rd power, effort and lambda by its -6th."""
     for seed, (obstacles, goal, guess), first in find_well_posed('circles', strategy):

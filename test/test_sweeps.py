@@ -41,7 +41,6 @@ SCENES = {
 SWEEPS: dict[str, tuple[float, float, Callable[..., Answers]]] = {
     'eta': (0.5, 0.97, lambda make, eta: answer(make(0.0), {'foc.eta': eta})),
     'place': (-0.02, 0.02, lambda make, y: answer(make(y), {})),
-    'speed': (0.0, 0.4, lambda make, v: answer(make(0.0), {}, (0.0, 0.0, v, 0.1 * v, 0.0, 0.0))),
     'start': (-0.02, 0.02, lambda make, y: answer(make(0.0), {}, (0.0, y, 0.1, 0.0, 0.0, 0.0))),
 }
 
@@ -55,8 +54,8 @@ def measure_jump(one: Answers, other: Answers) -> float:
     return max(jumps)
 
 
-SETTLED = [('box', 'eta'), ('gap', 'eta'), ('gap', 'place'), ('gap', 'speed'), ('gap', 'start')]
-"""The other sweeps of the box, and those among circles, have points at which a class does not settle, or in another minimum."""
+SETTLED = [('box', 'eta'), ('gap', 'place'), ('gap', 'start')]
+"""The other sweeps take long, or have points at which a class does not settle, or in another minimum."""
 
 
 @pytest.mark.parametrize(('scene', 'sweep'), SETTLED)
