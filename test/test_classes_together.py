@@ -46,7 +46,6 @@ def solve_together(problem: Problem, candidates: list[Candidate], strategy: str)
     ('name', 'strategy'),
     [
         *((name, strategy) for name in SCENES for strategy in ('optimal', 'fixed')),
-        *(('boxes', each) for each in ('lv',)),
     ],
 )
 def test_each_class_is_as_if_it_were_alone_and_the_same_each_time(name, strategy):

@@ -237,7 +237,8 @@ def test_a_repeated_way_becomes_more_likely() -> None:
     ways = [move_along(ABOVE)] * 4
     first, last = [], []
     for learning_ in ('none', 'online'):
-        pipeline = Pipeline(MOVEMENT_CONFIG.with_values({'experience.learning': learning_, 'likelihood.other_goal': 0.0}))
+        values = {'experience.learning': learning_, 'likelihood.other_goal': 0.0, 'rate_hz': 1.0}
+        pipeline = Pipeline(MOVEMENT_CONFIG.with_values(values))
         predicted = follow_paths(pipeline, *ways, is_predicting=True)
         of_each = len(predicted) // len(ways)
         first.append(likelihood_above(predicted[0]))

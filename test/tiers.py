@@ -58,7 +58,19 @@ PROCESS = (
     'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
     'test_evaluate.py::test_workers_do_not_matter_*',
     'test_paper.py::*',
-    # a dozen programs with a picture each
+    # seconds in one process, as a dozen programs with a picture each
+    'test_strategies.py::test_a_cheap_eta_*',
+    'test_sweeps.py::test_effort_and_likelihood_*',
+    'test_realised_classes.py::*',
+    'test_solution_numbers.py::test_nothing_is_below_*',
+    'test_simulation.py::test_the_command_*',
+    'test_replay_guidance.py::*',
+    'test_one_driver.py::*',
+    'test_notebook.py::*',
+    'test_plan_recovery.py::*',
+    'test_evaluate.py::test_in_order_*',
+    'test_measure_predictions.py::*',
+    'test_demonstrations.py::test_a_pooled_path_*',
     'test_examples.py::test_the_example_runs_and_makes_a_figure',
 )
 
