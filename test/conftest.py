@@ -70,6 +70,26 @@ def ros() -> Iterator[Graph]:
         yield created
 
 
+class Clock:
+    """A clock that stands still until a test sets `now_s`."""
+
+    def __init__(self) -> None:
+        self.now_s = 1000.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    """Return the clock by which the nodes of a test judge silence and age, however busy the machine is."""
+    from foc_ros.ros import node
+
+    made = Clock()
+    monkeypatch.setattr(node, 'monotonic', made)
+    return made
+
+
 @pytest.fixture
 def types(request: pytest.FixtureRequest) -> MessageTypes:
     """Return the message classes of the kind that the test is parametrised with (`message_helpers.both_kinds`)."""

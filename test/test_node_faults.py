@@ -139,7 +139,7 @@ def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
     assert stamps(bench.wait_for('prediction', 7))[-1] == 11 * SECOND
 
 
-def test_silent_sources_stop_predictions_until_they_are_received_or_removed(ros: Graph) -> None:
+def test_silent_sources_stop_predictions_until_they_are_received_or_removed(ros: Graph, clock: Any) -> None:
     """Unstamped obstacles have no age, so only the silence of their source shows that it has stopped."""
     bench, poses = Bench(ros, scene__timeout_s=1.0), iter(hand_path(30))
     scene = cloud(TYPES, obstacle_table(ROWS), 0)
@@ -148,7 +148,7 @@ def test_silent_sources_stop_predictions_until_they_are_received_or_removed(ros:
     bench.deliver('obstacles', scene)
     bench.move(islice(poses, 2))
     bench.wait_for('prediction', 1)
-    ros.spin_for(1.1)
+    clock.now_s += 1.1
     bench.move(islice(poses, 4))
     status = bench.health()
     assert status.level == WARN and 'no prediction: obstacles silent for' in status.message
@@ -159,7 +159,7 @@ def test_silent_sources_stop_predictions_until_they_are_received_or_removed(ros:
     bench.wait_for('prediction', 2)  # an empty array of markers that was sent once does not block
 
     bench.deliver('obstacle_markers', marker_array(TYPES, marker(TYPES, (0.15, 0.2, 0.0), stamp_ns=0)))
-    ros.spin_for(1.1)
+    clock.now_s += 1.1
     bench.deliver('obstacles', scene)
     bench.move(islice(poses, 2))
     assert 'obstacle_markers silent for' in bench.health().message
@@ -170,11 +170,11 @@ def test_silent_sources_stop_predictions_until_they_are_received_or_removed(ros:
     bench.wait_for('prediction', 3)
 
 
-def test_a_silent_hand_is_told_and_one_whose_poses_wait_is_not_silent(ros: Graph) -> None:
+def test_a_silent_hand_is_told_and_one_whose_poses_wait_is_not_silent(ros: Graph, clock: Any) -> None:
     bench, (first, second) = begin(ros, estimator__hand_timeout_s=0.3), hand_path(2)
     bench.move([first])
     bench.wait_for('prediction', 1)
-    ros.spin_for(0.4)
+    clock.now_s += 0.4
     status = bench.health()
     assert (status.level, status.message.split(' for ')[0]) == (WARN, 'no prediction: hand_pose silent')
     ros.spin_for(0.2)
@@ -187,25 +187,25 @@ def test_a_silent_hand_is_told_and_one_whose_poses_wait_is_not_silent(ros: Graph
 
 
 @pytest.mark.parametrize('is_moving', [True, False])
-def test_stamps_that_repeat_are_no_silence(ros: Graph, is_moving: bool) -> None:
+def test_stamps_that_repeat_are_no_silence(ros: Graph, clock: Any, is_moving: bool) -> None:
     """As of a clock of whole seconds, and of a driver that repeats its last message."""
     bench = begin(ros, 2, estimator__hand_timeout_s=0.05)
     for i in range(1, 12):
         bench.deliver('hand_pose', pose_stamped(TYPES, (0.01 * i * is_moving, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns))
-        ros.spin_for(0.01)
+        clock.now_s += 0.01
     status = bench.health()
     words = r'no prediction: no hand_pose could be used for \d\.\d s, the last: hand_pose: stamps repeat: '
     assert status.level == WARN and re.match(words, status.message) and 'silent' not in status.message
     assert 'stamps repeat: 11 of 13 poses have that of the pose before' in status.message
 
 
-def test_a_pose_without_data_is_a_lost_hand(ros: Graph) -> None:
+def test_a_pose_without_data_is_a_lost_hand(ros: Graph, clock: Any) -> None:
     bench = begin(ros, 2, estimator__hand_timeout_s=0.05)
     for i in range(1, 12):
         lost = pose_stamped(TYPES, (0.0, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns + i * SECOND // 50)
         lost.pose.orientation.w = 0.0
         bench.deliver('hand_pose', lost)
-        ros.spin_for(0.01)
+        clock.now_s += 0.01
     status = bench.health()
     assert status.level == WARN and 'hand_lost 11' in status.message
     assert re.match(r'no prediction: no hand_pose could be used for .* the tracker has lost the hand', status.message)

@@ -120,8 +120,13 @@ def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pyte
     assert updates
     bench.node.set_parameters([Parameter('guidance.enabled', value=False)])
     ros.spin_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
-    ros.spin_for(0.1)
-    updates.clear()
+
+    def is_over() -> bool:
+        updates.clear()
+        ros.spin_for(0.1)
+        return not updates
+
+    ros.spin_until(is_over, 'the end of the updates')
     bench.drive(20)
     assert not updates
 
@@ -151,10 +156,16 @@ def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros: Graph) -> N
     bench.node._engage(SetBool.Request(data=False), SetBool.Response())
     # how long that takes is measured by scripts/stress.py rates
     bench.drive_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
-    bench.drive(20)
+
+    def is_silent() -> bool:
+        before = len(bench.wrenches)
+        bench.drive(20)
+        return len(bench.wrenches) == before
+
+    ros.spin_until(is_silent, 'zero is published until the ramp ends, and then nothing')
     count = len(bench.wrenches)
-    bench.drive(60)
-    assert len(bench.wrenches) == count, 'zero is published until the ramp ends, and then nothing'
+    bench.drive(40)
+    assert len(bench.wrenches) == count
     assert figures(bench.health())['guidance'] in ('released', 'stale')
     bench.node._engage(SetBool.Request(data=True), SetBool.Response())
     bench.drive_until(lambda: len(bench.wrenches) > count, 'guidance')
@@ -187,7 +198,7 @@ def test_commands_are_blended_and_pass_unchanged_without_guidance(ros: Graph) ->
     bench.drive_until(is_blended, 'a command that is blended')
     assert bench.answer(0.0, 0.1, 'elsewhere').linear.x == 0.0
     ros.spin_until(lambda: not bench.forces[-1].any(), 'the hand is released')
-    ros.spin_for(0.3)
+    ros.spin_until(lambda: bench.answer(0.0, 0.1).linear.x == 0.0, 'the command alone')
     assert bench.answer(0.0, 0.1).linear.x == 0.0
 
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -119,11 +118,9 @@ def test_diagnostics_contain_rates_ages_times_and_candidates(ros: Graph) -> None
 
 
 def test_diagnostics_are_published_once_a_second_even_while_simulated_time_stands_still(ros: Graph) -> None:
-    bench, heard_s = Bench(ros, outputs=[], ticking=True, use_sim_time=True), []
-    for count in (1, 3):
-        ros.spin_until(lambda count=count: len(bench.diagnostics) >= count, 'diagnostics')
-        heard_s.append(time.monotonic())
-    assert heard_s[1] - heard_s[0] == pytest.approx(2.0, abs=0.9)
+    bench = Bench(ros, outputs=[], ticking=True, use_sim_time=True)
+    assert 10**9 in [timer.timer_period_ns for timer in bench.node.timers]
+    ros.spin_until(lambda: len(bench.diagnostics) >= 2, 'diagnostics')
     assert bench.node.get_clock().now().nanoseconds == 0
     (status,) = bench.diagnostics[-1].status
     assert status.level == WARN and 'no hand pose yet' in status.message
@@ -163,6 +160,7 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros: Graph) -> None:
 
     bench.deliver('goals', pose_array(TYPES, [(0.3, 0.0, 0.1)]))
     bench.move([next(poses) for _ in range(10)])  # the last message from before arrives meanwhile
+    ros.spin_for(0.1)
     before = len(heard[1])
     bench.move([next(poses) for _ in range(4)])
     assert len(heard[1]) == before, 'a goal that is gone has no likelihood'

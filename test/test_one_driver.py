@@ -26,7 +26,7 @@ from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, e
 CONFIG = replace_values(
     Config(), {'rate_hz': 1000.0, 'budget_s': 0.0, 'foc.steps': 15, 'homotopy.max_candidates': 4, 'experience.learning': 'online'}
 )
-PERIOD_S, SLOW_S = 0.1, 2.2
+PERIOD_S, SLOW_S, JUMP = 0.1, 2.2, 12
 SCENE = [(0.15, 0.01, 0.0, 0.03, 0.002, 7), (0.22, -0.04, 0.0, 0.02, 0.001, 9)]
 GOAL = [(0.3, 0.0, 0.0), (0.3, 0.08, 0.0)]
 
@@ -41,7 +41,7 @@ def positions() -> list[tuple[int, np.ndarray]]:
             s = s if number == 0 else 1.0 - s
             stamp_ns = START_NS + round((number * (SLOW_S + 1.2) + step * PERIOD_S) * NANOSECONDS)
             place = np.array([0.3 * s, 0.05 * np.sin(np.pi * s), 0.1])
-            found.append((stamp_ns, place + (1.0 if (number, step) == (0, 12) else 0.0)))
+            found.append((stamp_ns, place + (1.0 if (number, step) == (0, JUMP) else 0.0)))
     return found
 
 
@@ -129,10 +129,10 @@ def test_the_page_predicts_what_a_replay_does(bag: Path, replayed: tuple[list[Pr
         with BagReader(bag) as reader:
             items: list[Item] = list(reader)
         for role in (CLOUD, GOALS, HAND):
-            for item in [each for each in items if each.role == role]:
+            for number, item in enumerate(each for each in items if each.role == role):
                 count = len(received)
                 page.send(role, item.message)
-                while role == HAND and len(received) == count and arrived.wait(1.0 if count not in (11, 12) else 0.3):
+                while role == HAND and len(received) == count and arrived.wait(0.3 if number == JUMP else 20.0):
                     arrived.clear()
     finally:
         page.stop()
