@@ -27,18 +27,6 @@ def find(
     return search(mean, goals, obstacles, settings, [1.0] * len(goals), steps, previous)
 
 
-def random_scene(rng: np.random.Generator, n: int, spread: float = 0.12) -> Obstacles:
-    """n circles between the hand at the origin and GOAL that hold neither, and no gap within a millimetre of closing."""
-    while True:
-        centre = np.column_stack([rng.uniform(0.02, 0.33, n), rng.uniform(-spread, spread, n)])
-        radius = rng.uniform(0.01, 0.035, n)
-        apart = np.hypot(*(centre[:, None] - centre).transpose(2, 0, 1)) - radius[:, None] - radius - 2 * CLEARANCE
-        np.fill_diagonal(apart, 1.0)
-        ends = np.array([np.hypot(*(centre - end).T) - radius - CLEARANCE for end in (np.zeros(2), GOAL)])
-        if (np.abs(apart) > 1e-3).all() and (ends > 1e-3).all():
-            return make_obstacles(centre, radius)
-
-
 def gap_to_circles(path: np.ndarray, obstacles: Obstacles, clearance: float = CLEARANCE) -> float:
     """Least distance of a path's points from the circles with the clearance [m]."""
     apart = np.hypot(*(path[:, None] - obstacles.centre).transpose(2, 0, 1)) - obstacles.radius - clearance

@@ -24,25 +24,14 @@ from foc_ros import Circle, Goal
 from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.interpolation import interpolate_covariance
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.plant.models import make_plant_model
 from foc_ros.core.predict import predict
 from foc_ros.core.prediction import Prediction
-from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003, name='cup')
 FAST = foc_ros.Config().with_values({'foc.steps': 20, 'budget_s': 0.0})
-
-
-@pytest.fixture(autouse=True)
-def registries(monkeypatch):
-    """What a test registers is gone after it."""
-    for registry in (LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES):
-        monkeypatch.setattr(registry, '_parts', dict(registry._parts))
-    yield
-    make_plant_model.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -74,22 +63,6 @@ def predictor_of_one_cup():
     predictor.set_goals([(0.3, 0.0)])
     predictor.set_obstacles([CUP])
     return predictor
-
-
-def test_a_prediction_knows_its_scene_and_its_candidates():
-    prediction = predictor_of_one_cup().update(t=1.5, position=[0.0, 0.0])
-    assert prediction.t == 1.5
-    assert prediction.obstacles.ids == ('cup',)
-    np.testing.assert_array_equal(prediction.goal_positions, [[0.3, 0.0]])
-    assert {each.label for each in prediction.candidates} == {'goal0:+cup', 'goal0:-cup'}
-    best = prediction.candidates[0]
-    assert best.likelihood == max(each.likelihood for each in prediction.candidates)
-    assert best.status is foc_ros.Status.SOLVED
-    assert best.eta >= 0.9 - 1e-5
-    assert best.mean.shape == (21, 6)
-    assert best.covariance.shape == (21, 6, 6)
-    assert len(best.times) == 21
-    assert best.effort > 0.0
 
 
 def test_a_predictor_follows_a_movement_and_forgets_it():
@@ -196,11 +169,6 @@ def test_lists_states_and_tables_are_accepted():
     np.testing.assert_allclose(moving.mean[0, 2], 0.3)
 
 
-def test_a_guess_chooses_the_class():
-    labels = {foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST, guess=[(0.15, y)]).label for y in (0.08, -0.06)}
-    assert labels == {'goal0:+cup', 'goal0:-cup'}
-
-
 def test_the_solution_of_solve_is_the_most_likely_of_all_classes():
     candidates = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=FAST)
     solution = foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST)
@@ -248,36 +216,6 @@ def test_a_replay_yields_predictions_that_can_be_drawn():
     assert len(prediction.goals)
 
 
-def test_a_strategy_from_outside_builds_on_another_one():
-    def solve_with_less(problems, starts, settings, deadline):
-        results = foc_ros.get_strategy('lv')(problems, starts, settings, deadline)
-        etas.extend(foc_ros.compute_eta(*each) for each in zip(problems, (each.control for each in results), strict=True))
-        return [replace(each, message='as lv') for each in results]
-
-    etas = []
-    foc_ros.register_strategy('as_lv', solve_with_less)
-    solutions = [foc_ros.solve((0, 0), (0.3, 0), [CUP], strategy=name, config=FAST) for name in ('lv', 'as_lv')]
-    np.testing.assert_array_equal(solutions[0].mean, solutions[1].mean)
-    assert solutions[1].message == 'as lv'
-    assert min(etas) >= 0.9 - 1e-5
-    with pytest.raises(foc_ros.InputError, match='strategy: expected one of lv'):
-        foc_ros.get_strategy('shortest')
-
-
-def test_a_likelihood_rule_from_outside_is_used():
-    foc_ros.register_likelihood_rule('even', lambda costs, config: np.zeros(len(costs)))
-    even = FAST.with_values({'likelihood.rule': 'even'})
-    candidates = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], config=even)
-    np.testing.assert_allclose([each.likelihood for each in candidates], 0.5)
-    with pytest.raises(foc_ros.InputError, match='a new name besides cost_ratio'):
-        foc_ros.register_likelihood_rule('even', lambda costs, config: costs)
-    with pytest.raises(foc_ros.InputError, match='a function'):
-        foc_ros.register_likelihood_rule('odd', 3)
-    with pytest.raises(foc_ros.ParameterError, match=r'likelihood\.rule: expected one of cost_ratio, .*even'):
-        FAST.with_values({'likelihood.rule': 'odd'})
-    assert 'odd' not in LIKELIHOOD_RULES
-
-
 ROUND_CUP = Circle((0.15, 0.01), radius=0.03, name='cup')
 TWO = [Goal((0.3, -0.1), name='bowl'), (0.3, 0.1)]
 
@@ -302,15 +240,6 @@ def test_goals_have_names_and_likelihoods(predicted: foc_ros.Prediction) -> None
     words = {each.candidate.goal: each.description.partition(':')[0] for each in predicted}
     assert words == {0: 'bowl', 1: 'goal1'}, 'labels number the goals, words name them'
     assert all(each.label.startswith(f'goal{each.candidate.goal}:') for each in predicted)
-
-
-def test_names_change_no_number(predicted: foc_ros.Prediction) -> None:
-    plain = foc_ros.Predictor(FAST)
-    plain.set_goals([(0.3, -0.1), (0.3, 0.1)])
-    plain.set_obstacles([ROUND_CUP])
-    for one, other in zip(plain.update(0.0, (0.0, 0.0)), predicted, strict=True):
-        assert (one.label, one.likelihood) == (other.label, other.likelihood)
-        np.testing.assert_array_equal(one.mean, other.mean)
 
 
 def test_a_goal_of_which_nothing_is_known_is_not_unlikely() -> None:
@@ -353,13 +282,6 @@ def test_covariances_between_the_steps_are_those_of_the_motor_noise() -> None:
     exact = (response**2) @ (0.05**2 * (0.02 / solution.dt) * solution.control**2)
     found = interpolate_covariance(solution.covariance, solution.dt, times * solution.dt)
     np.testing.assert_allclose(found[:, [0, 1], [0, 1]], exact, atol=1e-5 * exact.max())
-
-
-def test_no_covariance_between_the_steps_is_less_than_none(predicted: foc_ros.Prediction) -> None:
-    with_plant = foc_ros.solve_classes((0, 0), (0.3, 0), ROUND_CUP, config=Config(foc={'plant': 'damped_mass', 'steps': 20}))
-    for each in (*predicted, *foc_ros.solve_classes((0, 0), (0.3, 0), ROUND_CUP, config=FAST), *with_plant):
-        found = each.covariance_at(np.linspace(0.0, each.times[-1], 997))
-        assert np.linalg.eigvalsh(found).min() >= -1e-9 * np.abs(each.covariance).max()
 
 
 @pytest.mark.parametrize('t', [-0.1, 99.0, float('nan'), 'now', None, [0.1, 99.0]])

@@ -18,7 +18,6 @@ from foc_ros.analysis.evaluation.report import find_label_mismatches
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.errors import RecordingError
-from foc_ros.io.bags import BagReader
 from foc_ros.ros.parameters import load_parameter_file
 
 HEADER = 'recording,object,x_m,y_m,z_m,width_m,depth_m,height_m\n'
@@ -68,14 +67,6 @@ def test_sides_of_the_table_of_trials_are_compared_with_the_path(folder: Path) -
     assert find_label_mismatches(folder, observed) == {'a': 'Long label right, path left'}
     (folder / 'trials.csv').write_text('recording,person,sides\n')
     assert find_label_mismatches(folder, observed) == {'a': 'no label'}
-
-
-def test_bags_of_the_folder_hold_cubes_that_are_read_back(folder: Path, tmp_path: Path) -> None:
-    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
-    with BagReader(tmp_path / 'bags' / 'a') as reader:
-        assert {item.role for item in reader} == {'hand_pose', 'obstacle_markers', 'goals'}
-    arguments = ['replay', str(tmp_path / 'bags' / 'a'), '--params', str(folder / 'parameters.yaml')]
-    assert main(arguments) == 0
 
 
 def test_evaluate_and_its_report_take_the_folder(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -131,18 +122,3 @@ def test_the_share_of_another_goal_is_judged_with_the_goal_left_out(picks: Path,
     found = answer['other_goal']
     assert 0.0 < found['share'] < found['share_left_out'] and found['area_under_curve'] > 0.5
     assert 0.0 <= found['calibration_error'] < 1.0 and answer['verdict'][-1].startswith('Another goal: ')
-
-
-@pytest.mark.parametrize(
-    ('text', 'words'),
-    [
-        ('recording,object\na,\n', "trials.csv: row 2, column object: expected a name, got ''"),
-        ('recording,object\na,Cup\nb,Target\n', "scenes.csv: no row of recording 'a' has the object Cup, which was picked up"),
-        ('recording,object\nb,Target\n', "scenes.csv: no row of recording 'a' has the object None, which was picked up"),
-    ],
-)
-def test_a_wrong_table_of_objects_is_named(picks: Path, text: str, words: str) -> None:
-    (picks / 'trials.csv').write_text(text)
-    with pytest.raises(RecordingError) as caught:
-        find_recordings(picks)
-    assert words in str(caught.value)

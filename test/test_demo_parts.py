@@ -27,7 +27,7 @@ from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import TYPESTORE, Item
-from foc_ros.reporting.live_text import GOAL, HAND, HEIGHT, OBSTACLE, WIDTH, draw_scene, extend_bounds, show_live
+from foc_ros.reporting.live_text import show_live
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 from foc_ros.ros import isolated_node
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
@@ -177,20 +177,6 @@ sys.exit(main(['demo']))
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False)
     assert (result.returncode, result.stderr) == (130, '')
     assert result.stdout.startswith('A recorded hand moves ') and result.stdout.endswith(' []\n')
-
-
-def test_the_scene_is_drawn_with_hand_goals_obstacles_and_candidates() -> None:
-    recorder = filled()
-    snapshot, hand = recorder.snapshots[0], recorder.samples[0].position
-    lines = draw_scene(snapshot, hand, extend_bounds(snapshot, hand, None)).splitlines()
-    assert len(lines) == HEIGHT and max(map(len, lines)) <= WIDTH
-    text = ''.join(lines)
-    assert text.count(HAND) == 1 and text.count(GOAL) == 2 and OBSTACLE in text and '1' in text and '2' in text
-    # x grows to the right: the hand is left of the obstacle, and that left of the goals
-    columns = {mark: [line.find(mark) for line in lines if mark in line] for mark in (HAND, OBSTACLE, GOAL)}
-    assert max(columns[HAND]) < min(columns[OBSTACLE]) < min(columns[GOAL])
-    before = (-1.0, 1.0, -1.0, 1.0)  # the drawing does not shrink
-    assert extend_bounds(snapshot, hand, before) == before and extend_bounds(snapshot, np.array([3.0, 0.0]), before)[1] > 3.0
 
 
 def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:

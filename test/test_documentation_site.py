@@ -64,12 +64,6 @@ def test_a_page_fits_its_window_and_needs_no_network(site: Path, browser: Any, p
         assert browser.execute_script(TOO_WIDE) == []
 
 
-def test_a_page_on_a_phone_is_not_hidden_by_the_contents(site: Path, browser: Any) -> None:
-    show(browser, site / 'index.html', 390)
-    assert browser.execute_script("return document.querySelector('.sidebar-drawer').getBoundingClientRect().right") <= 0
-    assert browser.execute_script('return document.documentElement.scrollWidth') <= 390
-
-
 def test_the_site_says_what_it_is_about(site: Path, browser: Any) -> None:
     show(browser, site / 'index.html')
     assert f'foc_ros {foc_ros.__version__}' in browser.title
@@ -79,14 +73,6 @@ def test_the_site_says_what_it_is_about(site: Path, browser: Any) -> None:
     described = browser.find_element('css selector', 'meta[name=description]').get_attribute('content')
     assert 'Predicts where the hand of a teleoperator is going' in described
     assert browser.execute_script("return document.querySelector('.sidebar-logo').naturalWidth") > 0
-
-
-def test_pictures_are_dark_where_the_page_is(site: Path, browser: Any) -> None:
-    style = "return getComputedStyle(document.querySelector('.content img')).filter"
-    show(browser, site / 'concepts.html')
-    assert browser.execute_script(style) == 'none'
-    show(browser, site / 'concepts.html', dark=True)
-    assert 'invert' in browser.execute_script(style)
 
 
 def test_the_reference_has_the_types_of_the_sources(site: Path, browser: Any) -> None:

@@ -27,7 +27,6 @@ from foc_ros.reporting.draw import (
     ELLIPSES_PER_CANDIDATE,
     GHOST_COLOUR,
     get_candidate_style,
-    save_figure,
 )
 from foc_ros.reporting.figures import make_moment_figure, make_scene_figure, plot_prediction, write_picture
 from foc_ros.reporting.views import Snapshot, build_hand_trajectory, build_snapshot
@@ -183,18 +182,6 @@ def test_a_plot_survives_subplots_and_savefig(name: str, tmp_path: Path) -> None
         assert not any(box.overlaps(other) for other in others)
     assert axes.get_window_extent(renderer).height > 50.0
     plt.close('all')
-
-
-@pytest.mark.parametrize(('suffix', 'start'), [('png', PNG), ('pdf', b'%PDF'), ('svg', b'<?xml')])
-def test_equal_input_gives_equal_pictures_in_every_format(tmp_path: Path, suffix: str, start: bytes) -> None:
-    for name in ('one', 'two'):
-        write_picture(tmp_path / f'{name}.{suffix}', prediction(START_NS, NOWHERE))
-    content = (tmp_path / f'one.{suffix}').read_bytes()
-    assert content.startswith(start)
-    if suffix == 'png':
-        save_figure(make_scene_figure(build_snapshot(prediction(START_NS, NOWHERE))), tmp_path / 'two.png')
-    if suffix != 'svg':  # whose marks have random names
-        assert content == (tmp_path / f'two.{suffix}').read_bytes()
 
 
 def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_start(tmp_path: Path) -> None:

@@ -21,7 +21,6 @@ from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import Status
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_goal_likelihoods, encode_outputs
 from foc_ros.ros.messages.plane import lift, project
-from foc_ros.ros.messages.ranking import MAX_RATIO
 from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
@@ -137,12 +136,6 @@ def test_nothing_solved_is_an_empty_answer(types: MessageTypes, outcomes: tuple[
     assert messages['path'].header.stamp.sec == 5
 
 
-def test_cost_ratios_stay_finite() -> None:
-    ways = prediction(outcome('a', 1.0, cost=0.0), outcome('b', 0.0, cost=1.0), outcome('c', 0.0, cost=0.0))
-    table = np.array(made('likelihoods', ways).data).reshape(-1, 4)
-    np.testing.assert_array_equal(table[:, 2], [1.0, MAX_RATIO, 1.0])
-
-
 @pytest.mark.parametrize('value', [np.nan, np.inf, 1e31])
 @pytest.mark.parametrize('where', ['mean', 'covariance', 'effort', 'eta'])
 def test_a_number_that_is_not_finite_is_not_encoded(value: float, where: str) -> None:
@@ -179,19 +172,6 @@ def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
     assert [each.scale.x for each in by_name['obstacle_deviation']] == pytest.approx([0.07, 0.04])
 
 
-def test_few_steps_are_drawn_as_a_smooth_curve_through_them() -> None:
-    """The markers of a path with constant jerk lie on the cubic, which the positions of the steps alone do not determine."""
-    times = DT * np.arange(STEPS + 1)
-    mean = np.zeros((STEPS + 1, 6))
-    mean[:, 0], mean[:, 2] = times, 1.0
-    mean[:, 1], mean[:, 3] = times**3, 3 * times**2
-    line = next(each for each in made('markers', prediction(outcome(mean=mean))).markers if each.ns == 'path')
-    points = np.array([(each.x, each.y) for each in line.points])
-    assert len(points) > 50
-    np.testing.assert_allclose(points[:, 1], points[:, 0] ** 3, atol=1e-12)
-    np.testing.assert_allclose(points[:: (len(points) - 1) // STEPS], mean[:, :2], atol=1e-12)
-
-
 def test_a_compromised_candidate_takes_part_and_says_so() -> None:
     ways = prediction(outcome('a', 0.7), outcome('b', 0.3, eta=0.62, status=Status.COMPROMISED))
     table = columns(made('prediction', ways))
@@ -208,21 +188,6 @@ def test_a_compromised_candidate_takes_part_and_says_so() -> None:
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
-def test_motor_noise_and_total_uncertainty_are_told_apart(plane: str) -> None:
-    one = outcome()
-    wide = replace(one, solution=one.solution.with_covariance(4.0 * one.solution.covariance))
-    table = columns(made('prediction', prediction(wide), plane=plane))
-    for pair in PAIRS:
-        np.testing.assert_allclose(table[pair], 4.0 * table[f'motor_{pair}'], rtol=1e-6)
-    assert table[f'motor_{plane}'].all()
-    sizes = {}
-    for each in made('markers', prediction(wide), plane=plane).markers:
-        sizes.setdefault(each.ns, []).append((each.scale.x, each.scale.y))
-    np.testing.assert_allclose(sizes['total_uncertainty'], 2.0 * np.array(sizes['motor_noise']), rtol=1e-6)
-    assert 'legend' in sizes
-
-
-@pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
 def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
     names, lifted = ('motor_noise', 'total_uncertainty'), lift(np.eye(2), 0.0, plane)
     ellipses = [each for each in made('markers', three_ways(), plane=plane).markers if each.ns in names]
@@ -232,13 +197,6 @@ def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
         axes = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()[:, :2]
         drawn = axes @ np.diag([each.scale.x / 2, each.scale.y / 2]) ** 2 @ axes.T
         np.testing.assert_allclose(drawn, lifted.T @ [[4e-6, 1e-6], [1e-6, 9e-6]] @ lifted, atol=1e-12)
-
-
-def test_a_candidate_without_a_path_shows_its_guess() -> None:
-    lost = outcome(status=Status.INFEASIBLE, mean=np.full((STEPS + 1, 6), np.nan))
-    markers = made('markers', prediction(lost)).markers
-    line = next(each for each in markers if each.ns == 'path')
-    np.testing.assert_allclose([(p.x, p.y) for p in line.points], lost.candidate.guess)
 
 
 @both_kinds

@@ -299,15 +299,6 @@ def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration() -
     assert_allclose(found.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-9)
 
 
-def test_a_goal_behind_an_obstacle_is_passed_with_velocity() -> None:
-    scene = make_obstacles([[0.15, 0.04]], 0.05), np.array([[0.3, 0.1]])
-    solved = predict(PASSING, moving_hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), *scene, NO_TRACKS)[0].solved_candidates
-    assert len(solved) == 2
-    for each in solved:
-        assert_allclose(each.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-6)
-        assert np.hypot(*each.solution.mean[-1, 2:4]) > 0.1
-
-
 def test_the_covariance_agrees_with_a_hand_that_replans_at_each_step() -> None:
     steps, dt, draws = 12, 0.1, 20_000
     plant, noise = discretise_triple_integrator(dt), np.random.default_rng(3)
@@ -332,23 +323,6 @@ def _plan(duration_s: float, passing: bool, mean: np.ndarray) -> Solution:
     stacked = build_triple_integrator_horizon(duration_s / STEPS, STEPS)
     problem = rest_to_goal(stacked, mean, GOAL, make_obstacles([], []), np.array([0.05, 0.05]), 0.9, passing=passing)
     return solve_problem(problem, cold_start(np.linspace(mean[:2], GOAL, STEPS + 1)), Config().foc)
-
-
-@pytest.mark.parametrize('passing', [False, True])
-@pytest.mark.parametrize('mean', [np.zeros(6), HAND.mean])
-def test_the_duration_sensitivity_is_the_difference_between_plans_of_other_durations(passing: bool, mean: np.ndarray) -> None:
-    duration_s, share = 0.8, 0.01
-    sooner, later = (_plan(duration_s * (1 + each), passing, mean) for each in (-share, share))
-    now = _plan(duration_s, passing, mean)
-    expected = np.zeros((STEPS + 1, 2))
-    for axis in range(2):
-        early, late = (np.interp(now.times, each.times, each.mean[:, axis]) for each in (sooner, later))
-        expected[:, axis] = (early - late) / (2.0 * share)
-    middle = slice(0, int(0.95 * STEPS))  # the shorter plan ends earlier
-    found = compute_duration_sensitivity(now, passing)[:, :2]
-    assert np.abs(found).max() > 0.05
-    # the free velocity at the goal changes as well, which the map does not contain
-    assert_allclose(found[middle], expected[middle], atol=(0.04 if passing else 0.015) * np.abs(found).max())
 
 
 def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods() -> None:

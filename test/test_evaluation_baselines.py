@@ -15,7 +15,6 @@ from foc_ros.analysis.evaluation.baselines import (
     boltzmann_shares,
     compute_straight_costs,
     compute_straight_positions,
-    forecast_straight_minimum_jerk,
     guess_constant_velocity,
     guess_nearest_gap,
     guess_shortest_path,
@@ -43,12 +42,6 @@ def ask_of(observed, name=PATH_CLASS):
 def test_constant_velocity_passes_the_obstacle_on_its_line_or_on_the_side_to_which_it_turns(velocity, side) -> None:
     observed = observation(TWO_CLASSES, centre=[(1.0, 0.3)], hand=(0.0, 0.0, *velocity, 0.0, 0.0))
     assert guess_constant_velocity(observed, ask_of(observed)) == (side,)
-
-
-def test_a_hand_at_rest_goes_straight_ahead_and_so_does_the_nearest_gap() -> None:
-    observed = observation(TWO_CLASSES, centre=[(1.0, 0.3)], hand=(0.0, 0.0, 0.0, 9.0, 0.0, 0.0), movement_age_s=0.0)
-    assert guess_constant_velocity(observed, ask_of(observed)) == guess_nearest_gap(observed, ask_of(observed)) == (R,)
-    assert guess_nearest_gap(replace(observed, hand=np.array([0.0, 0.4, 1.0, -1.0, 0.0, 0.0])), ask_of(observed)) == (L,)
 
 
 GOALS = [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
@@ -92,11 +85,6 @@ def test_straight_minimum_jerk_from_any_state_has_the_effort_of_its_own_jerk() -
         assert (jerk**2).sum() * t[1] == pytest.approx(compute_straight_costs(observed)[goal], rel=0.02)
         np.testing.assert_allclose(path[-1], observed.goals[goal], atol=1e-9)
         np.testing.assert_allclose((path[1] - path[0]) / t[1], [0.5, 0.3], atol=1e-2)
-
-
-def test_straight_minimum_jerk_weighs_goals_by_the_ratio_of_efforts() -> None:
-    forecast = forecast_straight_minimum_jerk(reaching(), ask_of(reaching(), GOAL), (1.0, 0.99))
-    np.testing.assert_allclose(forecast.probability, 0.99 * np.array([0.8, 0.2]) + 0.005)
 
 
 def test_every_baseline_forecasts_every_setting() -> None:

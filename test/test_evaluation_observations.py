@@ -19,7 +19,7 @@ from foc_ros.analysis.evaluation.observations import (
     observe_in_order,
 )
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
-from foc_ros.analysis.evaluation.truth import RecordedPath, find_open_gaps, find_rows_ahead
+from foc_ros.analysis.evaluation.truth import RecordedPath, find_rows_ahead
 from foc_ros.analysis.recordings import BagRecording, convert_tables, find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core import tracks
@@ -27,8 +27,7 @@ from foc_ros.core.classes.rows import find_rows
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.shapes import Box, Circle, Shape, collect_obstacles
-from foc_ros.core.solution import LEFT, RIGHT
+from foc_ros.core.solution import LEFT
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
 from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -52,17 +51,6 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def observe_one(data: Path, config: Config) -> ObservedRecording:
     return observe(find_recordings(data)['one'], config)
-
-
-@pytest.mark.parametrize('config', [PLAIN, AHEAD])
-def test_the_published_likelihoods_follow_from_the_observations(data: Path, config: Config) -> None:
-    recording = observe_one(data, config)
-    assert len(recording.observations) >= 4
-    for each in recording.observations:
-        np.testing.assert_allclose(
-            power_rule_shares(each, config.likelihood)[each.candidates.has_likelihood],
-            each.candidates.likelihood[each.candidates.has_likelihood],
-        )
 
 
 def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_them(data: Path) -> None:
@@ -149,34 +137,6 @@ def test_a_row_is_passed_for_good_only_when_the_path_does_not_come_back() -> Non
     assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place).tolist() == [True, True, False]
     assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place[1:]).tolist() == [True, True, False]
     assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place[3:]).tolist() == [False, False, False]
-
-
-START, END = np.zeros(2), np.array([[2.0, 0.0]])
-WALLS = [Box((1.0, side * 0.5), (3.0, 0.1), name=f'wall{side}') for side in (-1, 1)]
-
-
-def find_ways(*shapes: Shape, hand_radius: float = 0.0) -> tuple[list[int], list[list[list[int]]]]:
-    """Return the row of each obstacle, and the sides of the open gaps of each row."""
-    obstacles = collect_obstacles(shapes)
-    row = find_rows(obstacles, DIRECTION, START, END)
-    return row.tolist(), [sides.tolist() for sides in find_open_gaps(obstacles, row, DIRECTION, hand_radius)]
-
-
-def test_a_wall_is_in_no_row_and_a_box_across_the_way_is() -> None:
-    across = Box((0.5, 0.0), (0.05, 0.4)), Box((1.5, 0.1), (0.4, 0.05), np.pi / 2)
-    assert find_ways(*across, *WALLS)[0] == [0, 1, -1, -1]
-    assert find_ways(Box((1.0, 0.3), (1.0, 0.05)), Box((2.5, 0.0), (0.1, 2.0)))[0] == [0, -1]  # beside a part; behind the goal
-    assert find_ways(Circle((1.0, 30.0), radius=20.0))[0] == [0]
-
-
-def test_gaps_too_narrow_for_the_hand_are_closed() -> None:
-    right, left = Box((1.0, -0.2), (0.1, 0.3)), Box((1.0, 0.2), (0.1, 0.2))  # gaps of 0.10, 0.15 and 0.15 m
-    through = [[RIGHT, RIGHT], [LEFT, RIGHT], [LEFT, LEFT]]
-    for hand_radius, is_open in ((0.0, [True] * 3), (0.06, [False, True, True]), (0.08, [False] * 3)):
-        row, (gaps,) = find_ways(right, left, *WALLS, hand_radius=hand_radius)
-        assert row == [0, 0, -1, -1]
-        assert gaps == [[*sides, 0, 0] for sides, each in zip(through, is_open, strict=True) if each]
-    assert find_ways(right, left, hand_radius=0.08)[1] == [[through[0], through[2]]]
 
 
 TRUE_GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])

@@ -19,7 +19,6 @@ from foc_ros.analysis.evaluation.scores import (
     choose_held_out,
     compare_scores,
     compute_reliability,
-    find_final_leads,
     find_tenths,
     score_forecasts,
     summarise,
@@ -37,26 +36,6 @@ def test_rows_of_two_and_one_have_six_classes_and_the_next_row_three_gaps() -> N
     path_class, gap = ask(PATH_CLASS, observed, relevant), ask(GAP, observed, relevant)
     assert path_class.possible == 6 and path_class.answers[path_class.truth] == (R, L, R) and path_class.given.tolist() == [0, 1]
     assert gap.possible == 3 and gap.answers[gap.truth] == (R, L)
-
-
-def test_passed_and_irrelevant_obstacles_are_not_in_question() -> None:
-    observed = observation(
-        make_candidates([[L, L, L], [R, L, R]]), **TWO_ROWS, true_sides=(R, L, R), is_ahead=[False, False, True]
-    )
-    assert ask(PATH_CLASS, observed, frozenset('012')).answers == ((L,), (R,))
-    assert ask(PATH_CLASS, observed, frozenset('01')) is None
-    assert ask(GOAL, observed, frozenset()) is None
-
-
-def test_an_answer_that_weaves_through_a_row_is_not_possible() -> None:
-    observed = observation(make_candidates([[L, R, L], [R, L, L]]), **TWO_ROWS, true_sides=(R, R, R))
-    found = ask(PATH_CLASS, observed, frozenset('012'))
-    assert dict(zip(found.answers, found.is_possible.tolist(), strict=True)) == {
-        (L, R, L): False,
-        (R, L, L): True,
-        (R, R, R): True,
-    }
-    assert found.unlisted == 4
 
 
 def test_the_goal_is_in_question_where_there_are_several_and_one_was_reached() -> None:
@@ -167,11 +146,6 @@ def test_a_summary_counts_by_tenths_which_include_their_lower_bound() -> None:
     assert (found['leads_for_good_from'], found['leads_for_good_before_s']) == (0.95, 0.2)
     assert found['gain'] == pytest.approx(np.log(2.0))
     assert find_tenths(np.array([0.0, 0.1, 0.3, 0.7, 0.99, 1.0])).tolist() == [0, 1, 3, 7, 9, 9]
-
-
-def test_the_final_lead_begins_after_the_last_wrong_forecast() -> None:
-    found = make_scores([0.5] * 6, [1, 0, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1], [0.1, 0.4, 0.6, 0.2, 0.5, 0.9], [5, 4, 3, 9, 8, 7])
-    assert find_final_leads(found).tolist() == [[0.6, 1.0], [3.0, 0.0]]
 
 
 def test_a_held_out_recording_gets_the_setting_that_is_best_for_the_others() -> None:

@@ -17,7 +17,6 @@ from foc_ros.analysis.fitting.direct import (
     FADING,
     MAX_CLASSES,
     RecordedHand,
-    count_classes,
     fit_duration,
     fit_estimator,
     fit_fading,
@@ -78,14 +77,6 @@ def test_where_only_a_sum_is_determined_one_part_is_kept_and_the_other_follows()
     assert found.estimates[name].value == 7.0 - GIVEN[kept]
 
 
-def test_resamples_scatter_as_the_mean_of_a_sample_does() -> None:
-    data, tried = np.random.default_rng(6).normal(2.0, 0.5, 400), np.linspace(1.5, 2.5, 501)
-    values = -0.5 * ((data[:, None] - tried) / 0.5) ** 2
-    table = SettingTable(values, tuple({'likelihood.beta': each} for each in tried.tolist()))
-    found = table.estimate({'likelihood.beta': 2.0}, 'how')[0].estimates['likelihood.beta']
-    assert [found.low, found.high] == pytest.approx(data.mean() + 1.96 * data.std() / 20 * np.array([-1, 1]), abs=0.008)
-
-
 def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
     """Return hands that are driven by white jerk, as the filter expects."""
     rng = np.random.default_rng(seed)
@@ -112,12 +103,6 @@ def test_the_deviations_that_made_the_data_are_found(stddev: float, density: flo
         assert each.low <= each.value <= each.high
         assert each.value == pytest.approx(true, rel=0.1)
         assert 0.8 * each.low < true < 1.2 * each.high
-
-
-def test_noise_below_the_resolution_is_undetermined_and_keeps_its_value() -> None:
-    found = fit_estimator(_drifting(3, 1e-9, 3.0), Config())
-    assert set(found.estimates) == {'estimator.jerk_density'}
-    assert 'the end of the values tried' in found.undetermined['estimator.position_stddev']
 
 
 def _reaches(durations: list[float], goals: np.ndarray) -> list:
@@ -157,14 +142,6 @@ def test_distances_that_differ_determine_intercept_and_slope() -> None:
     assert np.ptp(fitted - durations) < 0.05
 
 
-def test_without_a_goal_reached_durations_are_kept() -> None:
-    far = _reaches([1.0], np.array([[0.3, 0.0]]))[0]
-    missed = recorded_hand('missed', far.times, far.positions, far.obstacles, np.array([[0.9, 0.0]]))
-    found = fit_duration([missed], Config())
-    assert found.estimates == {}
-    assert found.undetermined['duration.fitts_a_s'] == 'no recording has a movement that ends near a goal'
-
-
 @pytest.mark.parametrize('fading_s', [0.06, 0.2])
 def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
     rng, dt = np.random.default_rng(5), 0.005
@@ -201,14 +178,6 @@ def make_hand(centres, goals=((1.0, 0.0),)) -> RecordedHand:
 
 
 TWO_ROWS = [(0.3, -0.1), (0.3, 0.1), (0.6, 0.0)]
-
-
-@pytest.mark.parametrize(
-    ('centres', 'expected'),
-    [([], 1), (TWO_ROWS, 6), ([*TWO_ROWS, (-0.5, 0.0), (1.5, 0.0)], 6), ([(0.1 * k, 0) for k in range(1, 9)], 256)],
-)
-def test_rows_between_start_and_goal_multiply(centres, expected: int) -> None:
-    assert count_classes(make_hand(centres)) == expected
 
 
 @pytest.mark.parametrize(

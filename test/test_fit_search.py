@@ -82,19 +82,6 @@ def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_record
     assert many.rounds[-1] == (2, race.MAX_RECORDINGS)
 
 
-def test_classes_decide_and_positions_where_classes_are_alike() -> None:
-    positions = np.array([[0.0, 0.0], [5.0, 5.0], [1.0, 1.0]])
-    assert race.rank(np.array([[[1.0, 1.2], [0.5, 0.8], [0.9, 1.4]], positions])) == [2, 0, 1]
-    assert race.rank(np.array([[[1.0, 1.2], [0.7, 1.55], [0.9, 1.4]], positions])) == [1, 2, 0]
-    assert race.rank(np.array([np.zeros((3, 2)), positions])) == [1, 2, 0]
-
-
-def test_worse_positions_have_a_warning() -> None:
-    config, found = KnownReplays([[0.0] * 8, [1.0] * 8], [[0.0] * 8, [-0.3] * 8]).search(ARRIVALS)
-    assert config.duration.arrival == 'passing'
-    assert [words for words in found.warnings if 'predicts positions worse' in words and '0.3 nat' in words]
-
-
 def test_models_durations_arrivals_and_fading_are_tried_in_all_combinations() -> None:
     reaches, fading = _reaches(CONFIG), replace_values(CONFIG, {'estimator.acceleration_time_s': 0.06})
     for config, accelerations in ((CONFIG, {0.0}), (fading, {0.06, 0.0})):
@@ -242,9 +229,3 @@ def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoin
     for kind in ('inside_90', 'inside_all_90'):
         assert scores[kind]['fitted'] == pytest.approx(0.9, abs=0.08)
         assert scores[kind]['without the recording'] == pytest.approx(0.9, abs=0.08)
-
-
-def test_a_value_at_the_end_of_those_tried_is_not_taken() -> None:
-    found, _ = fit_widening(_make_recordings(0.3, 0.0), Config())
-    assert 'foc.endpoint_stddev' not in found.estimates
-    assert found.undetermined['foc.endpoint_stddev'] == '0.16, the end of the values tried, explains the recordings best'

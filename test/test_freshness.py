@@ -7,41 +7,11 @@ from __future__ import annotations
 import pytest
 
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.pipeline import SampleStatus
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.io.topics import CLOUD, HAND, MARKERS
 from foc_ros.ros.freshness import Freshness
 
 CONFIG = replace_values(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
 NEVER = replace_values(Config(), {'estimator.hand_timeout_s': 0.0, 'scene.timeout_s': 0.0})
-BOTH = ('cloud', 'markers')
-SILENT = 'hand_pose silent for {} s (estimator.hand_timeout_s is 0.5)'
-
-
-@pytest.mark.parametrize(
-    ('times', 'words', 'silent'),
-    [
-        ({}, None, []),
-        ({HAND: 9.4, CLOUD: 9.0}, SILENT.format(0.6), []),
-        ({HAND: 10.0, CLOUD: 7.9, MARKERS: 10.0}, 'obstacles silent for 2.1 s (scene.timeout_s is 2)', ['cloud']),
-        ({HAND: 10.0, CLOUD: 10.0, MARKERS: 7.0}, 'obstacle_markers silent for 3.0 s (scene.timeout_s is 2)', ['markers']),
-        ({HAND: 10.0, CLOUD: 5.0, MARKERS: 7.0}, 'obstacles silent for 5.0 s (scene.timeout_s is 2)', ['cloud', 'markers']),
-        ({HAND: 9.6, CLOUD: 8.1, MARKERS: 8.1}, None, []),
-    ],
-)
-def test_one_silent_input_stops_predictions(times: dict[str, float], words: str | None, silent: list[str]) -> None:
-    """An input that was never received is not silent."""
-    freshness = Freshness()
-    for role, time_s in times.items():
-        freshness.note(role, SampleStatus.ACCEPTED, time_s)
-    found = freshness.find_not_ready_reason(10.0, CONFIG, BOTH)
-    assert (found and found[1]) == words
-    assert freshness.find_silent_sources(10.0, CONFIG, BOTH) == silent
-    assert freshness.find_not_ready_reason(10.0, NEVER, BOTH) is None
-    assert freshness.find_silent_sources(10.0, NEVER, BOTH) == []
-    for role in (HAND, CLOUD, MARKERS):
-        freshness.note(role, SampleStatus.ACCEPTED, 10.0)
-    assert freshness.find_not_ready_reason(10.0, CONFIG, BOTH) is None, 'it is received again'
 
 
 @pytest.mark.parametrize(

@@ -106,23 +106,6 @@ def test_a_hull_is_convex_and_holds_its_points(seed):
     assert distance.max() < 1e-9
 
 
-def test_tables_hold_the_polygons_of_shapes():
-    table = collect_obstacles(
-        [
-            Circle((0.1, 0.2), radius=0.03),
-            Capsule((0.0, 0.0), (0.2, 0.0), radius=0.01),
-            Box((0.5, 0.5), size=(0.2, 0.1), radius=0.02),
-            Hull([(0.0, 0.0), (0.3, 0.0), (0.0, 0.3), (0.05, 0.05)]),
-        ]
-    )
-    assert table.corners.tolist() == [1, 2, 4, 3]
-    np.testing.assert_allclose(table.centre, [[0.1, 0.2], [0.1, 0.0], [0.5, 0.5], [0.1, 0.1]], atol=1e-15)
-    np.testing.assert_allclose(table.extent, [0.03, 0.11, 0.02 + np.hypot(0.1, 0.05), np.hypot(0.2, 0.1)])
-    grown = table.grow(0.01)
-    np.testing.assert_allclose(grown.extent, table.extent + 0.01)
-    np.testing.assert_array_equal(grown.vertices, table.vertices)
-
-
 def make_circle_of_points(corners: int) -> np.ndarray:
     turns = 2 * np.pi * np.arange(corners) / corners
     return 0.1 * np.stack((np.cos(turns), np.sin(turns)), axis=1)

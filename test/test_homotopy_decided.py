@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from foc_ros.core.classes import Turn, compute_swept_angles, find_path_sides, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT
 
@@ -86,14 +85,6 @@ def test_a_wall_of_three_hundred_obstacles_is_noted():
     assert found.notes['no_way'] == 1 and found.notes['left_out'] > 0
 
 
-def test_arguments_that_do_not_fit_are_named():
-    settings = HomotopyConfig()
-    with pytest.raises(SceneError, match='hand_mean'):
-        search(np.zeros(2), np.array([[0.3, 0.0]]), NOTHING, settings, [1.0], 50)
-    with pytest.raises(SceneError, match='duration_s: expected one for each of the 1 goals, got 2'):
-        search(np.zeros(6), np.array([[0.3, 0.0]]), NOTHING, settings, [1.0, 1.0], 50)
-
-
 ABEAM = make_obstacles([[0.5, 0.0]], 0.1, ids=('post',))
 
 
@@ -120,13 +111,6 @@ def test_a_moving_obstacle_counts_where_it_is_at_each_step():
     # half way, when the hand passes, it has come no nearer than 0.1 m to the left
     assert find_path_sides(path, ABEAM, crossing) == {'post': RIGHT}
     assert find_path_sides(path, ABEAM, crossing - [0.0, 0.2]) == {'post': LEFT}
-
-
-def test_centres_of_another_number_of_points_are_refused():
-    with pytest.raises(SceneError, match='centres: expected one row for each of the 101 points, got 3 rows'):
-        find_path_sides(bowed(0.1), ABEAM, np.zeros((3, 1, 2)))
-    with pytest.raises(SceneError, match='path: expected points'):
-        find_path_sides(np.zeros((3, 3)), ABEAM)
 
 
 @settings(max_examples=80, deadline=None, derandomize=True)

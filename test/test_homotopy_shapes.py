@@ -4,13 +4,13 @@
 
 import numpy as np
 import pytest
-from homotopy_scenes import AVOIDING, CLEARANCE, GOAL, avoiding, find, random_scene
+from homotopy_scenes import AVOIDING, CLEARANCE, GOAL, avoiding, find
 from homotopy_shapes import HAND, make_box, random_shapes, shortest_by_pattern, turn
 
 from foc_ros.core.classes import find_path_sides, scene
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.shapes import Capsule, collect_obstacles, make_box_polygon
+from foc_ros.core.obstacles.shapes import make_box_polygon
 
 BEST = 16
 """Number of classes to compare: the longest of 32 wind about obstacles, where limits of winding count."""
@@ -127,15 +127,6 @@ def test_brute_force_agrees_with_the_closed_form_for_one_circle():
     assert found == {(1,): pytest.approx(exact, rel=1e-3), (-1,): pytest.approx(exact, rel=1e-3)}
 
 
-def test_a_wall_across_the_way_is_named_though_its_centre_lies_beyond_the_goal():
-    wall = Capsule((0.1, -0.05), (0.7, 0.4), radius=0.01, name='wall')
-    found = find(collect_obstacles([wall]), [[0.3, -0.04]], (0.1, 0.1))
-    assert {one.label for one in found.candidates} == {'goal0:+wall', 'goal0:-wall'}
-    obstacles = collect_obstacles([wall])
-    for one in found.candidates:
-        assert find_path_sides(one.guess, obstacles) == dict(one.sides)
-
-
 @pytest.mark.parametrize('centre', [(0.033, 0.0), (0.028, 0.004), (0.01, 0.002), (0.02, -0.01)])
 def test_a_hand_in_a_box_or_in_its_margin_gets_out_on_both_sides(centre):
     obstacles = make_obstacles([centre], 0.0, polygons=[make_box(0.06, 0.04, 0.1)])
@@ -209,15 +200,6 @@ def test_the_search_ends_at_the_largest_number_of_states_and_says_so(monkeypatch
     few = find(obstacles, velocity=VELOCITY, k=32)
     assert few.notes == {'search_cut': 1} and 0 < len(few.candidates) < len(whole.candidates)
     assert [one.label for one in few.candidates] == [one.label for one in whole.candidates][: len(few.candidates)]
-
-
-@pytest.mark.parametrize('seed', range(10))
-def test_guesses_are_as_smooth_as_hands_on_exact_paths(seed):
-    rng = np.random.default_rng(seed)
-    for one in find(random_scene(rng, int(rng.integers(1, 6))), steps=50).candidates:
-        bend = np.hypot(*np.diff(one.guess, 2, axis=0).T).max() * 50**2
-        # minimum jerk on a straight line has 5.8 L / T^2; a circle of radius r adds v^2 / r
-        assert bend < 5.8 * one.length + 1.4 * (1.875 * one.length) ** 2 / 0.015
 
 
 TICKS = 150

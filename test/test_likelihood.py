@@ -15,16 +15,13 @@ from scipy.stats import norm
 
 import foc_ros
 from foc_ros.core.classes.rows import Decisions, find_decisions
-from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
+from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.errors import InputError
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.prediction import PredictedCandidate
-from foc_ros.core.registry import LIKELIHOOD_RULES
-from foc_ros.core.safety_preference import SafetyPreference
-from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
-from foc_ros.core.types import Array, HandState
+from foc_ros.core.solution import LEFT, RIGHT, Status
+from foc_ros.core.types import HandState
 
 ANY_COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)
@@ -51,46 +48,6 @@ def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs: list[flo
 def test_a_negative_or_infinite_cost_is_refused_by_name(wrong: float) -> None:
     with pytest.raises(InputError, match=r'costs\[1\]: expected a finite number >= 0'):
         compute_likelihoods(np.array([1.0, wrong]), with_beta(0.5))
-
-
-def test_a_rule_may_give_classes_no_weight(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        LIKELIHOOD_RULES, '_parts', {'first': lambda costs, _: np.where(np.arange(len(costs)) == 0, 0.0, -np.inf)}
-    )
-    config, ahead = replace(LikelihoodConfig(), rule='first'), BranchTimes(np.full((3, 3), 0.5), np.arange(3))
-    for horizon_s in (0.0, 1000.0):
-        found = compute_likelihoods(np.ones(3), replace(config, planning_horizon_s=horizon_s, lookahead_s=0.0), ahead)
-        np.testing.assert_allclose(found, [1.0, 0.0, 0.0], atol=1e-250)
-    monkeypatch.setattr(LIKELIHOOD_RULES, '_parts', {'first': lambda costs, _: np.full(len(costs), -np.inf)})
-    np.testing.assert_allclose(compute_likelihoods(np.ones(3), config, ahead, time_s=1.0), np.ones(3) / 3.0)
-
-
-STEPS = 40
-
-
-def outcome(corners: list[tuple[float, float]], goal: int = 0, duration_s: float = 2.0) -> PredictedCandidate:
-    """A path through corners at even times."""
-    at = np.linspace(0.0, len(corners) - 1.0, STEPS + 1)
-    path: Array = np.column_stack([np.interp(at, np.arange(len(corners)), axis) for axis in np.array(corners).T])
-    mean = np.hstack([path, np.zeros((STEPS + 1, 4))])
-    none = np.zeros((STEPS, 2))
-    solution = Solution(
-        Status.SOLVED, '', duration_s / STEPS, mean, np.zeros((STEPS + 1, 6, 6)), none, 1.0, {}, tau=0.0, lam=1.0, eta=0.9
-    )
-    return PredictedCandidate(Candidate('', goal, (), path, 1.0), solution, {}, 1.0, 0.0)
-
-
-TWO = make_obstacles([(1.0, 0.0), (3.0, 0.0)], 0.1)
-
-
-def pass_two(first: float, second: float, duration_s: float = 4.0) -> PredictedCandidate:
-    return outcome([(0.0, 0.0), (1.0, first), (2.0, 0.0), (3.0, second), (4.0, 0.0)], duration_s=duration_s)
-
-
-def test_paths_separate_when_the_first_of_them_passes_an_obstacle_on_another_side() -> None:
-    found = compute_branch_times([pass_two(0.1, 0.1), pass_two(0.1, -0.1), pass_two(-0.1, -0.1, duration_s=2.0)], TWO)
-    np.testing.assert_allclose(found.after_s, [[np.inf, 3.0, 0.5], [3.0, np.inf, 0.5], [0.5, 0.5, np.inf]])
-    assert found.path_class.tolist() == [0, 1, 2]
 
 
 THREE_COSTS = np.array([1.0, 2.0, 5.0])
@@ -179,16 +136,6 @@ CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
 def classes(**values):
     given = {'foc.noise_x': 0.3, 'foc.noise_y': 0.3} | {name.replace('__', '.'): value for name, value in values.items()}
     return foc_ros.solve_classes((0, 0), [(0.3, 0)], [CUP], config=foc_ros.Config().with_values(given))
-
-
-def test_the_loss_is_that_of_the_likelihood():
-    """Two classes whose losses differ by x have likelihoods of ratio exp(x)."""
-    config = LikelihoodConfig(beta=0.7, shortfall=1.3)
-    preference = SafetyPreference(config.beta, config.shortfall, fixed_cost=2.0, dt=0.02)
-    efforts, ks = np.array([100.0, 400.0]), np.array([1.5, 2.75])
-    losses = [preference.compute_loss(effort, k, 3.0) for effort, k in zip(efforts, ks, strict=True)]
-    shares = compute_likelihoods(2.0 + 0.02 * efforts, config, shortfalls=3.0 - ks)
-    assert math.log(shares[0] / shares[1]) == pytest.approx(losses[1] - losses[0])
 
 
 def test_a_class_that_misses_eta_takes_part_with_less_weight():

@@ -74,18 +74,6 @@ def test_without_a_movement_nothing_changes() -> None:
     assert pipeline.adapted_config is CONFIG
 
 
-def test_the_present_movement_counts_by_the_distance_that_it_has_covered() -> None:
-    slow, pipeline, found = reach(4.0), Pipeline(CONFIG), [1.0]
-    for row, position in enumerate(slow[:130]):
-        pipeline.set_goals(FAR_GOAL, 'world')
-        pipeline.add_hand_sample(HandSample(NANOSECONDS + row * STEP_NS, position, 0.0, 'world'))
-        found.append(pipeline.learnt.pace.find_best(CONFIG.duration)[1])
-    assert pipeline.learnt.pace.movements == 0 and found[40] == 1.0 and found[-1] > 1.5
-    first = int(np.flatnonzero(np.array(found) != 1.0)[0])
-    assert np.abs(np.diff(np.log(found[first:]))).max() < 0.1, 'after the first state that is judged, the factor does not jump'
-    assert pipeline.learnt.pace.interrupt().find_best(CONFIG.duration) == ('rest', 1.0)
-
-
 def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
     one, other = (follow(Pipeline(CONFIG), reach(4.0), reach(3.5), reach(4.2)) for _ in range(2))
     np.testing.assert_array_equal(one.learnt.pace.losses, other.learnt.pace.losses)

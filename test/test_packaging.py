@@ -210,15 +210,6 @@ def test_the_workflow_runs_what_decides_over_a_change() -> None:
     assert f'Python {first} to {last}' in (ROOT / 'Makefile').read_text('utf-8')
 
 
-@pytest.mark.parametrize('name', ['bug', 'wish'])
-def test_a_template_of_an_issue_asks_for_something(name: str) -> None:
-    form = read_yaml(f'.github/ISSUE_TEMPLATE/{name}.yml')
-    assert form['name'] and form['description']
-    fields = [field for field in form['body'] if field['type'] != 'markdown']
-    assert any(field.get('validations', {}).get('required') for field in fields)
-    assert len({field['id'] for field in fields}) == len(fields)
-
-
 def test_the_hooks_are_those_of_make_lint() -> None:
     (repository,) = read_yaml('.pre-commit-config.yaml')['repos']
     assert repository['repo'] == 'local'

@@ -139,22 +139,6 @@ def test_a_rejected_message_changes_nothing_and_is_counted_with_its_reason(recor
     assert sum(pipeline.counts.values()) == len(rejections)
 
 
-@pytest.mark.parametrize(
-    ('jump', 'status'),
-    [(-600.0, SampleStatus.RESTARTED_BACKWARD), (600.0, SampleStatus.RESTARTED_GAP), (-1e5, SampleStatus.RESTARTED_BACKWARD)],
-)
-def test_a_jump_of_the_hand_stamp_restarts_the_movement(recorder: Recorder, jump: float, status: SampleStatus) -> None:
-    pipeline = ready(replace_values(CONFIG, {'scene.timeout_s': 0.0}))
-    pipeline.add_hand_sample(hand(0.0))
-    pipeline.predict()
-    assert pipeline.add_hand_sample(hand(jump)) is status
-    assert status.is_restart
-    assert pipeline.is_due
-    assert pipeline.predict() is not None
-    assert recorder.calls[1][4].stamp_ns is None
-    assert pipeline.counts[f'hand_{status}'] == 1
-
-
 def test_while_disengaged_the_hand_is_followed_without_predictions(recorder: Recorder) -> None:
     pipeline = ready()
     pipeline.add_hand_sample(hand(0.0))

@@ -166,21 +166,6 @@ def test_a_click_on_a_chart_leads_to_its_time_and_the_scene_zooms(browser: Any, 
     assert scale == pytest.approx([1.25, 1.0])
 
 
-def test_a_warning_leads_to_its_first_moment(browser: Any, tmp_path: Path) -> None:
-    made = samples()
-    snapshots = [build_snapshot(each) for each in predictions(made)]
-    # only from the eleventh prediction on is a candidate lost
-    snapshots[:10] = [replace(each, unsolved=()) for each in snapshots[:10]]
-    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {'rejected': 'hand_late 3', 'hand poses': '150'})
-    assert show(browser, tmp_path / 'index.html') == []
-    (button,) = browser.find_elements('css selector', '.warning button.moment')
-    assert button.text == 'first at 0.40 s'
-    browser.execute_script('arguments[0].click()', button)
-    assert browser.find_element('id', 'clock').text == '0.40 s'
-    counters = browser.find_element('css selector', 'details')
-    assert counters.get_attribute('open') is None and 'hand_late 3' in counters.get_attribute('textContent')
-
-
 def test_the_page_opens_on_the_way_where_several_paths_are_likely_and_the_filter_has_setled(browser: Any, tmp_path: Path) -> None:
     """The second of two movements has a moment with four paths; the first predictions of both are not settled."""
     made = samples(2)

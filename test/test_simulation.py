@@ -15,12 +15,10 @@ from evaluation_samples import reach, write_tables
 from foc_ros.analysis.simulation import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
 from foc_ros.analysis.simulation.operators import (
     DT,
-    FREE_M,
     Arm,
     Task,
     draw_task,
     interpolate_minimum_jerk,
-    plan_path,
 )
 from foc_ros.analysis.simulation.study import (
     RULES,
@@ -47,13 +45,6 @@ def cross(goal_row: int = 0) -> Task:
     """Return a straight movement to a goal, without obstacles."""
     path = interpolate_minimum_jerk(np.array([[0.0, 0.0], GOALS[goal_row]]), np.array([0.0, 1.2]), AT_REST)
     return Task(Arm(noise=0.0), make_obstacles(), GOALS, GOALS[goal_row], goal_row, path)
-
-
-def test_an_intended_path_avoids_the_obstacles_as_they_are_seen() -> None:
-    seen = make_obstacles([(0.15, 0.0)], [0.03])
-    path = plan_path(np.random.default_rng(1), np.zeros(2), np.array([0.3, 0.0]), seen)
-    assert path is not None
-    assert np.hypot(*(path.position - seen.centre[0]).T).min() >= 0.03 + FREE_M
 
 
 @pytest.mark.parametrize('operator', OPERATORS[:-1])

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 import math
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ import pytest
 from reach_helpers import reference_cases
 
 from foc_ros.cli.main import main
-from foc_ros.core.ocp import strategies
 from foc_ros.core.solution import Status
 
 SCENE: dict[str, Any] = {
@@ -118,16 +116,6 @@ def test_a_goal_without_a_path_is_named(tmp_path: Path, capsys: pytest.CaptureFi
     assert solve(tmp_path, {**scene, 'goal': [0.3, 0.0]}, '--plot', str(tmp_path / 'none.png')) == 3
     assert capsys.readouterr() == ('', 'foc_ros solve: no path was found between the start and any goal\n')
     assert (tmp_path / 'none.png').exists()
-
-
-@pytest.mark.parametrize('strategy', [{'strategy': 'optimal'}, {'strategy': 'fixed', 'tau': 5e-4, 'lambda': 1e3}])
-def test_a_class_that_is_not_settled_says_so_and_is_late_only_where_there_is_a_time_limit(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, strategy: dict[str, Any]
-) -> None:
-    monkeypatch.setattr(strategies, 'solve_at', partial(strategies.solve_at, most=1))
-    for each in candidates(tmp_path, capsys, {**SCENE, **strategy}):
-        assert each['status'] == 'estimated' and each['likelihood'] > 0.0
-        assert each['message'].startswith('not settled after 1 QPs')
 
 
 def test_the_terminal_gives_reason_and_remedy_of_what_is_not_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -94,9 +94,6 @@ def test_a_killed_sqlite_recorder_leaves_a_log_that_is_read_with_a_warning(tmp_p
 @pytest.mark.parametrize(
     'options',
     [
-        {'use_statistics': False},
-        {'index_types': IndexType.MESSAGE},
-        {'use_chunking': False, 'repeat_channels': False, 'repeat_schemas': False},
         {'compression': CompressionType.LZ4, 'use_summary_offsets': False, 'enable_crcs': False},
         {'repeat_channels': False, 'use_statistics': False, 'index_types': IndexType.NONE, 'repeat_schemas': False},
     ],
@@ -163,13 +160,6 @@ def test_a_missing_part_of_a_split_recording_is_named(tmp_path: Path, lost: int,
         assert len(read(tmp_path)) == len(WHOLE) - len(WHOLE[lost::3])
     with pytest.raises(RecordingError, match=rf'split_{lost}\.db3.* is missing'):
         list(BagRecording('split', tmp_path).items())
-
-
-def test_a_file_that_the_metadata_do_not_name_is_named(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / 'one', SHORT)
-    write_mcap(bag / 'two.mcap', SHORT)
-    with pytest.warns(FocWarning, match=r'two\.mcap, which metadata\.yaml does not name, is not read'):
-        assert read(bag) == WHOLE
 
 
 @pytest.mark.parametrize('name', ['a%20b', 'a?mode=rw', "it's", 'été 手', '-x', 'a\nb'])
