@@ -65,7 +65,7 @@ NOT_RUN = {
     # measuring
     'make people': f'{LONG}, and needs recordings that are not part of the checkout',
     '.venv/bin/python scripts/flicker.py': REPLAYED,
-    '.venv/bin/python benchmarks/accuracy.py': f'{LONG}; test_accuracy_page.py checks the page',
+    '.venv/bin/python benchmarks/accuracy.py': f'{LONG}; test_documentation.py checks the page',
     # guidance
     'foc_ros simulate --trials 200': PARTLY,
     # CONTRIBUTING

@@ -8,14 +8,16 @@ import math
 import re
 
 import pytest
+from bag_helpers import STORE
 from hypothesis import given
 from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, message_types, pose, pose_array, pose_stamped
 
 from foc_ros.core.errors import LostHandError, MessageError, RecordingError
 from foc_ros.io.topics import assign_topics
+from foc_ros.ros.messages import types as conversion_types
 from foc_ros.ros.messages.decode_poses import MAX_GOALS, decode_goal, decode_goals, decode_hand_sample
-from foc_ros.ros.messages.types import MessageTypes
+from foc_ros.ros.messages.types import MessageTypes, RosbagsTypes
 
 BAGS = message_types('rosbags')
 
@@ -170,3 +172,12 @@ def test_topics_are_found(topics: dict[str, str], expected: dict[str, str]) -> N
 def test_a_wrong_choice_of_topics_is_refused(topics: dict[str, str], chosen: dict[str, str] | None, message: str) -> None:
     with pytest.raises(RecordingError, match=re.escape(message)):
         assign_topics(topics, chosen)
+
+
+@pytest.mark.parametrize(
+    ('stamp_ns', 'expected'),
+    [(0, (0, 0)), (1_500_000_000, (1, 500_000_000)), (-1, (-1, 999_999_999)), (2**80, (2**31 - 1, 2**80 % 10**9))],
+)
+def test_stamps_split_and_stay_in_range(stamp_ns: int, expected: tuple[int, int]) -> None:
+    made = conversion_types.make_stamp(RosbagsTypes(STORE), stamp_ns)
+    assert (made.sec, made.nanosec) == expected

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import os
 import signal
@@ -13,11 +14,13 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from report_samples import START_NS, prediction, predictions, samples
 from rich.console import Console
+from rosbags.highlevel import AnyReader
 
 from foc_ros.cli import demo
 from foc_ros.cli.demo import Recorder, describe_lead
@@ -276,3 +279,43 @@ with NodeProcess(os.environ | {{'PYTHONPATH': {str(package.parent)!r}}}, Path({s
         assert alive(pid)
         process.send_signal(signal.SIGKILL)
     until(lambda: not alive(pid))
+
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / 'scripts'))
+script = importlib.import_module('recordings')
+
+PACKAGED = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
+
+
+def read(file: Path) -> list[tuple[str, int, Any]]:
+    with AnyReader([file]) as reader:
+        out = [
+            (connection.topic, log_ns, reader.deserialize(data, connection.msgtype))
+            for connection, log_ns, data in reader.messages()
+        ]
+        assert len(out) == sum(connection.msgcount for connection in reader.connections)
+    return out
+
+
+@pytest.fixture(scope='module')
+def recorded() -> list[tuple[str, int, Any]]:
+    return read(PACKAGED)
+
+
+def hand(recorded: list[tuple[str, int, Any]]) -> np.ndarray:
+    poses = [
+        (m.header.stamp.sec * 10**9 + m.header.stamp.nanosec, m.pose.position)
+        for topic, _, m in recorded
+        if topic == '/hand_pose'
+    ]
+    return np.array([[(stamp - poses[0][0]) * 1e-9, p.x, p.y, p.z] for stamp, p in poses])
+
+
+def test_equals_a_fresh_run(recorded: list[tuple[str, int, Any]], tmp_path: Path) -> None:
+    script.write_recording(tmp_path / 'fresh.mcap')
+    fresh = read(tmp_path / 'fresh.mcap')
+    assert [item[:2] for item in fresh] == [item[:2] for item in recorded]
+    np.testing.assert_allclose(hand(fresh), hand(recorded), rtol=0, atol=1e-6)
+    for (topic, _, made), (_, _, kept) in zip(fresh, recorded, strict=True):
+        assert topic == '/hand_pose' or repr(made) == repr(kept)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
+from homotopy_scenes import AVOIDING
 
 from foc_ros.analysis.csv_recordings import EPOCH_NS
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
@@ -19,6 +20,7 @@ from foc_ros.analysis.evaluation.observations import (
     observe_in_order,
 )
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
+from foc_ros.analysis.evaluation.report import find_gaps, find_label_mismatches
 from foc_ros.analysis.evaluation.truth import RecordedPath, find_rows_ahead
 from foc_ros.analysis.recordings import BagRecording, convert_tables, find_recordings
 from foc_ros.analysis.replay import Replay
@@ -31,6 +33,7 @@ from foc_ros.core.solution import LEFT
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
 from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes
+from foc_ros.ros.parameters import load_parameter_file
 
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_candidates': 24}
 PLAIN = replace_values(Config(), FAST | {'likelihood.planning_horizon_s': 1000.0, 'likelihood.other_goal': 0.0})
@@ -167,3 +170,22 @@ def test_true_positions_are_interpolated_and_unknown_beyond_the_end() -> None:
     np.testing.assert_allclose(
         path.interpolate(250_000_000, np.array([0.25, 0.5, 1.0])), [[0.5, 0.0], [0.75, 0.0], [np.nan, np.nan]]
     )
+
+
+PARAMETERS = Path(__file__).parents[1] / 'doc' / 'examples' / 'thumb_stick.yaml'
+
+
+@pytest.mark.skipif(not AVOIDING.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
+@pytest.mark.parametrize('name', ['000', '053'])
+def test_the_classes_taken_are_as_labelled(name: str, tmp_path: Path) -> None:
+    config = replace_values(load_parameter_file(PARAMETERS), {'rate_hz': 0.5})
+    recording = observe(find_recordings(AVOIDING)[name], config)
+    first, relevant = recording.observations[0], find_relevant_obstacles(recording)
+    assert first.row.tolist() == [0, 1, 1, 2, 2, 2]
+    assert ask(PATH_CLASS, first, relevant).possible == 24
+    assert ask(GAP, first, relevant).possible == 2
+    # a goal stands behind each gap of the last row
+    assert ask(GOAL, first, relevant).truth == find_gaps(first)[2]
+    label = next(line for line in (AVOIDING / 'labels.csv').read_text().splitlines() if line.startswith(f'{name},'))
+    (tmp_path / 'labels.csv').write_text(f'recording,gap_row1,gap_row2,gap_row3\n{label}\n')
+    assert find_label_mismatches(tmp_path, [recording]) == {}

@@ -2,12 +2,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes solved by independent solvers (quadprog, IPOPT): those of `reference_cases.json`, and more where they are present."""
 
+import json
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
-from reach_helpers import case_guess, case_problem, reference_cases, solved
+from homotopy_scenes import GOAL
+from homotopy_shapes import HAND, random_shapes
+from reach_helpers import REFERENCE_SHAPES, case_guess, case_problem, reach, reference_cases, shapes_problem, solved
 
-from foc_ros.core.classes import find_path_sides
-from foc_ros.core.solution import Status
+from foc_ros.core.classes import find_path_sides, search
+from foc_ros.core.config import Config, FocConfig, HomotopyConfig
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
+from foc_ros.core.ocp.problem import Problem
+from foc_ros.core.ocp.solve import solve_problem, solve_problems
+from foc_ros.core.ocp.solver import LARGEST_TOLERANCE
+from foc_ros.core.ocp.start import cold_start
+from foc_ros.core.predict import build_scene_problems, solve_scene
+from foc_ros.core.safety_preference import SafetyPreference
+from foc_ros.core.scene import ReachingScene
+from foc_ros.core.solution import Candidate, Solution, Status
+from foc_ros.core.types import HandState
 
 CASES = pytest.mark.parametrize('case', reference_cases())
 
@@ -51,3 +68,178 @@ def test_continuous_strategies_just_meet_eta_and_cost_no_less_than_optimal(case,
     assert solution.eta >= problem.eta
     assert solution.lam == 1.0 or solution.eta == pytest.approx(problem.eta, abs=1e-3)
     assert solution.effort >= optimal.effort * (1 - 1e-3)
+
+
+SHAPE_CASES = pytest.mark.parametrize(
+    'case',
+    [
+        pytest.param(case, id='-'.join(each['kind'] for each in case['obstacles']))
+        for case in json.loads(REFERENCE_SHAPES.read_text('utf-8'))
+    ],
+)
+
+
+def find_sides(problem: Problem, solution: Solution) -> list[int]:
+    realised = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
+    return [realised[identity] for identity in problem.obstacles.ids]
+
+
+@SHAPE_CASES
+def test_fixed_costs_no_more_than_what_ipopt_finds(case):
+    """Within 2 %: with a distance kept at the steps alone, every pair of steps that a corner lies between has its own minimum."""
+    reference, problem = case['fixed'], shapes_problem(case)
+    solution = solved(problem, case_guess(case), 'fixed', tau=reference['tau'], lam=reference['lam'])
+    assert solution.status is Status.SOLVED
+    assert find_sides(problem, solution) == reference['sides']
+    assert solution.violation < 1e-6
+    assert solution.effort <= 1.01 * reference['effort']
+    assert solution.costs['effort'] + solution.costs['lambda_variance'] <= 1.02 * reference['cost']
+
+
+@SHAPE_CASES
+def test_optimal_meets_eta_at_no_more_than_the_effort_of_ipopt(case):
+    reference, problem = case['min_effort_at_eta'], shapes_problem(case)
+    solution = solved(problem, case_guess(case), 'optimal')
+    assert solution.status is Status.SOLVED, solution.message
+    assert solution.eta >= reference['eta'] - 1e-6
+    assert find_sides(problem, solution) == reference['sides']
+    assert solution.effort <= 1.01 * reference['ipopt_effort']
+
+
+@SHAPE_CASES
+@pytest.mark.parametrize('strategy', ['lv', 'hc'])
+def test_continuous_strategies_meet_eta_and_cost_no_less_than_ipopt(case, strategy):
+    reference, problem = case['min_effort_at_eta'], shapes_problem(case)
+    solution = solved(problem, case_guess(case), strategy)
+    assert solution.status is Status.SOLVED, solution.message
+    assert solution.eta >= reference['eta'] - 1e-6
+    assert find_sides(problem, solution) == reference['sides']
+    assert solution.effort >= 0.999 * reference['ipopt_effort']
+
+
+REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'random_shapes.json'
+PREFERENCE = SafetyPreference(beta=2.0, shortfall=6.0)
+SCENES = {
+    'circles': [Circle((0.1, 0.01), 0.02, 0.002), Circle((0.17, -0.03), 0.025), Circle((0.2, 0.05), 0.02, velocity=(0.0, -0.02))],
+    'boxes': [Box((0.12, 0.03), (0.04, 0.03), 0.4, 0.005), Box((0.19, -0.02), (0.02, 0.05), centre_stddev=0.001)],
+    'mixed': [Circle((0.08, 0.0), 0.02), Capsule((0.15, 0.04), (0.19, 0.07), 0.01, 0.001), Box((0.2, -0.04), (0.03, 0.03), 1.0)],
+}
+
+
+def find_classes(problem: Problem) -> tuple[Candidate, ...]:
+    config, duration_s = HomotopyConfig(max_candidates=16, clearance=0.0), problem.horizon.dt * problem.horizon.steps
+    return search(
+        problem.initial_mean, problem.goal[None, :2], problem.obstacles, config, [duration_s], problem.horizon.steps
+    ).candidates
+
+
+def solve_together(problem: Problem, candidates: list[Candidate], strategy: str) -> list[Solution]:
+    starts = [cold_start(each.guess) for each in candidates]
+    return solve_problems([problem] * len(starts), starts, FocConfig(strategy=strategy))
+
+
+@pytest.mark.parametrize(
+    ('name', 'strategy'),
+    [
+        *((name, strategy) for name in SCENES for strategy in ('optimal', 'fixed')),
+    ],
+)
+def test_each_class_is_as_if_it_were_alone_and_the_same_each_time(name, strategy):
+    problem = reach(collect_obstacles(SCENES[name]), steps=30, noise=(0.1, 0.1), preference=PREFERENCE)
+    candidates = list(find_classes(problem))
+    assert len(candidates) >= 4
+    together, again = (solve_together(problem, candidates, strategy) for _ in range(2))
+    for candidate, one, other in zip(candidates, together, again, strict=True):
+        np.testing.assert_array_equal(one.mean, other.mean)
+        alone = solve_problem(problem, cold_start(candidate.guess), FocConfig(strategy=strategy))
+        # beside a better class a class is solved as far as its likelihood tells; `lv` and `hc` look at samples of such solutions
+        inexact = {'fixed': 1e-6, 'lv': 0.1, 'hc': 0.1}.get(strategy, LARGEST_TOLERANCE)
+        assert find_loss(one) == pytest.approx(find_loss(alone), abs=inexact)
+        assert one.effort == pytest.approx(alone.effort, rel=1e-2)
+        np.testing.assert_allclose(one.path, alone.path, atol=5e-4)
+
+
+def find_loss(solution: Solution) -> float:
+    return PREFERENCE.compute_loss(solution.effort, max(solution.safety_factor, 0.0), 3.0)
+
+
+def read_table(scene: dict) -> Obstacles:
+    """Return the obstacles of a scene, whose vertices are given in the world."""
+    vertices = [np.array(each['vertices']) for each in scene['obstacles']]
+    centres = [each.mean(axis=0) for each in vertices]
+    radii, deviations, names, velocities = (
+        [each[key] for each in scene['obstacles']] for key in ('radius', 'radius_stddev', 'name', 'velocity')
+    )
+    polygons = [each - centre for each, centre in zip(vertices, centres, strict=True)]
+    return make_obstacles(centres, radii, deviations, ids=tuple(names), velocity=velocities, polygons=polygons)
+
+
+@pytest.mark.skipif(not REFERENCE.is_file(), reason='optional data: ../shared/reference/random_shapes.json is absent')
+def test_classes_are_as_good_as_those_of_an_independent_solver():
+    """At most one of all classes has a loss more than 0.05 above its reference; every path passes on the sides of its class."""
+    worse, compared = {}, 0
+    for scene in json.loads(REFERENCE.read_text('utf-8')):
+        problem = reach(
+            read_table(scene),
+            goal=scene['goal'],
+            steps=scene['steps'],
+            duration=scene['duration_s'],
+            noise=scene['noise_per_step'],
+            eta=scene['eta'],
+            preference=PREFERENCE,
+        )
+        problem = replace(problem, initial_mean=np.array(scene['start']))
+        references = {each['label']: each['reference'] for each in scene['classes']}
+        candidates = [each for each in find_classes(problem) if each.label in references]
+        assert len(candidates) == len(references)
+        for candidate, solution in zip(candidates, solve_together(problem, candidates, 'optimal'), strict=True):
+            compared += 1
+            sides, reference = (
+                find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories),
+                references[candidate.label],
+            )
+            assert all(sides.get(name, side) == side for name, side in candidate.sides)
+            losses = [
+                PREFERENCE.compute_loss(effort, min(k + 1e-5, problem.wanted_k), problem.wanted_k)
+                for effort, k in ((solution.effort, solution.safety_factor), (reference['effort'], reference['k']))
+            ]
+            if losses[0] > losses[1] + 0.05 or solution.status not in (Status.SOLVED, Status.COMPROMISED):
+                worse[scene['seed'], scene['kind'], candidate.label] = (losses[0] - losses[1], solution.status.value)
+    assert compared > 50
+    assert len(worse) <= 1, worse
+
+
+CLASS_SCENES = 7
+DURATION_S = 0.9
+
+
+def make_scene(seed):
+    rng = np.random.default_rng(seed)
+    obstacles = random_shapes(rng, int(rng.integers(2, 6)))
+    config = Config().with_values({'duration.fixed_s': DURATION_S, 'budget_s': 0.0})
+    hand = HandState(0, np.concatenate((HAND, np.zeros(4))), np.zeros((6, 6)))
+    return ReachingScene(hand, np.array([GOAL]), obstacles, None, None, config)
+
+
+def sweep(path, point):
+    """The angle that a path (n, 2) sweeps about a point [rad]."""
+    angles = np.unwrap(np.arctan2(*(path - point).T[::-1]))
+    return angles[-1] - angles[0]
+
+
+def test_every_solved_candidate_is_in_the_class_of_its_label():
+    counts = dict.fromkeys(Status, 0)
+    for seed in range(CLASS_SCENES):
+        scene = make_scene(seed)
+        for one in solve_scene(scene, build_scene_problems(scene)):
+            counts[one.status] += 1
+            if not one.has_likelihood:
+                continue
+            for name, _ in one.candidate.sides:
+                centre = scene.obstacles.centre[scene.obstacles.ids.index(name)]
+                difference = sweep(one.solution.path, centre) - sweep(one.candidate.guess, centre)
+                assert abs(difference) < np.pi / 2, f'scene {seed}, {one.label}, obstacle {name}'
+    found = sum(counts.values())
+    assert found > 2 * CLASS_SCENES
+    assert counts[Status.LEFT_CLASS] <= 0.02 * found, counts
+    assert counts[Status.SOLVED] + counts[Status.COMPROMISED] >= 0.94 * found, counts

@@ -5,7 +5,7 @@
 `LONG` lists the long tests. The mark `process` is derived from the code: a test has it if the test, a fixture of it or a helper
 in this folder starts a process, a ROS graph or a browser. Tests that do so through the package are listed in `PROCESS`,
 with others that `make check` leaves to `make test`. The
-lists consist of shell patterns for 'file::function'. `test_tiers.py` fails if a pattern matches no test.
+lists consist of shell patterns for 'file::function'. `test_documentation.py` fails if a pattern matches no test.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ PROCESS = (
     'test_paper.py::*',
     # seconds in one process, as a dozen programs with a picture each
     'test_strategies.py::test_a_cheap_eta_*',
-    'test_sweeps.py::test_effort_and_likelihood_*',
-    'test_realised_classes.py::*',
+    'test_strategies.py::test_effort_and_likelihood_*',
+    'test_reference_cases.py::test_every_solved_candidate_*',
     'test_solution_numbers.py::test_nothing_is_below_*',
     'test_simulation.py::test_the_command_*',
     'test_replay_guidance.py::*',
