@@ -13,14 +13,10 @@ from fit_recordings import GOALS, reach, recorded_hand
 
 from foc_ros.analysis.fitting import SettingTable
 from foc_ros.analysis.fitting.direct import (
-    CANDIDATES,
     FADING,
-    MAX_CLASSES,
-    RecordedHand,
     fit_duration,
     fit_estimator,
     fit_fading,
-    fit_max_candidates,
     fit_wait,
 )
 from foc_ros.core.config import Config, replace_values
@@ -170,28 +166,3 @@ def test_half_of_the_wait_is_left_on_average_and_the_stay_at_the_goal_does_not_c
     # the wait includes the first 0.15 s of a movement, until its onset is detected
     assert found['duration.wait_s'].value == pytest.approx(0.4, abs=0.1)
     assert found['duration.wait_s'].low < found['duration.wait_s'].value < found['duration.wait_s'].high
-
-
-def make_hand(centres, goals=((1.0, 0.0),)) -> RecordedHand:
-    positions = np.linspace([0.0, 0.0], [1.0, 0.0], 12)
-    return RecordedHand('one', np.arange(12) * 100_000_000, positions, make_obstacles(centres, 0.02), np.array(goals))
-
-
-TWO_ROWS = [(0.3, -0.1), (0.3, 0.1), (0.6, 0.0)]
-
-
-@pytest.mark.parametrize(
-    ('found', 'given', 'expected'),
-    [
-        pytest.param(make_hand(TWO_ROWS), 4, 6, id='classes'),
-        pytest.param(make_hand(TWO_ROWS), 8, None, id='enough'),
-        pytest.param(make_hand([], [(1.0, 0.1 * k) for k in range(30)]), 4, 30, id='goals'),
-        pytest.param(make_hand([(0.1 * k, 0) for k in range(1, 9)]), 4, MAX_CLASSES, id='too many'),
-    ],
-)
-def test_there_is_room_for_goals_and_classes_and_never_less_than_given(
-    found: RecordedHand, given: int, expected: int | None
-) -> None:
-    fitted = fit_max_candidates([found], replace_values(Config(), {CANDIDATES: given}))
-    assert fitted.values == ({} if expected is None else {CANDIDATES: expected})
-    assert bool(fitted.warnings) == (expected == MAX_CLASSES)
