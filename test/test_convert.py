@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -231,28 +230,10 @@ def test_scenes_that_cannot_be_in_metres_are_named(
         assert capsys.readouterr().err.splitlines() == told
 
 
-def test_a_scene_beyond_the_reach_of_its_recording_is_no_doubt(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = write_folder(tmp_path / 'tables')
-    (folder / 'goals.csv').write_text('x_m,y_m\n8,0\n')
-    (folder / 'obstacles.csv').write_text('x_m,y_m,radius_m\n300,0,1\n4,1,0.1\n')  # one is near
-    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
-    assert not capsys.readouterr().err
-
-
 def test_times_that_repeat_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = '\n'.join(f'a,{0.02 * (i // 2):.2f},{0.001 * i},0' for i in range(20))
     assert convert(tmp_path, recordings=f'recording,t_s,x_m,y_m\n{rows}\n') == 0
     assert 't_s of recording a repeats: 10 of 19 rows have the time of the row before' in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ('cell', 'words'), [('"0,5"', "a number with a decimal point in .*, got '0,5'"), ('1_0', "a number in .*, got '1_0'")]
-)
-def test_a_number_of_another_country_or_language_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], cell: str, words: str
-) -> None:
-    assert convert(tmp_path, goals=f'x_m,y_m\n{cell},0\n') == 2
-    assert re.search(f'row 2, column x_m: expected {words}', capsys.readouterr().err)
 
 
 @pytest.mark.parametrize(

@@ -160,16 +160,6 @@ def test_data_that_cannot_be_used_is_one_line_and_exit_2(tables: Path, capsys, c
     assert captured.out == '' and words in captured.err and captured.err.count('\n') == 1
 
 
-def test_the_errors_of_all_tables_are_found_at_once(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with (tables / 'recordings.csv').open('a') as file:
-        file.write('broken,0.0,nan,0.0\n')
-    (tables / 'obstacles.csv').write_text('x_m,y_m\n')
-    (tables / 'goals.csv').write_text('x_m,y_m\n0,a\n')
-    assert run(tables) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.partition('.csv: ')[0].rpartition('/')[2] for line in lines] == ['obstacles', 'goals', 'recordings']
-
-
 def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_labels(
     tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

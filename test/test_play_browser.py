@@ -247,16 +247,6 @@ def test_bars_have_the_colours_of_their_paths_and_paths_to_one_goal_differ_in_wo
     assert names == sorted(names)  # by goals and names, so that a bar stays where it is
 
 
-def test_the_status_line_is_not_green_while_something_is_refused(page: Any) -> None:
-    click(page, 'record')
-    wait_for(page, "document.getElementById('session').innerText.startsWith('Recording to ')", 'a recording')
-    page.execute_script("document.getElementById('fit').disabled = false; document.getElementById('fit').click()")
-    wait_for(page, "document.getElementById('status').className === 'status failing'", 'the status line')
-    assert text_of(page, 'status').startswith('refused: job: expected a session that has ended')
-    wait_for(page, "document.getElementById('status').className === 'status well'", 'the status line is green again')
-    click(page, 'record')
-
-
 def test_everything_can_be_done_by_keys_and_survives_a_reload(page: Any, tmp_path: Path) -> None:
     """Move the hand, arrange the scene, switch guidance, record, do a task, write a report and download it, without a pointer."""
     page.execute_cdp_cmd('Browser.setDownloadBehavior', {'behavior': 'allow', 'downloadPath': str(tmp_path)})

@@ -16,10 +16,8 @@ import pytest
 from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_mcap, write_parameters
 
 from foc_ros.analysis.replay import Replay, replay
-from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.cli.main import main
 from foc_ros.core.config import replace_values
-from foc_ros.core.solution import Status
 from foc_ros.io.bags import BagReader
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import make_header
@@ -118,30 +116,6 @@ def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path: Path) -> 
 
 def by_stamp(*given: list[tuple[str, int, Any]]) -> list[tuple[str, int, Any]]:
     return sorted(chain.from_iterable(given), key=lambda each: each[1])
-
-
-def test_stamps_that_repeat_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As of a clock of whole seconds."""
-    given = messages(seconds=FEW)
-    poses = [each for each in given if each[0] == '/hand_pose']
-    whole = [(topic, stamp_ns, encode_hand_pose(TYPES, ns(0), FRAME, (0.1, 0.0, 0.0))) for topic, stamp_ns, _ in poses]
-    assert run(write_bag(tmp_path / 'whole', by_stamp([each for each in given if each[0] != '/hand_pose'], whole))) == 0
-    words = f'{len(poses) - 1} of {len(poses)} messages of hand_pose refused, the last: hand_pose: stamps repeat: '
-    assert words in capsys.readouterr().err
-
-
-def test_poses_without_data_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def empty(stamp_ns: int) -> tuple[str, int, Any]:
-        pose = TYPES.make('geometry_msgs/msg/Pose')
-        header = make_header(TYPES, stamp_ns, FRAME)
-        return '/hand_pose', stamp_ns, TYPES.make('geometry_msgs/msg/PoseStamped', header=header, pose=pose)
-
-    bag = write_bag(tmp_path / 'lost', by_stamp(messages(seconds=FEW), [empty(ns(each)) for each in (0.01, 0.03, 0.05)]))
-    assert run(bag, '--json') == 0
-    captured = capsys.readouterr()
-    summary = json.loads(captured.out)['summary']
-    assert summary['refused'] == {'hand_lost': 3} and summary['predictions'] == len(reach(FEW))
-    assert '3 of 9 messages of hand_pose refused, the last: hand_pose: pose: expected a position' in captured.err
 
 
 def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path: Path) -> None:
@@ -251,15 +225,6 @@ def test_a_wrong_remap_is_said(bag: Path, capsys: pytest.CaptureFixture[str], re
     assert run(bag, '--remap', remap) == 2
     err = capsys.readouterr().err
     assert remap.split(':=')[0] in err and err.count('\n') == 1
-
-
-def test_the_summary_names_what_is_compromised_or_not_solved_with_its_remedy() -> None:
-    summary = Summary(samples=3, predictions=3, solved=2, compromised=4, estimated=7, seconds=[0.01])
-    shown = facts(summary.answer({'candidate_deadline': 5, 'hand_late': 1}, 1.0))
-    assert shown['candidates compromised'] == f'4 ({Status.COMPROMISED.remedy})'
-    assert shown['candidates estimated'] == '7 (unlikely or late)'
-    assert shown['candidates not solved'] == f'deadline ({Status.DEADLINE.remedy}) 5'
-    assert facts(Summary().answer({}, 0.0))['candidates compromised'] == 'none'
 
 
 def camera_at(y: float, seconds: float, late_s: float = 0.02) -> tuple[str, int, Any]:
