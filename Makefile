@@ -1,7 +1,7 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with what demo and test need; repeated only after a change.
 #                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them
 # make check       lint, and the tests that run within one process: less than a minute on two cores
-# make test        all tests but the long ones: a quarter of an hour on two cores
+# make test        all tests but the long ones: a few minutes on two cores
 # make test-long   the long studies, tests under load and the commands of the documentation
 #                  test/tiers.py lists the long tests (mark `long`) and finds those that start another process, a ROS graph or a
 #                  browser (mark `process`); make check is pytest -m 'not long and not process'

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import importlib
 import io
-import os
 import signal
 import socket
 import subprocess
@@ -208,16 +207,6 @@ def test_a_domain_in_use_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
                 pass
 
 
-def stand_in(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> isolated_node.NodeProcess:
-    """Return a process that runs another program in place of the node."""
-    package = tmp_path / 'foc_ros'
-    package.mkdir()
-    (package / '__init__.py').touch()
-    (package / '__main__.py').write_text(program)
-    monkeypatch.chdir(tmp_path)
-    return isolated_node.NodeProcess(os.environ | {'PYTHONPATH': str(tmp_path)}, tmp_path / 'log.txt')
-
-
 def until(condition: object, seconds: float = 20.0) -> None:
     deadline = time.monotonic() + seconds
     while not condition():  # type: ignore[operator]
@@ -231,29 +220,6 @@ def alive(pid: int) -> bool:
     except FileNotFoundError:
         return False
     return state != 'Z'
-
-
-def test_a_node_that_dies_is_reported_with_its_output(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    with stand_in(monkeypatch, tmp_path, 'import sys; print("out of"); sys.exit("luck")') as node:
-        until(lambda: not alive(node.pid))
-        with pytest.raises(isolated_node.NodeDiedError, match=r'exit code 1: out of \| luck|exit code 1: luck \| out of'):
-            until(lambda: node.check() is not None)
-
-
-@pytest.mark.parametrize(
-    'program',
-    [
-        'import time; time.sleep(60)',
-        'import signal, time; signal.signal(15, lambda *_: None); [time.sleep(1) for _ in range(60)]',
-    ],
-)
-def test_the_node_ends_with_its_context(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: str) -> None:
-    monkeypatch.setattr(isolated_node, 'STOP_S', 0.3)
-    with pytest.raises(KeyboardInterrupt), stand_in(monkeypatch, tmp_path, 'print("up", flush=True);' + program) as node:  # noqa: PT012
-        until(lambda: 'up' in (tmp_path / 'log.txt').read_text())
-        node.check()
-        raise KeyboardInterrupt
-    assert not alive(node.pid)
 
 
 @pytest.mark.skipif(sys.platform != 'linux', reason='only Linux ends a child with its parent')

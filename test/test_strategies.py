@@ -333,3 +333,20 @@ def test_beside_a_box_before_a_hand_at_rest_eta_is_met(gap_mm, radius, yaw):
     solution = foc_ros.solve((0, 0), (0.3, 0), [foc_ros.Box(centre, size=(0.04, 0.06), radius=radius, yaw=yaw)])
     assert solution.status is foc_ros.Status.SOLVED
     assert solution.eta >= 0.9 - 1e-6
+
+
+@pytest.mark.parametrize('seed', SEEDS)
+@pytest.mark.parametrize('preference', [HARD, QUARTER_SHORTFALL], ids=['hard', 'soft'])
+def test_a_warm_start_finds_what_a_cold_one_finds(seed, preference):
+    problem, guess = make_reach(seed, preference)
+    cold = solve_optimal(problem, guess)
+    warm = solve_problem(problem, warm_start(cold, problem), OPTIMAL)
+    assert warm.status is cold.status
+    losses = [
+        (QUARTER_SHORTFALL if preference is QUARTER_SHORTFALL else SafetyPreference(1.0, 3.0)).compute_loss(
+            each.effort, min(each.safety_factor, problem.wanted_k), problem.wanted_k
+        )
+        for each in (cold, warm)
+    ]
+    assert losses[0] == pytest.approx(losses[1], abs=1e-6 if preference is HARD else 1e-4)
+    assert warm.qp_solves <= 4
