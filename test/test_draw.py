@@ -31,7 +31,6 @@ from foc_ros.reporting.draw import (
 from foc_ros.reporting.figures import make_moment_figure, make_scene_figure, plot_prediction, write_picture
 from foc_ros.reporting.views import Snapshot, build_hand_trajectory, build_snapshot
 
-ROOT = Path(__file__).resolve().parents[1]
 PNG = b'\x89PNG\r\n\x1a\n'
 NOWHERE = np.zeros(2)
 

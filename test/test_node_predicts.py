@@ -6,14 +6,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import ros_required  # noqa: F401
 import numpy as np
 import pytest
-from bag_helpers import CONFIG, messages, write_bag
-from bag_helpers import TYPES as BAG_TYPES
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
 from node_helpers import (
     CROWD,
@@ -29,17 +26,12 @@ from node_helpers import (
     stamps,
 )
 from process_helpers import Player, ended, parameters, running
-from rclpy.serialization import deserialize_message, serialize_message
 from ros_helpers import Graph
 from std_msgs.msg import Float64
 
-from foc_ros.analysis.replay import Replay
-from foc_ros.core.classes.library import is_same_recording
-from foc_ros.core.config import Config, flatten, replace_values
-from foc_ros.io.bags import BagReader
 from foc_ros.ros import health, node
 from foc_ros.ros.endpoints import MOST_GOAL_TOPICS
-from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
+from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 
 def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros: Graph) -> None:
@@ -175,84 +167,6 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros: Graph) -> None:
     assert len({each.key for each in goals.values} - {'unknown', 'other'}) == MOST_GOAL_TOPICS + 2
     bench.change('deactivate', 'cleanup')
     assert not list_goal_topics(bench)
-
-
-SECONDS = 0.3
-LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
-LEARNING = {'experience.learning': 'online', 'foc.steps': 20, 'homotopy.max_candidates': 2}
-NO_LIMITS = {'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0, 'budget_s': 0.0}
-
-
-def messages_in_space() -> list[tuple[str, int, Any]]:
-    """Return a reach that goes down to a goal, over a low obstacle and past one of any height."""
-    columns = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'size_z')]
-    scene = obstacle_table([(0.15, 0.0, 0.02, 0.03, 0.04), (0.2, 0.02, 0.0, 0.02, 0.0)], columns)
-    found = []
-    for topic, stamp_ns, message in messages(SECONDS):
-        if topic == '/obstacles':
-            message = cloud(BAG_TYPES, scene, stamp_ns)
-        elif topic == '/goals':
-            message = pose_array(BAG_TYPES, [(0.3, 0.0, 0.2)])
-        else:
-            message.pose.position.z = 0.4 - 0.5 * message.pose.position.x
-        found.append((topic, stamp_ns, message))
-    return found
-
-
-CASES = {
-    'lv': (LV, lambda: messages(SECONDS)),
-    'heights': (CONFIG, messages_in_space),
-    '1 kHz': (CONFIG, lambda: messages(0.1, rate_hz=1000.0)),
-    'learning': (replace_values(Config(), LEARNING), lambda: messages(1.0)),
-}
-"""Parameters, and the messages of a recording."""
-
-
-def sent(message: Any) -> Any:
-    """Return the message after serialisation, with its float32 fields rounded."""
-    return deserialize_message(serialize_message(message), type(message))
-
-
-@pytest.mark.parametrize('case', CASES)
-def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, case: str) -> None:
-    config, make_messages = CASES[case]
-    config = replace_values(config, NO_LIMITS)
-    bench, replay, expected = Bench(ros, **flatten(config)), Replay(config), []
-    with BagReader(write_bag(tmp_path / 'reach', make_messages())) as reader:
-        for step in replay.steps(reader):
-            bench.deliver(step.item.role, bytes(step.item.raw))
-            if step.prediction is not None:
-                obstacles = step.scene.obstacles(step.prediction.stamp_ns)
-                expected.append(encode_outputs(step.prediction, obstacles, 'xy', TYPES))
-    count = len(expected)
-    assert count > 3
-    assert max(each['prediction'].width for each in expected) == 2 * (config.foc.steps + 1)
-    for name in ('prediction', 'path', 'markers'):
-        assert bench.wait_for(name, count) == [sent(each[name]) for each in expected]
-    for received, each in zip(bench.wait_for('likelihoods', count), expected, strict=True):
-        assert received.layout == sent(each['likelihoods']).layout
-        assert np.array_equal(received.data, each['likelihoods'].data, equal_nan=True)  # of shares without a candidate
-    skipped = figures(bench.health()).get('count hand_skipped', '0')
-    assert skipped == str(replay.intake.counts.get('hand_skipped', 0))
-    assert (skipped != '0') == (case == '1 kHz')
-    live, learnt = (each.learnt.movements.finish().learnt for each in (bench.node.pipeline, replay.pipeline))
-    assert (len(live) > 0) == (case == 'learning')
-    assert all(is_same_recording(*each) for each in zip(live, learnt, strict=True))
-
-
-def test_the_case_with_heights_has_heights(tmp_path: Path) -> None:
-    """The low obstacle, number 0, is cleared, and the height and its variance change along the path."""
-    bag = write_bag(tmp_path / 'reach', messages_in_space())
-    for is_named, config in ((False, CONFIG), (True, replace_values(CONFIG, {'predict_height': False}))):
-        with BagReader(bag) as reader:
-            made = [step.prediction for step in Replay(config).steps(reader) if step.prediction is not None]
-        assert made
-        for each in made:
-            answer = encode_outputs(each, each.obstacles, 'xy', TYPES)
-            label = answer['likelihoods'].layout.dim[0].label
-            assert ('+0' in label or '-0' in label) == is_named
-            rows = np.frombuffer(bytes(answer['prediction'].data), CLOUD_ROW)
-            assert is_named or (np.ptp(rows['z']) > 0.1 and np.ptp(rows['vz']) > 0.1 and np.ptp(rows['zz']) > 1e-5)
 
 
 LIGHT = ['foc.steps:=20', 'homotopy.max_candidates:=1', 'rate_hz:=10.0', 'scene.timeout_s:=0.0', 'estimator.hand_timeout_s:=10.0']
