@@ -7,21 +7,24 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import ros_required  # noqa: F401
 import numpy as np
 import pytest
-from bag_helpers import CONFIG, messages, write_bag
-from bag_helpers import TYPES as BAG_TYPES
-from message_helpers import cloud, obstacle_table, pose_array
-from node_helpers import TYPES, Bench, figures
-from rclpy.serialization import deserialize_message, serialize_message
-from ros_helpers import Graph
+import ros_helpers
 
-from foc_ros.analysis.replay import Replay
-from foc_ros.core.classes.library import is_same_recording
-from foc_ros.core.config import Config, flatten, replace_values
-from foc_ros.io.bags import BagReader
-from foc_ros.ros.messages.encode_prediction import encode_outputs
+ros_helpers.require_ros()
+
+from bag_helpers import CONFIG, messages, write_bag  # noqa: E402
+from bag_helpers import TYPES as BAG_TYPES  # noqa: E402
+from message_helpers import cloud, obstacle_table, pose_array  # noqa: E402
+from node_helpers import TYPES, Bench, figures  # noqa: E402
+from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
+from ros_helpers import Graph  # noqa: E402
+
+from foc_ros.analysis.replay import Replay  # noqa: E402
+from foc_ros.core.classes.library import is_same_recording  # noqa: E402
+from foc_ros.core.config import Config, flatten, replace_values  # noqa: E402
+from foc_ros.io.bags import BagReader  # noqa: E402
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs  # noqa: E402
 
 SECONDS = 0.3
 LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
@@ -84,3 +87,18 @@ def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, cas
     live, learnt = (each.learnt.movements.finish().learnt for each in (bench.node.pipeline, replay.pipeline))
     assert (len(live) > 0) == (case == 'learning')
     assert all(is_same_recording(*each) for each in zip(live, learnt, strict=True))
+
+
+def test_the_case_with_heights_has_heights(tmp_path: Path) -> None:
+    """The low obstacle, number 0, is cleared, and the height and its variance change along the path."""
+    bag = write_bag(tmp_path / 'reach', messages_in_space())
+    for is_named, config in ((False, CONFIG), (True, replace_values(CONFIG, {'predict_height': False}))):
+        with BagReader(bag) as reader:
+            made = [step.prediction for step in Replay(config).steps(reader) if step.prediction is not None]
+        assert made
+        for each in made:
+            answer = encode_outputs(each, each.obstacles, 'xy', TYPES)
+            label = answer['likelihoods'].layout.dim[0].label
+            assert ('+0' in label or '-0' in label) == is_named
+            rows = np.frombuffer(bytes(answer['prediction'].data), CLOUD_ROW)
+            assert is_named or (np.ptp(rows['z']) > 0.1 and np.ptp(rows['vz']) > 0.1 and np.ptp(rows['zz']) > 1e-5)

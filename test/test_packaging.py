@@ -218,7 +218,7 @@ def test_the_hooks_are_those_of_make_lint() -> None:
     assert hooks == {line.strip().replace('$(BIN)', '.venv/bin') for line in recipe.splitlines()}
 
 
-pytestmark = pytest.mark.skipif(shutil.which('make') is None, reason='make is not installed')
+needs_make = pytest.mark.skipif(shutil.which('make') is None, reason='make is not installed')
 
 
 @pytest.fixture
@@ -246,6 +246,7 @@ def write_program(file: Path, text: str) -> Path:
     return file
 
 
+@needs_make
 def test_a_python_that_is_not_there_is_named(clone: Path) -> None:
     result = make(clone, 'setup', 'PYTHON=no_such_python')
     assert result.returncode != 0
@@ -253,6 +254,7 @@ def test_a_python_that_is_not_there_is_named(clone: Path) -> None:
     assert not (clone / '.venv').exists()
 
 
+@needs_make
 def test_an_inactive_shim_of_pyenv_is_named_with_what_to_do(clone: Path, tmp_path: Path) -> None:
     shim = write_program(tmp_path / 'shims' / 'python3.99', 'exit 127')
     write_program(tmp_path / 'shims' / 'pyenv', 'echo 3.99.1')
@@ -263,6 +265,7 @@ def test_an_inactive_shim_of_pyenv_is_named_with_what_to_do(clone: Path, tmp_pat
     assert not (clone / '.venv').exists()
 
 
+@needs_make
 def test_an_old_python_is_refused_before_anything_is_made(clone: Path, tmp_path: Path) -> None:
     old = write_program(tmp_path / 'bin' / 'python3', 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.10.2;; esac')
     result = make(clone, 'setup', f'PYTHON={old}')
@@ -278,12 +281,14 @@ def list_recipe(clone: Path, target: str) -> str:
     return result.stdout
 
 
+@needs_make
 def test_it_says_what_it_does(clone: Path) -> None:
     told = re.findall(r'echo [\'"](setup: \w+)', list_recipe(clone, 'setup'))
     assert told == ['setup: creating', 'setup: installing', 'setup: ready']
     assert 'setup: ready; next: make demo' in list_recipe(clone, 'setup')
 
 
+@needs_make
 def test_linters_and_peers_are_installed_by_their_targets_only(clone: Path) -> None:
     extras = {target: re.findall(r"'\.\[([\w,]+)\]'", list_recipe(clone, target)) for target in ('setup', 'lint', 'doc', 'bench')}
     setup = 'ros,report,play,test'
