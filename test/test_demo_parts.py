@@ -77,10 +77,10 @@ def test_recorder_keeps_every_prediction_with_its_scene() -> None:
     stamps = [START_NS + n * STEP_NS for n in range(5)]
     assert [each.stamp_ns for each in recorder.samples] == [each.stamp_ns for each in recorder.snapshots] == stamps
     snapshot, expected = recorder.snapshots[3], build_snapshot(make(3))
-    shares = [[(each.label, each.likelihood) for each in view.candidates] for view in (snapshot, expected)]
+    shares = [[(each.label, each.likelihood) for each in view.candidates_with_likelihood] for view in (snapshot, expected)]
     assert shares[0] == shares[1]
     assert snapshot.obstacles.ids == ('1',)
-    np.testing.assert_allclose(snapshot.goals, [[0.3, 0.0], [0.3, 0.12]])
+    np.testing.assert_allclose(snapshot.goal_positions, [[0.3, 0.0], [0.3, 0.12]])
     np.testing.assert_allclose(recorder.delays, 0.005)
     assert (recorder.rates(0.09), recorder.rates(3.0)) == ((5, 5), (0, 0)), 'messages of the last second'
 
@@ -111,7 +111,7 @@ def test_without_a_terminal_a_line_is_printed_each_second() -> None:
 
 def test_on_a_terminal_a_table_is_shown() -> None:
     text = shown(filled(), True, np.array([0.2]))
-    for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
+    for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1: left of 1, right of post', '0.90', 'x 1.15'):
         assert part in text
     assert '█' in text
     assert '…' not in text and '...  ' not in text
@@ -202,7 +202,7 @@ def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:
         f'{len(snapshots)} predictions were made. The hand moved to a goal 1 times, for 0.8 s; this goal was the most '
     )
     assert 'most likely one from 0.8 s before the arrival' in words
-    others = [replace(each, most_likely='goal1:+1-post') for each in snapshots]
+    others = [replace(each, candidates=each.candidates[::-1]) for each in snapshots]
     assert 'from 0.0 s before the arrival' in describe_lead(build_hand_trajectory(made), others)
     assert describe_lead(build_hand_trajectory(made[:5]), snapshots).endswith('no movement ended at a goal.')
 

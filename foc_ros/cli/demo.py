@@ -25,6 +25,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
@@ -33,7 +34,7 @@ from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
 from foc_ros.reporting.received import read_snapshot
 from foc_ros.reporting.report import describe_late, write_report
-from foc_ros.reporting.views import HandTrajectory, Snapshot, build_hand_trajectory, parse_label
+from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
 from foc_ros.ros.messages.decode_poses import decode_stamp
@@ -60,7 +61,7 @@ class Recorder:
 
     def __init__(self, config: Config) -> None:
         self.samples: list[HandSample] = []
-        self.snapshots: list[Snapshot] = []
+        self.snapshots: list[Prediction] = []
         self.delays: list[float] = []
         self.health: dict[str, str] = {}
         # This pipeline never predicts. It decodes the inputs and holds the scene at each of them.
@@ -215,16 +216,16 @@ def _catch_interrupts() -> Iterator[threading.Event]:
             signal.signal(number, handler)
 
 
-def describe_lead(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> str:
+def describe_lead(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> str:
     """Return how long before the end of the movements the goals that were reached had become the most likely ones."""
     leads = []
     for start_ns, end_ns in hand.find_movements(ONSET_SPEED):
         inside = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.most_likely is not None]
         if not inside:
             continue
-        goal, distance = find_goal_at_end(hand.positions[hand.between(start_ns, end_ns)], inside[-1].goals)
+        goal, distance = find_goal_at_end(hand.positions[hand.between(start_ns, end_ns)], inside[-1].goal_positions)
         if distance <= AT_GOAL_M:
-            others = [each.stamp_ns for each in inside if parse_label(str(each.most_likely), ())[0] != f'goal{goal}']
+            others = [each.stamp_ns for each in inside if each.candidates[0].candidate.goal != goal]
             first = next((each.stamp_ns for each in inside if not others or each.stamp_ns > others[-1]), end_ns)
             leads.append(((end_ns - first) / NANOSECONDS, (end_ns - start_ns) / NANOSECONDS))
     if not leads:

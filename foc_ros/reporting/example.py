@@ -11,12 +11,13 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS
 
 from .figures import make_moment_figure
 from .page import render_figure, render_pictures
 from .report import ONSET_SPEED, ReportCollector
-from .views import HandTrajectory, Snapshot, build_hand_trajectory
+from .views import HandTrajectory, build_hand_trajectory, count_likely_paths
 
 MOST_ITEMS = 3_000
 """Messages of a recording that are read at most."""
@@ -42,21 +43,21 @@ def render_example(recordings: Mapping[str, Recording], config: Config) -> str:
         except FocError:
             continue  # the page lists what cannot be read
         hand = build_hand_trajectory(collected.samples)
-        if moment := _choose_moment(hand, [each for each in collected.snapshots if each.candidates]):
+        if moment := _choose_moment(hand, [each for each in collected.snapshots if each.candidates_with_likelihood]):
             return '<h2>One recording with its prediction</h2>' + _render_moment(name, hand, *moment)
     return ''
 
 
-def _choose_moment(hand: HandTrajectory, snapshots: list[Snapshot]) -> tuple[Snapshot, tuple[int, int]] | None:
+def _choose_moment(hand: HandTrajectory, snapshots: list[Prediction]) -> tuple[Prediction, tuple[int, int]] | None:
     """Return the snapshot of the first movement with the most likely paths, and the start and end of this movement [ns]."""
     for start_ns, end_ns in hand.find_movements(ONSET_SPEED):
         begin, end = (start_ns + share * (end_ns - start_ns) for share in ON_THE_WAY)
         if inside := [each for each in snapshots if begin <= each.stamp_ns <= end]:
-            return max(inside, key=lambda each: each.likely_paths), (start_ns, end_ns)
+            return max(inside, key=count_likely_paths), (start_ns, end_ns)
     return None
 
 
-def _render_moment(name: str, hand: HandTrajectory, snapshot: Snapshot, span: tuple[int, int]) -> str:
+def _render_moment(name: str, hand: HandTrajectory, snapshot: Prediction, span: tuple[int, int]) -> str:
     seconds = (snapshot.stamp_ns - span[0]) / NANOSECONDS
     caption = f'{name}, {seconds:.2f} s after the hand began to move.'
     return render_pictures([render_figure(make_moment_figure(hand, snapshot, span), caption)])
