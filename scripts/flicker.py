@@ -15,14 +15,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count, product
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 from page import ROOT, SHARED, format_table
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.interpolate import CubicSpline
 
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.core.config import Config
@@ -84,66 +84,27 @@ HEAD = (
 )
 
 
-class ClassTracker:
-    """Gives each homotopy class a number that stays when its label changes; remembers classes for SHORT_TICKS ticks."""
-
-    def __init__(self) -> None:
-        self._numbers = count()
-        self._known: dict[int, tuple[int, PredictedCandidate]] = {}
-        self._tick = 0
-
-    def identify(self, candidates: Iterable[PredictedCandidate]) -> tuple[dict[int, PredictedCandidate], int]:
-        """Return the candidates of the next tick by number, and how many of them were absent for a short time."""
-        self._tick += 1
-        self._known = {number: each for number, each in self._known.items() if self._tick - each[0] <= SHORT_TICKS}
-        rest: list[PredictedCandidate] = list(candidates)
-        found: dict[int, PredictedCandidate] = {}
-        for is_same in (_has_same_label, _is_renamed):
-            pairs = [
-                (-tick, compute_sideways_move(before, each), -before.likelihood, number, place)
-                for number, (tick, before) in self._known.items()
-                for place, each in enumerate(rest)
-                if number not in found and is_same(before, each)
-            ]
-            for *_, number, place in sorted(pairs):  # of several names the one whose path is nearest
-                if number not in found and rest[place] not in found.values():
-                    found[number] = rest[place]
-            rest = [each for each in rest if each not in found.values()]
-        absences = sum(self._known[number][0] < self._tick - 1 for number in found)
-        found |= {next(self._numbers): each for each in rest}
-        self._known |= {number: (self._tick, each) for number, each in found.items()}
-        return found, absences
-
-
-def _has_same_label(one: PredictedCandidate, other: PredictedCandidate) -> bool:
-    return one.label == other.label
-
-
-def _is_renamed(one: PredictedCandidate, other: PredictedCandidate) -> bool:
-    """Tell whether the label of one class is that of the other with obstacles left out."""
-    sides, others = set(one.candidate.sides), set(other.candidate.sides)
-    return one.candidate.goal == other.candidate.goal and (sides <= others or others <= sides)
-
-
 def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> None:
-    """Add the ticks of one recording to a total. A change of goals or obstacles begins anew."""
+    """Add the ticks of one recording to a total, with classes by their numbers. A change of goals or obstacles begins anew."""
     before: Prediction | None = None
-    tracker = ClassTracker()
     last: dict[int, PredictedCandidate] = {}
+    seen: dict[int, int] = {}  # the last tick of each class
     leads: list[tuple[float, int]] = []
-    for now in predictions:
-        if before is None or not _is_same_scene(before, now):
-            tracker, last, leads = ClassTracker(), {}, []
-        found, absences = tracker.identify(now.candidates_with_likelihood)
-        if last or leads:
+    for tick, now in enumerate(predictions):
+        is_first = before is None or not _is_same_scene(before, now)
+        if is_first:
+            last, seen, leads = {}, {}, []
+        found = {each.way: each for each in now.candidates_with_likelihood}
+        if before is not None and not is_first:
             total.ticks += 1
-            total.seconds += now.t - before.t if before is not None else 0.0
-            total.absences += absences
+            total.seconds += now.t - before.t
+            total.absences += sum(1 < tick - seen.get(way, -SHORT_TICKS) <= SHORT_TICKS for way in found)
             total.changed += _compute_largest_change(last, found) > CHANGE
             total.sideways += [compute_sideways_move(last[each], found[each]) for each in last.keys() & found.keys()]
-        leads += [(now.t, number) for number, each in found.items() if each.label == now.most_likely]
+        leads += [(now.t, way) for way, each in found.items() if each.label == now.most_likely]
         total.returns += _has_returned(leads)
         before, last = now, found
+        seen |= dict.fromkeys(found, tick)
 
 
 def _is_same_scene(before: Prediction, now: Prediction) -> bool:
@@ -168,17 +129,10 @@ def _has_returned(leads: list[tuple[float, int]]) -> bool:
     return any(number == leader and end - time <= RETURN_S + 1e-9 for time, number in leads[:-2])
 
 
-def refine_path(candidate: PredictedCandidate) -> Array:
-    """Return the mean path of a candidate as points (m, 2) [m] on the cubic through its steps."""
-    times = candidate.times
-    fine = np.linspace(times[0], times[-1], FINE * (len(times) - 1) + 1)
-    points: Array = CubicHermiteSpline(times, candidate.mean[:, :2], candidate.mean[:, 2:4])(fine)
-    return points
-
-
 def compute_sideways_move(before: PredictedCandidate, now: PredictedCandidate) -> float:
     """Return the largest distance [m] of a mean path from that of the tick before, perpendicular to the latter."""
-    return float(measure_distances(now.mean[:, :2], refine_path(before)).max())
+    line = before.position_at(np.linspace(0.0, before.times[-1], FINE * (len(before.times) - 1) + 1))
+    return float(measure_distances(now.solution.path, line).max())
 
 
 def measure_distances(points: Array, line: Array) -> Array:
