@@ -18,8 +18,8 @@ Times = dict[str, list[float]]
 class Result:
     """Measurement of one row.
 
-    ours, peer: what was timed, in words; ours_ms, peer_ms: the medians of its times [ms]; agree: whether the answers of both sides
-    differ by no more than the tolerance; agreement: the difference in words; details: further numbers by name.
+    ours, peer: what was timed, in words; ours_ms, peer_ms: the medians of its times [ms]; agree: whether the answers differ by no
+    more than the tolerance; agreement: the difference in words; details: further numbers by name.
     """
 
     ours: str

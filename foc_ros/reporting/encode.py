@@ -22,7 +22,7 @@ from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
 from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, Span, compute_bounds, compute_ellipse_axes
 from .tracks import CandidateTracks
-from .views import LIKELY, HandTrajectory, describe_ghost, list_unsolved
+from .views import LIKELY, HandTrajectory, choose_moment, count_likely_paths, describe_ghost, list_unsolved
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
 """Units [m], [m/s], [s]."""
@@ -40,7 +40,8 @@ def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence
 
     count: of the predictions; times [s] after the first hand sample, solve_ms, and unknown, the share that no candidate has, of
     those that are drawn; tracks: for each its slot, the row of its first prediction and its likelihoods from there on; frames:
-    the predictions at which the slider stops. Obstacles, goals and labels are stored once and referred to by their row.
+    the predictions at which the slider stops; openings: the frame at which each movement opens, and opened: the movement that the
+    page shows first. Obstacles, goals and labels are stored once and referred to by their row.
     """
     count, most = len(tracks.snapshots), MOST_FRAMES
     kept = select_evenly(count, MOST_TIMES).tolist() if count else []
@@ -66,7 +67,10 @@ class _ReportData:
     def build(self, spans: Sequence[Span], bounds: Bounds, most: int) -> dict[str, Any]:
         """Return the data with at most so many frames."""
         snapshots, hand = self._tracks.snapshots, self._hand
-        frames = [self._encode_frame(row) for row in (select_evenly(len(snapshots), most).tolist() if snapshots else [])]
+        rows = select_evenly(len(snapshots), most).tolist() if snapshots else []
+        stops, frames = [snapshots[row] for row in rows], [self._encode_frame(row) for row in rows]
+        openings = [choose_moment(stops, *span) for span in spans]
+        counts = [0.0 if row is None else count_likely_paths(stops[row]) for row in openings]
         samples = select_evenly(len(hand.stamps_ns), MOST_HAND_SAMPLES)
         return {
             'unit': {'speed': SPEED, 'time': TIME},
@@ -80,6 +84,8 @@ class _ReportData:
             ],
             'unknown': [round(each.unknown + each.other, 3) for each in snapshots],
             'movements': [[self._seconds(stamp) for stamp in span] for span in spans],
+            'openings': openings,
+            'opened': int(np.argmax(counts)),
             'hand': {
                 't': _quantise_differences(hand.seconds_after(self._origin_ns)[samples], TIME),
                 'v': _quantise_differences(hand.speed[samples], SPEED),

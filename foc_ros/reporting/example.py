@@ -17,12 +17,10 @@ from foc_ros.core.types import NANOSECONDS
 from .figures import make_moment_figure
 from .page import render_figure, render_pictures
 from .report import ONSET_SPEED, ReportCollector
-from .views import HandTrajectory, build_hand_trajectory, count_likely_paths
+from .views import HandTrajectory, build_hand_trajectory, choose_moment
 
 MOST_ITEMS = 3_000
 """Messages of a recording that are read at most."""
-ON_THE_WAY = 0.15, 0.6
-"""Parts of a movement between which a moment is chosen."""
 FEW = 20
 """Number of recordings below which the page warns."""
 
@@ -43,18 +41,11 @@ def render_example(recordings: Mapping[str, Recording], config: Config) -> str:
         except FocError:
             continue  # the page lists what cannot be read
         hand = build_hand_trajectory(collected.samples)
-        if moment := _choose_moment(hand, [each for each in collected.snapshots if each.candidates_with_likelihood]):
-            return '<h2>One recording with its prediction</h2>' + _render_moment(name, hand, *moment)
+        for span in hand.find_movements(ONSET_SPEED):
+            row = choose_moment(collected.snapshots, *span)
+            if row is not None:
+                return '<h2>One recording with its prediction</h2>' + _render_moment(name, hand, collected.snapshots[row], span)
     return ''
-
-
-def _choose_moment(hand: HandTrajectory, snapshots: list[Prediction]) -> tuple[Prediction, tuple[int, int]] | None:
-    """Return the snapshot of the first movement with the most likely paths, and the start and end of this movement [ns]."""
-    for start_ns, end_ns in hand.find_movements(ONSET_SPEED):
-        begin, end = (start_ns + share * (end_ns - start_ns) for share in ON_THE_WAY)
-        if inside := [each for each in snapshots if begin <= each.stamp_ns <= end]:
-            return max(inside, key=count_likely_paths), (start_ns, end_ns)
-    return None
 
 
 def _render_moment(name: str, hand: HandTrajectory, snapshot: Prediction, span: tuple[int, int]) -> str:

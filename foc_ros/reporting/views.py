@@ -20,6 +20,8 @@ COLOURS, SLOTS = 6, 12
 """Numbers of colours, and of the letters that tell candidates apart: the letters beyond F have the same colours again."""
 NOTED, LIKELY = 0.01, 0.05
 """Likelihoods from which a candidate is worth mentioning, and from which its ellipses are drawn."""
+ON_THE_WAY, USUAL = (0.15, 0.6), 1.5
+"""Parts of a movement between which a moment is worth seeing, and the size of its ellipses, at most, in parts of their median."""
 GRAZE_M = 1e-3
 """Depth [m] up to which a path within an obstacle counts as one along its boundary."""
 Sides = dict[str, int]
@@ -54,10 +56,26 @@ def is_late(snapshot: Prediction) -> bool:
 
 
 def count_likely_paths(snapshot: Prediction) -> float:
-    """Return the number of likely paths: exp of the entropy of the likelihoods that are at least LIKELY."""
-    shares = np.array([each.likelihood for each in snapshot.candidates if each.likelihood >= LIKELY])
+    """Return the number of likely paths, without ghosts: exp of the entropy of the likelihoods that are at least LIKELY."""
+    likely = [each for each in snapshot if each.likelihood >= LIKELY and not describe_ghost(snapshot, each)[0]]
+    shares = np.array([each.likelihood for each in likely])
     shares = shares / max(shares.sum(), LIKELY)
     return float(np.exp(-(shares * np.log(shares)).sum())) if len(shares) else 0.0
+
+
+def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -> int | None:
+    """Return the row of the snapshot of a movement that is the most worth seeing, None where the movement has none.
+
+    It has the most likely paths of those on the way, once the filter of the hand has settled: its ellipses have the usual size.
+    """
+    during = {row: each for row, each in enumerate(snapshots) if start_ns <= each.stamp_ns <= end_ns and each.most_likely}
+    if not during:
+        return None
+    sizes = {row: np.linalg.eigvalsh(each.candidates[0].covariance[:, :2, :2]).max() for row, each in during.items()}
+    settled = [row for row, size in sizes.items() if size <= USUAL**2 * np.median(list(sizes.values()))]
+    begin, end = (start_ns + share * (end_ns - start_ns) for share in ON_THE_WAY)
+    on_the_way = [row for row in settled if begin <= during[row].stamp_ns <= end]
+    return max(on_the_way or settled, key=lambda row: count_likely_paths(during[row]))
 
 
 def find_entered(snapshot: Prediction, candidate: PredictedCandidate) -> tuple[str, float]:
