@@ -48,7 +48,7 @@ def test_a_report_is_replaced_by_the_next_one(tmp_path: Path) -> None:
     made = samples()
     for _ in range(2):
         write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], {})
-    write_page(tmp_path, 'index.html', 'made by foc_ros')
+    write_page(tmp_path, 'index.html', 'x', (), (), None)
 
 
 @pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png'])

@@ -22,9 +22,9 @@ from foc_ros.io.bags import BagReader, Item
 from foc_ros.reporting import evaluation_report, simulation_report
 from foc_ros.reporting.draw import open_figure
 from foc_ros.reporting.evaluation_report import _draw_reliability
-from foc_ros.reporting.example import FEW, render_example, warn_of_few
+from foc_ros.reporting.example import FEW, draw_example, warn_of_few
 from foc_ros.reporting.fit_report import write_report
-from foc_ros.reporting.page import place_legend, render_page, render_tables
+from foc_ros.reporting.page import Section, explain_tables, place_legend, write_page
 
 RECORDING = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 ANSWER = {
@@ -99,26 +99,29 @@ class Recorded:
 
 def test_a_recording_is_pictured_with_its_prediction_and_one_that_cannot_be_read_is_passed_over() -> None:
     config = Config().with_values({'rate_hz': 10.0, 'foc.steps': 20})
-    html = render_example({'broken': Recorded(is_broken=True), 'whole': Recorded()}, config)
-    assert html.count('<img') == 1 and 'whole, 0.' in html and 'after the hand began to move' in html
-    assert render_example({'broken': Recorded(is_broken=True)}, config) == ''
+    (section,) = draw_example({'broken': Recorded(is_broken=True), 'whole': Recorded()}, config)
+    ((_, caption),) = section.pictures
+    assert caption.startswith('whole, 0.') and caption.endswith('after the hand began to move.')
+    assert draw_example({'broken': Recorded(is_broken=True)}, config) == []
 
 
-def test_a_page_names_what_made_it_and_no_path() -> None:
+def test_a_page_names_what_made_it_and_no_path(tmp_path: Path) -> None:
     config = Config().with_values({'foc.eta': 0.8, 'homotopy.library': '/elsewhere/mine.json'})
-    page = render_page('x', '<p>body</p>', (), config)
+    write_page(tmp_path, 'x.html', 'x', [Section('In short', ['a < b'])], (), config)
+    page = (tmp_path / 'x.html').read_text(encoding='utf-8')
+    assert '<li>a &lt; b</li>' in page
     footer = page.partition('<footer')[2].partition('</footer>')[0]
     assert f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; ' in footer
     assert 'processors' in footer and 'foc.eta = 0.8' in footer and 'homotopy.library = mine.json' in footer
     assert 'someone' not in page and str(Path.cwd()) not in page
-    assert 'All parameters have their defaults.' in render_page('x', '', (), Config())
+    write_page(tmp_path, 'x.html', 'x', [], (), Config())
+    assert 'All parameters have their defaults.' in (tmp_path / 'x.html').read_text(encoding='utf-8')
 
 
 def test_words_are_explained_once_where_they_stand_first() -> None:
     tables = (('First', ('', 'gain [nat]'), [('foc', '1')]), ('Second', ('', 'gain [nat]', 'ECE'), [('foc', '1', '0')]))
-    html = render_tables(tables, {'nat': 'a unit', 'ECE': 'an error', 'Brier': 'not here'})
-    assert html.count('nat: a unit') == html.count('ECE: an error') == 1 and 'Brier' not in html
-    assert html.index('First') < html.index('nat: a unit') < html.index('Second') < html.index('ECE: an error')
+    sections = explain_tables(tables, {'nat': 'a unit', 'ECE': 'an error', 'Brier': 'not here'})
+    assert [(each.heading, each.notes) for each in sections] == [('First', ['nat: a unit']), ('Second', ['ECE: an error'])]
 
 
 def test_few_recordings_are_warned_of(tmp_path: Path) -> None:

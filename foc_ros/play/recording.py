@@ -26,7 +26,8 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, HandSample, as_readonly
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.topics import TYPES
-from foc_ros.reporting.report import Table, write_report
+from foc_ros.reporting.page import Table
+from foc_ros.reporting.report import write_report
 from foc_ros.reporting.views import build_hand_trajectory
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, Place
 from foc_ros.ros.messages.encode_prediction import encode_outputs

@@ -11,13 +11,12 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError
-from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS
 
 from .figures import make_moment_figure
-from .page import render_figure, render_pictures
+from .page import Section, make_picture
 from .report import ONSET_SPEED, ReportCollector
-from .views import HandTrajectory, build_hand_trajectory, choose_moment
+from .views import build_hand_trajectory, choose_moment
 
 MOST_ITEMS = 3_000
 """Messages of a recording that are read at most."""
@@ -31,12 +30,12 @@ def warn_of_few(count: int, what: str) -> list[str]:
     return [words] if count < FEW else []
 
 
-def render_example(recordings: Mapping[str, Recording], config: Config) -> str:
-    """Return HTML with a picture of a moment of the first recording that can be replayed, '' if there is none."""
-    for name, recording in recordings.items():
+def draw_example(recordings: Mapping[str, Recording] | None, config: Config | None) -> list[Section]:
+    """Return a section with a moment of the first recording that can be replayed, nothing if there is none."""
+    for name, recording in (recordings or {}).items():
         collected = ReportCollector()
         try:
-            for step in Replay(config).steps(islice(recording.items(), MOST_ITEMS)):
+            for step in Replay(config or Config()).steps(islice(recording.items(), MOST_ITEMS)):
                 collected.add(step)
         except FocError:
             continue  # the page lists what cannot be read
@@ -44,11 +43,8 @@ def render_example(recordings: Mapping[str, Recording], config: Config) -> str:
         for span in hand.find_movements(ONSET_SPEED):
             row = choose_moment(collected.snapshots, *span)
             if row is not None:
-                return '<h2>One recording with its prediction</h2>' + _render_moment(name, hand, collected.snapshots[row], span)
-    return ''
-
-
-def _render_moment(name: str, hand: HandTrajectory, snapshot: Prediction, span: tuple[int, int]) -> str:
-    seconds = (snapshot.stamp_ns - span[0]) / NANOSECONDS
-    caption = f'{name}, {seconds:.2f} s after the hand began to move.'
-    return render_pictures([render_figure(make_moment_figure(hand, snapshot, span), caption)])
+                snapshot = collected.snapshots[row]
+                words = f'{name}, {(snapshot.stamp_ns - span[0]) / NANOSECONDS:.2f} s after the hand began to move.'
+                picture = make_picture(make_moment_figure(hand, snapshot, span), words)
+                return [Section('One recording with its prediction', pictures=[picture])]
+    return []

@@ -23,7 +23,7 @@ from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 from .draw import Span, save_figure
 from .encode import compute_recording_bounds, encode_report, round_number
 from .figures import make_recording_figure
-from .page import render
+from .page import Table, render
 from .tracks import build_candidate_tracks
 from .views import NOTED, HandTrajectory, build_hand_trajectory, build_snapshot, is_late, list_unsolved
 
@@ -33,8 +33,6 @@ LATE_SHARE = 0.05
 """Share of the predictions that were not finished from which the page warns of a busy computer."""
 COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candidates not solved', 'counters of the node')
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
-Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
-"""Heading, columns and rows of a table of the page."""
 
 
 @dataclass(frozen=True)
