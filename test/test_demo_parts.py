@@ -176,7 +176,7 @@ sys.exit(main(['demo']))
     command = [sys.executable, '-c', program]
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False)
     assert (result.returncode, result.stderr) == (130, '')
-    assert result.stdout.startswith('A recorded hand moves ') and result.stdout.endswith(' []\n')
+    assert result.stdout.startswith('Welcome to foc_ros. A recorded hand moves ') and result.stdout.endswith(' []\n')
 
 
 def test_the_scene_is_drawn_with_hand_goals_obstacles_and_candidates() -> None:

@@ -36,8 +36,8 @@ def demo(*, output: Path = Path('demo_output')) -> int:
     check_folder('--output', output)
     if find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: run `make setup`, or source a ROS 2 installation, or install the extra `ros`')
-    words = 'A recorded hand moves among a box (obstacle 1), three posts (2, 3, 4) and a wall (5)'
-    print(f'{words}; the node predicts where it goes. Loading ...', flush=True)
+    print('Welcome to foc_ros. A recorded hand moves among a box (obstacle 1), three posts (2, 3, 4) and a wall (5);')
+    print('the node predicts where it goes, for 20 s. Then open the report:', output / 'report' / 'index.html', flush=True)
     from .demo import perform  # not before: its import takes seconds
 
     return perform(output)

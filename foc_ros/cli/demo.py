@@ -147,9 +147,9 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
     counters = {'counters of the node': ', '.join(counts)}
     write_report(output / 'report', 'Reaching among obstacles, live', hand, recorder.snapshots, {**facts, **counters})
     show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
+    show_text(describe_lead(hand, recorder.snapshots))
     print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
     show_address(output / 'report' / 'index.html')
-    show_text(describe_lead(hand, recorder.snapshots))
     if words := describe_late(recorder.snapshots):
         show_text(words)
     return 0
