@@ -33,6 +33,7 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.analysis.solve import solve_to_values
 from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, LikelihoodConfig
+from foc_ros.core.interpolation import interpolate_position
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.plant.covariance import stack_noise
@@ -341,17 +342,6 @@ def follow_with_rows_at_steps() -> Array:
     return np.array(found)
 
 
-def interpolate(solution: foc_ros.Solution, times: Array) -> Array:
-    """Return the mean (k, 2) [m] at times in steps: the cubic through positions and velocities at the steps."""
-    step = np.minimum(times.astype(int), STEPS - 1)
-    a = (times - step)[:, None]
-    position, velocity = solution.mean[:, :2], solution.mean[:, 2:4] * solution.dt
-    weights = 2 * a**3 - 3 * a**2 + 1, a**3 - 2 * a**2 + a, 3 * a**2 - 2 * a**3, a**3 - a**2
-    parts = position[step], velocity[step], position[step + 1], velocity[step + 1]
-    mean: Array = sum(weight * part for weight, part in zip(weights, parts, strict=True))
-    return mean
-
-
 def contacts() -> Figure:
     """Return the picture: the mean against the circle, a close-up of the contact, effort over eta."""
     solution = reach([TOUCHED], TOUCHED_ETA, 'lv', c=TOUCHED_NOISE)
@@ -359,8 +349,8 @@ def contacts() -> Figure:
     centre, radius = np.array(TOUCHED.centre), TOUCHED.radius
     kept = float(np.sqrt(radius**2 + TOUCHED.radius_stddev**2 + solution.tau))
     blue, orange = get_class_style(0)[0], get_class_style(1)[0]
-    fine = interpolate(solution, np.linspace(0.0, STEPS, 20 * STEPS + 1))
-    contact = interpolate(solution, np.array([time]))[0]
+    fine = interpolate_position(solution.mean, solution.dt, solution.dt * np.linspace(0.0, STEPS, 20 * STEPS + 1))
+    contact = interpolate_position(solution.mean, solution.dt, np.array(solution.dt * time))
     normal = (contact - centre) / np.linalg.norm(contact - centre)
     with open_figure(10.0, 3.4) as figure:
         overview, close_up, curves = figure.subplots(1, 3, width_ratios=(1.35, 1.0, 1.15))
