@@ -64,7 +64,7 @@ def _whole(low: int, high: int) -> Parameter:
     return Parameter(validator=Number(gte=low, lte=high))
 
 
-def _names(known: tuple[str, ...]) -> Parameter:
+def names(known: tuple[str, ...]) -> Parameter:
     """Return the parameter of names with commas between them, each of which is taken once."""
 
     def read(_: object, tokens: Sequence[Token]) -> tuple[str, ...]:
@@ -114,9 +114,9 @@ Samples = Annotated[int, _whole(1, MOST_SAMPLES)]
 Port = Annotated[int, _whole(0, LARGEST_PORT)]
 Trials = Annotated[int, _whole(1, MOST_TRIALS)]
 Seed = Annotated[int, _whole(0, MOST_TRIALS)]
-Operators = Annotated[tuple[str, ...], _names(OPERATORS)]
-Assistance = Annotated[tuple[str, ...], _names(ASSISTANCE)]
-Allowed = Annotated[tuple[str, ...], _names(ALLOWED)]
+Operators = Annotated[tuple[str, ...], names(OPERATORS)]
+Assistance = Annotated[tuple[str, ...], names(ASSISTANCE)]
+Allowed = Annotated[tuple[str, ...], names(ALLOWED)]
 
 
 @Parameter(name='*')
