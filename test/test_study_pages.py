@@ -9,6 +9,7 @@ from datetime import datetime
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,11 +21,12 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.reporting import evaluation_report, simulation_report
+from foc_ros.reporting import page as pages
 from foc_ros.reporting.draw import open_figure
 from foc_ros.reporting.evaluation_report import _draw_reliability
 from foc_ros.reporting.example import FEW, draw_example, warn_of_few
 from foc_ros.reporting.fit_report import write_report
-from foc_ros.reporting.page import Section, explain_tables, place_legend, write_page
+from foc_ros.reporting.page import Section, explain_tables, make_chart, write_page
 
 RECORDING = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 ANSWER = {
@@ -134,17 +136,18 @@ def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
     assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
 
 
-def test_legends_are_below_the_axes_and_cover_nothing() -> None:
-    with open_figure(6.4, 4.6) as figure:
-        axes = figure.subplots()
+def test_legends_are_below_the_axes_and_cover_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def draw(axes: Any) -> None:
         for number in range(6):
             axes.plot([0, 1], [0, number], label=f'baseline number {number}')
         axes.plot([0, 1], [1, 0], label='baseline number 0')
-        place_legend(figure)
-        figure.draw_without_rendering()
+
+    monkeypatch.setattr(pages, 'make_picture', lambda figure, _: figure)
+    figure: Any = make_chart((6.4, 4.6), '', draw)
+    figure.draw_without_rendering()
     (legend,) = figure.legends
     assert len(legend.get_texts()) == 6
-    assert not legend.get_window_extent().overlaps(axes.get_tightbbox())
+    assert not legend.get_window_extent().overlaps(figure.axes[0].get_tightbbox())
 
 
 def test_results_are_told_in_plain_words_first() -> None:

@@ -18,11 +18,10 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config
 from foc_ros.io.outputs import EVALUATION_PAGE
 
-from .draw import open_figure
 from .example import draw_example, warn_of_few
-from .page import Picture, Section, explain_tables, make_picture, place_legend, write_page
+from .page import Picture, Section, explain_tables, make_chart, write_page
 
-WIDTH_IN, HEIGHT_IN = 6.4, 4.6
+SIZE_IN = 6.4, 4.6
 WEIGHTED, AHEAD_S, LEVEL = 'likelihood-weighted', '0.5', '0.9'
 """The predicted position, the time ahead [s] and the probability of a region that the summary is about."""
 COUNTS = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
@@ -98,10 +97,7 @@ def _draw_questions(questions: Mapping[str, Any]) -> Iterator[Picture]:
         if name in questions:
             reliability = f'{name}: how often the likeliest answer is true, over its probability, {COUNTS}.'
             for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
-                with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
-                    draw(figure.subplots(), name, questions[name])
-                    place_legend(figure)
-                yield make_picture(figure, words)
+                yield make_chart(SIZE_IN, words, draw, name, questions[name])
 
 
 def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:

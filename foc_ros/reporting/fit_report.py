@@ -13,9 +13,9 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config
 from foc_ros.io.outputs import FIT_PAGE
 
-from .draw import get_class_style, open_figure
+from .draw import get_class_style
 from .example import draw_example, warn_of_few
-from .page import Picture, Section, explain_tables, make_picture, write_page
+from .page import Picture, Section, explain_tables, make_chart, write_page
 
 WIDTH_IN, LINE_IN = 6.4, 0.34
 CAPTION = (
@@ -64,16 +64,18 @@ def _draw_parameters(parameters: Mapping[str, Any]) -> list[Picture]:
     drawn = {name: each for name, each in parameters.items() if each['given'] > 0.0 and each['value'] > 0.0}
     if not drawn:
         return []
-    with open_figure(WIDTH_IN, 0.9 + LINE_IN * len(drawn)) as figure:
-        axes, (colour, _) = figure.subplots(), get_class_style(0)
-        for row, each in enumerate(drawn.values()):
-            ends = [end / each['given'] for end in each['interval'] if end is not None and end > 0.0]
-            axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
-            axes.plot(each['value'] / each['given'], row, marker='o', color=colour)
-        axes.axvline(1.0, color='0.4', linewidth=1.0)
-        axes.set_yticks(range(len(drawn)), list(drawn))
-        axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
-        for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
-            set_format('{x:g}')
-        axes.tick_params(axis='x', which='minor', labelsize=7)
-    return [make_picture(figure, CAPTION)]
+    return [make_chart((WIDTH_IN, 0.9 + LINE_IN * len(drawn)), CAPTION, _draw_multiples, drawn)]
+
+
+def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
+    colour, _ = get_class_style(0)
+    for row, each in enumerate(drawn.values()):
+        ends = [end / each['given'] for end in each['interval'] if end is not None and end > 0.0]
+        axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
+        axes.plot(each['value'] / each['given'], row, marker='o', color=colour)
+    axes.axvline(1.0, color='0.4', linewidth=1.0)
+    axes.set_yticks(range(len(drawn)), list(drawn))
+    axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
+    for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+        set_format('{x:g}')
+    axes.tick_params(axis='x', which='minor', labelsize=7)

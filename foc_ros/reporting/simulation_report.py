@@ -16,13 +16,13 @@ from foc_ros.analysis.simulation.study import COLUMNS, PairResult, Trial, make_t
 from foc_ros.core.config import Config
 from foc_ros.io.outputs import SIMULATION_PAGE
 
-from .draw import draw_scene, get_class_style, open_figure
+from .draw import draw_scene, get_class_style
 from .example import warn_of_few
-from .page import Picture, Section, explain_tables, make_picture, place_legend, write_page
+from .page import Picture, Section, explain_tables, make_chart, write_page
 
 DRAWN = ('collision_rate', 'completion_s', 'opposing_impulse')
 """Measures with a figure."""
-WIDTH_IN, HEIGHT_IN = 6.4, 4.2
+SIZE_IN = 6.4, 4.2
 ARROWS = 24
 """Number of arrows along a path."""
 NEWTONS_PER_M = 60.0
@@ -76,10 +76,8 @@ def summarise(cells: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _draw_measures(cells: Sequence[Mapping[str, Any]]) -> Iterator[Picture]:
     for name in DRAWN:
-        with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
-            _draw_measure(figure.subplots(), cells, name)
-            place_legend(figure)
-        yield make_picture(figure, f'{COLUMNS[name][0]}: mean over the paired trials, with its bootstrap interval of 95 %.')
+        words = f'{COLUMNS[name][0]}: mean over the paired trials, with its bootstrap interval of 95 %.'
+        yield make_chart(SIZE_IN, words, _draw_measure, cells, name)
 
 
 def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
@@ -101,13 +99,9 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
 def _draw_trials(results: Sequence[PairResult]) -> Iterator[Picture]:
     """Yield a picture of every trial that was kept."""
     for result in results:
-        if result.task is None:
-            continue
-        with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
-            _draw_trial(figure.subplots(), result.task, result.trials)
-            place_legend(figure)
-        words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
-        yield make_picture(figure, f'Operator {result.operator}. {words}')
+        if result.task is not None:
+            words = f'Operator {result.operator}. Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
+            yield make_chart(SIZE_IN, words, _draw_trial, result.task, result.trials)
 
 
 def _draw_trial(axes: Any, task: Task, trials: Mapping[str, Trial]) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import base64
 import os
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -18,6 +18,7 @@ from typing import Any
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.io.outputs import MARK, check_replaceable
+from foc_ros.reporting.draw import open_figure
 
 try:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -106,8 +107,13 @@ def explain_tables(tables: Iterable[Table], explanations: Mapping[str, str]) -> 
     return sections
 
 
-def place_legend(figure: Any, columns: int = 3) -> None:
-    """Write the legend of the axes of a figure below them, where it covers nothing."""
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    named = dict(zip(labels, handles, strict=True))  # each label once
-    figure.legend(named.values(), named.keys(), loc='outside lower center', ncols=columns, frameon=False, fontsize='small')
+def make_chart(size_in: tuple[float, float], caption: str, draw: Callable[..., None], *given: Any) -> Picture:
+    """Return a chart for a section, drawn on axes by a function; its legend is below, where it covers nothing."""
+    with open_figure(*size_in) as figure:
+        draw(axes := figure.subplots(), *given)
+        handles, labels = axes.get_legend_handles_labels()
+        named = dict(zip(labels, handles, strict=True))  # each label once
+        if named:
+            look = {'loc': 'outside lower center', 'ncols': 3, 'frameon': False, 'fontsize': 'small'}
+            figure.legend(named.values(), named.keys(), **look)
+    return make_picture(figure, caption)
