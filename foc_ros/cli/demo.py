@@ -13,7 +13,6 @@ import sys
 import tempfile
 import threading
 import time
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,8 +45,8 @@ MARK = '.foc_ros_demo'
 RECEIVED = {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()} | {'/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}
 """Types of the outputs of the node."""
 PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
-WINDOW_S = 1.0
-"""Seconds over which rates are counted."""
+RATES = {'hand samples': 'hand_pose', 'predictions': 'prediction'}
+"""Rates that are shown, and their names in the diagnostics."""
 ONSET_SPEED = 0.05
 """Speed [m/s] above which the hand counts as moving."""
 
@@ -67,7 +66,6 @@ class Recorder:
         # This pipeline never predicts. It decodes the inputs and holds the scene at each of them.
         self._intake = Intake(Pipeline(config))
         self._sent: dict[int, tuple[float, Scene]] = {}
-        self._times: tuple[list[float], list[float]] = ([], [])
         self._halves: dict[str, Any] = {}
 
     def add_sent(self, item: Item, now: float) -> None:
@@ -76,7 +74,6 @@ class Recorder:
         if item.role == topics.HAND and self._intake.sample is not None:
             self.samples.append(self._intake.sample)
             self._sent[self._intake.sample.stamp_ns] = (now, self._intake.pipeline.scene)
-            self._times[0].append(now)
 
     def add_received(self, name: str, message: Any, now: float) -> None:
         """Record an output of the node by its name; the two messages of a prediction may come in any order, or be lost."""
@@ -85,7 +82,6 @@ class Recorder:
         if name not in PAIR:
             return
         if name == PAIR[0]:
-            self._times[1].append(now)
             self.delays.append(now - self._sent.get(decode_stamp(message.header), (now, None))[0])
         key = f'{STAMP}{decode_stamp(message.header)}' if name == PAIR[0] else message.layout.dim[2].label
         other = self._halves.pop(key, None)
@@ -104,15 +100,10 @@ class Recorder:
         """Whether the node's diagnostics count goals and obstacles, where zero obstacles are a count, too."""
         return self.health.get('goals', 'none yet') != 'none yet' and any(name.startswith('obstacles of') for name in self.health)
 
-    def rates(self, now: float) -> tuple[int, int]:
-        """Return how many hand samples were sent and how many predictions were received within the last second."""
-        sent, received = (len(times) - bisect_right(times, now - WINDOW_S) for times in self._times)
-        return sent, received
-
-    def describe(self, now: float, items: Sequence[Item]) -> str:
-        """Return how far the recording has been played, with rates and delay."""
+    def describe(self, items: Sequence[Item]) -> str:
+        """Return how far the recording has been played, with the rates of the node's diagnostics and the delay."""
         progress = f'{(self.snapshots[-1].stamp_ns - items[0].log_ns) / NANOSECONDS:4.1f} of {_measure_duration_s(items):.1f} s'
-        rates = 'hand samples {}/s, predictions {}/s'.format(*self.rates(now))
+        rates = ', '.join(f'{name} {self.health.get(f"{key} rate [Hz]", "-")}/s' for name, key in RATES.items())
         return f'{progress}   {rates}, delay {1e3 * float(np.median(self.delays[-50:])):.0f} ms'
 
 
@@ -191,7 +182,7 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: thread
                 node.check()
                 now = time.monotonic()
                 if recorder.snapshots:
-                    show(now, recorder.snapshots[-1], recorder.describe(now, items), recorder.samples[-1].position)
+                    show(now, recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
                 return not stopped.is_set()
 
             with Player(items, RECEIVED, receive, tick, domain) as player:
