@@ -39,6 +39,7 @@ FILES = {
     **{f'/{name}': FOLDER / name for name in ('style.css', 'play.js', 'hand.js', 'arranging.js')},
     **{f'/{name}': report_page.FOLDER / name for name in ('frame.css', 'frame.js', 'scene.js')},
 }
+REPORT = '/report'
 POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:"
 HEADERS = {'X-Content-Type-Options': 'nosniff', 'Referrer-Policy': 'no-referrer', 'Cache-Control': 'no-store'}
 OWN_HOSTS = r'localhost|[\d.]+|\[[\da-f:.]+\]'
@@ -59,20 +60,16 @@ class _Handler(RequestHandler):
 
 
 class _PageHandler(_Handler):
-    def get(self) -> None:
-        file = FILES[self.request.path]
-        self.set_header('Content-Type', f'{TYPES[file.suffix]}; charset=utf-8')
-        self.set_header('Content-Security-Policy', POLICY)
-        self.finish(file.read_bytes())
+    """Answers with a file of the page, or with the last report."""
 
-
-class _ReportHandler(_Handler):
     def get(self) -> None:
-        if self.session.report is None:
+        is_report = self.request.path == REPORT
+        file = self.session.report if is_report else FILES[self.request.path]
+        if file is None:
             raise HTTPError(404, 'there is no report yet')
-        self.set_header('Content-Type', 'text/html; charset=utf-8')
-        self.set_header('Content-Security-Policy', report_page.POLICY)
-        self.finish(self.session.report.read_bytes())
+        self.set_header('Content-Type', f'{TYPES[file.suffix]}; charset=utf-8')
+        self.set_header('Content-Security-Policy', report_page.POLICY if is_report else POLICY)
+        self.finish(file.read_bytes())
 
 
 class _SocketHandler(_Handler, WebSocketHandler):
@@ -102,8 +99,7 @@ class _SocketHandler(_Handler, WebSocketHandler):
 def listen(session: Session, host: str, sockets: Sequence[socket]) -> HTTPServer:
     """Start to serve a session on the sockets of a host (`open_sockets`); return the server."""
     given = {'session': session}
-    routes: list[Any] = [(path, _PageHandler, given) for path in FILES]
-    routes += [('/report', _ReportHandler, given), ('/socket', _SocketHandler, given)]
+    routes: list[Any] = [*((path, _PageHandler, given) for path in (*FILES, REPORT)), ('/socket', _SocketHandler, given)]
     application = Application(websocket_max_message_size=LONGEST_MESSAGE, log_function=lambda _: None)
     application.add_handlers(rf'({re.escape(host.lower())}|{OWN_HOSTS})', routes)  # a request to another host finds nothing
     server = HTTPServer(application)
