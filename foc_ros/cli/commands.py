@@ -19,7 +19,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from foc_ros.core.errors import FocError
-from foc_ros.io.outputs import check_folder, check_picture, check_report
+from foc_ros.io.outputs import REPORT_FILES, check_folder, check_page, check_picture
 
 from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Learning, Params, Port, Remaps, Samples, app, warn_all
 
@@ -162,7 +162,7 @@ def replay(
     from foc_ros.io.bags import check_bag, check_new_bag
 
     if report is not None:
-        check_report('--report', report)
+        check_page('--report', report, *REPORT_FILES)
     learning.check(params)
     check_bag(bag)
     if output is not None:

@@ -47,8 +47,6 @@ RECEIVED = {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()} | {'/di
 PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
 RATES = {'hand samples': 'hand_pose', 'predictions': 'prediction'}
 """Rates that are shown, and their names in the diagnostics."""
-ONSET_SPEED = 0.05
-"""Speed [m/s] above which the hand counts as moving."""
 
 
 class Recorder:
@@ -210,7 +208,7 @@ def _catch_interrupts() -> Iterator[threading.Event]:
 def describe_lead(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> str:
     """Return how long before the end of the movements the goals that were reached had become the most likely ones."""
     leads = []
-    for start_ns, end_ns in hand.find_movements(ONSET_SPEED):
+    for start_ns, end_ns in hand.find_movements():
         inside = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.most_likely is not None]
         if not inside:
             continue

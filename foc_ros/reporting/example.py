@@ -15,7 +15,7 @@ from foc_ros.core.types import NANOSECONDS
 
 from .figures import make_moment_figure
 from .page import Section, make_picture
-from .report import ONSET_SPEED, ReportCollector
+from .report import ReportCollector
 from .views import build_hand_trajectory, choose_moment
 
 MOST_ITEMS = 3_000
@@ -40,7 +40,7 @@ def draw_example(recordings: Mapping[str, Recording] | None, config: Config | No
         except FocError:
             continue  # the page lists what cannot be read
         hand = build_hand_trajectory(collected.samples)
-        for span in hand.find_movements(ONSET_SPEED):
+        for span in hand.find_movements():
             row = choose_moment(collected.snapshots, *span)
             if row is not None:
                 snapshot = collected.snapshots[row]

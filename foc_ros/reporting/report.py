@@ -17,7 +17,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import NANOSECONDS, HandSample
-from foc_ros.io.outputs import MARK, OVERVIEW, REPORT_FILES, check_report
+from foc_ros.io.outputs import MARK, REPORT_FILES, check_page
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
 from .draw import Span, save_figure
@@ -27,8 +27,6 @@ from .page import Table, render
 from .tracks import build_candidate_tracks
 from .views import NOTED, HandTrajectory, build_hand_trajectory, build_snapshot, is_late, list_unsolved
 
-ONSET_SPEED = 0.05
-"""Speed [m/s] above which the hand counts as moving."""
 LATE_SHARE = 0.05
 """Share of the predictions that were not finished from which the page warns of a busy computer."""
 COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candidates not solved', 'counters of the node')
@@ -76,10 +74,10 @@ def write_report(
     tables: further ones. Raises InputError if the directory cannot be written or contains other files of those names, or if the
     hand has no sample.
     """
-    check_report('--report', directory)
+    check_page('--report', directory, *REPORT_FILES)
     if not len(hand.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
-    spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
+    spans = hand.find_movements() or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
     tracks = build_candidate_tracks(snapshots)
     facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots, int(hand.stamps_ns[0]))
     data = encode_report(hand, tracks, spans, compute_recording_bounds(hand, snapshots))
@@ -94,10 +92,10 @@ def write_report(
         'hand_samples': len(hand.stamps_ns),
         'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
     }
-    page_file, numbers_file = (directory / name for name in REPORT_FILES)
+    page_file, numbers_file, overview_file = (directory / name for name in REPORT_FILES)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        pictures = _write_overview(directory / OVERVIEW, hand, snapshots, spans)
+        pictures = _write_overview(overview_file, hand, snapshots, spans)
         page_file.write_text(html, encoding='utf-8', errors='replace')
         numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
     except OSError as error:

@@ -20,6 +20,8 @@ COLOURS, SLOTS = 6, 12
 """Numbers of colours, and of the letters that tell candidates apart: the letters beyond F have the same colours again."""
 NOTED, LIKELY = 0.01, 0.05
 """Likelihoods from which a candidate is worth mentioning, and from which its ellipses are drawn."""
+ONSET_SPEED = 0.05
+"""Speed [m/s] above which the hand counts as moving."""
 ON_THE_WAY, USUAL = (0.15, 0.6), 1.5
 """Parts of a movement between which a moment is worth seeing, and the size of its ellipses, at most, in parts of their median."""
 GRAZE_M = 1e-3
@@ -39,9 +41,14 @@ def build_snapshot(prediction: Prediction) -> Prediction:
 
 
 def _keep_positions(candidate: PredictedCandidate) -> PredictedCandidate:
-    solution, covariance, motor = candidate.solution, candidate.covariance, candidate.motor_covariance
-    parts = {'covariance': covariance[:, :2, :2], 'motor_covariance': None if motor is covariance else motor[:, :2, :2]}
-    kept = replace(solution, mean=solution.mean[:, :4], control=solution.control[:0], **parts)
+    solution, motor = candidate.solution, candidate.solution.motor_covariance
+    kept = replace(
+        solution,
+        mean=solution.mean[:, :4],
+        covariance=solution.covariance[:, :2, :2],
+        motor_covariance=None if motor is None else motor[:, :2, :2],
+        control=solution.control[:0],
+    )
     return replace(candidate, solution=kept, height=None)
 
 
@@ -147,7 +154,9 @@ class HandTrajectory(Record):
         """Return the rows with start_ns <= stamp <= end_ns."""
         return slice(int(np.searchsorted(self.stamps_ns, start_ns)), int(np.searchsorted(self.stamps_ns, end_ns, side='right')))
 
-    def find_movements(self, onset_speed: float, gap_s: float = 0.15, least_m: float = 0.03) -> list[tuple[int, int]]:
+    def find_movements(
+        self, onset_speed: float = ONSET_SPEED, gap_s: float = 0.15, least_m: float = 0.03
+    ) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement.
 
         During a movement the hand is faster than onset_speed [m/s], pauses shorter than gap_s [s] apart; it extends over more
