@@ -20,8 +20,8 @@ COLOURS, SLOTS = 6, 12
 """Numbers of colours, and of the letters that tell candidates apart: the letters beyond F have the same colours again."""
 NOTED, LIKELY = 0.01, 0.05
 """Likelihoods from which a candidate is worth mentioning, and from which its ellipses are drawn."""
-ONSET_SPEED = 0.05
-"""Speed [m/s] above which the hand counts as moving."""
+ONSET_SPEED, PAUSE_S, LEAST_M = 0.05, 0.15, 0.03
+"""Speed [m/s] above which the hand counts as moving, longest pause within a movement, and its least extent."""
 ON_THE_WAY, USUAL = (0.15, 0.6), 1.5
 """Parts of a movement between which a moment is worth seeing, and the size of its ellipses, at most, in parts of their median."""
 GRAZE_M = 1e-3
@@ -154,23 +154,21 @@ class HandTrajectory(Record):
         """Return the rows with start_ns <= stamp <= end_ns."""
         return slice(int(np.searchsorted(self.stamps_ns, start_ns)), int(np.searchsorted(self.stamps_ns, end_ns, side='right')))
 
-    def find_movements(
-        self, onset_speed: float = ONSET_SPEED, gap_s: float = 0.15, least_m: float = 0.03
-    ) -> list[tuple[int, int]]:
+    def find_movements(self, onset_speed: float = ONSET_SPEED) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement.
 
-        During a movement the hand is faster than onset_speed [m/s], pauses shorter than gap_s [s] apart; it extends over more
-        than least_m [m].
+        During a movement the hand is faster than onset_speed [m/s], pauses shorter than PAUSE_S apart; it extends over more than
+        LEAST_M.
         """
         rows = np.flatnonzero(self.speed > onset_speed)
         if not len(rows):
             return []
-        breaks = np.flatnonzero(np.diff(self.stamps_ns[rows]) > gap_s * NANOSECONDS)
+        breaks = np.flatnonzero(np.diff(self.stamps_ns[rows]) > PAUSE_S * NANOSECONDS)
         spans = zip(np.concatenate([rows[:1], rows[breaks + 1]]), np.concatenate([rows[breaks], rows[-1:]]), strict=True)
         return [
             (int(self.stamps_ns[first]), int(self.stamps_ns[last]))
             for first, last in spans
-            if np.ptp(self.positions[first : last + 1], axis=0).max() > least_m
+            if np.ptp(self.positions[first : last + 1], axis=0).max() > LEAST_M
         ]
 
 
