@@ -9,33 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import Candidate, Solution
 from foc_ros.core.types import Array
 from foc_ros.ros.messages.decode_poses import decode_frame, decode_stamp
-from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STAMP, STATUSES, UNKNOWN
-from foc_ros.ros.messages.plane import project
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STATUSES, UNKNOWN
 
 from .views import parse_label
-
-
-def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
-    """Whether messages of `~/prediction` and `~/likelihoods` hold the same prediction."""
-    return bool(likelihoods.layout.dim[2].label == f'{STAMP}{decode_stamp(cloud.header)}')
 
 
 def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Prediction:
     """Return the snapshot in a pair of messages of `~/prediction` and `~/likelihoods`: inverse of `messages.encode_prediction`.
 
     obstacles and goals (g, 2) [m] are those at the stamp of the messages. Costs are relative to the least one.
-
-    Raises MessageError if the two messages hold different predictions.
     """
-    if not is_same_prediction(cloud, likelihoods):
-        raise MessageError('likelihoods', 'those of the prediction', 'those of another prediction')
-    rows, columns = _read_cloud(cloud), np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
+    rows = np.frombuffer(cloud.data, dtype=CLOUD_ROW) if len(cloud.data) else np.zeros(0, dtype=CLOUD_ROW)
+    columns = np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
     labels = likelihoods.layout.dim[0].label.split(';') if len(columns) else []
     shares = {UNKNOWN: 0.0 if labels else 1.0, OTHER: 0.0}
     while labels and labels[-1] in shares:
@@ -45,7 +35,7 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
     candidates = tuple(_read_candidate(label, obstacles.ids, values, part, plane) for label, values, part in read)
     cleared = np.zeros(len(obstacles), dtype=bool)
     if len(rows):
-        height = project(_stack(rows, 'xyz'), plane)[1]
+        height = rows[next(axis for axis in 'xyz' if axis not in plane)]
         cleared = (height.min() > obstacles.heights[:, 1]) | (height.max() < obstacles.heights[:, 0])
     return Prediction(
         decode_stamp(cloud.header),
@@ -62,27 +52,19 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
 
 
 def _read_candidate(label: str, ids: Collection[str], values: Array, rows: Any, plane: str) -> PredictedCandidate:
-    path, velocity = (project(_stack(rows, names), plane)[0] for names in ('xyz', ('vx', 'vy', 'vz')))
-    covariances = []
-    for prefix in ('', 'motor_'):
-        pairs = [prefix + pair for pair in ('xx', 'xy', 'xz', 'xy', 'yy', 'yz', 'xz', 'yz', 'zz')]
-        half, _ = project(_stack(rows, pairs).reshape(-1, 3, 3), plane)
-        covariances.append(project(half.swapaxes(1, 2), plane)[0])
+    x, y = plane
+    mean = _stack(rows, (x, y, f'v{x}', f'v{y}'))
+    pairs = x + x, plane, plane, y + y
+    covariance, motor = (_stack(rows, [prefix + pair for pair in pairs]).reshape(-1, 2, 2) for prefix in ('', 'motor_'))
     likelihood, effort, cost_ratio, eta = values.tolist()
     status, dt = STATUSES[int(rows['status'][0])], float(rows['t'][-1]) / max(len(rows) - 1, 1)
-    head = status, '', dt, np.hstack([path, velocity]), covariances[0], np.zeros((0, 2))
-    motor = None if np.array_equal(*covariances) else covariances[1]
-    solution = Solution(*head, effort, {}, 0.0, 0.0, eta, motor_covariance=motor)
+    motor = None if np.array_equal(covariance, motor) else motor
+    head = status, '', dt, mean, covariance, np.zeros((0, 2)), effort, {}, 0.0, 0.0, eta
+    solution = Solution(*head, motor_covariance=motor)
     sides = parse_label(label, ids)[1]
-    candidate = Candidate(label, int(rows['goal'][0]), tuple(sides.items()), path, 0.0)
+    candidate = Candidate(label, int(rows['goal'][0]), tuple(sides.items()), mean[:, :2], 0.0)
     return PredictedCandidate(candidate, solution, sides, cost_ratio, likelihood, way=int(rows['way'][0]))
 
 
 def _stack(rows: Any, names: Sequence[str]) -> Array:
     return np.stack([rows[name].astype(float) for name in names], axis=-1)
-
-
-def _read_cloud(cloud: Any) -> Any:
-    if cloud.point_step != CLOUD_ROW.itemsize:
-        raise MessageError('point_step', str(CLOUD_ROW.itemsize), cloud.point_step)
-    return np.frombuffer(cloud.data, dtype=CLOUD_ROW) if len(cloud.data) else np.zeros(0, dtype=CLOUD_ROW)
