@@ -58,9 +58,9 @@ NOWHERE = np.zeros(2)
 def test_an_ellipse_is_the_level_set_of_the_covariance() -> None:
     root = np.random.default_rng(0).normal(size=(2, 2))
     covariance, centre = root @ root.T, np.array([0.3, -0.1])
-    ellipse = make_stddev_ellipse(centre, covariance, 2.0)
+    ellipse = make_stddev_ellipse(centre, covariance)
     edge = ellipse.get_patch_transform().transform(np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])) - centre
-    np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 4.0, rtol=1e-9)
+    np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 1.0, rtol=1e-9)
     ellipse = make_stddev_ellipse(NOWHERE, np.array([[0.0, 0.0], [0.0, -1e-18]]))
     assert (ellipse.width, ellipse.height) == (0.0, 0.0)
 

@@ -121,7 +121,7 @@ foc: {ros__parameters: {rate_hz: 25}}
         (f'/**: {{ros__parameters: {{rate_hz: {"9" * 400}}}}}', 'rate_hz: expected a number in [0.1, 1000] Hz, got 9999'),
         (
             f'/**: {{ros__parameters: {{foc.steps: {"9" * 4000}}}}}',
-            'foc.steps: expected a number in [5, 400], got a whole number of',
+            'foc.steps: expected a number in [5, 400], got a whole number',
         ),
         ('/**: {ros__parameters: {foc: {steps: 9}, foc.steps: 9}}', 'foc.steps: expected one value in section /**, got two'),
         ('/**: {ros__parameters: [1, 2]}', '/**: expected ros__parameters with parameters below it'),

@@ -42,8 +42,6 @@ CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9
 """Colours of Okabe and Ito, without yellow (invisible on white) and black (used for the measured hand)."""
 GHOST_COLOUR = '#777777'
 """Colour of a ghost, and of a candidate without a letter."""
-STDDEVS = 1.0
-"""Size of ellipses and rings in standard deviations."""
 ELLIPSES_PER_CANDIDATE = 8
 NAMED_OBSTACLES = 30
 """The obstacles of larger scenes are drawn without their ids."""
@@ -119,10 +117,10 @@ def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
     return stddevs[..., 1], stddevs[..., 0], np.degrees(np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1]))
 
 
-def make_stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDEVS) -> Ellipse:
-    """Return the ellipse of the given number of standard deviations; centre (2,) [m], covariance (2, 2) [m^2]."""
+def make_stddev_ellipse(centre: Array, covariance: Array) -> Ellipse:
+    """Return the ellipse of one standard deviation; centre (2,) [m], covariance (2, 2) [m^2]."""
     greater, smaller, angle = compute_ellipse_axes(covariance)
-    return Ellipse(tuple(centre), 2.0 * stddevs * float(greater), 2.0 * stddevs * float(smaller), angle=float(angle))
+    return Ellipse(tuple(centre), 2.0 * float(greater), 2.0 * float(smaller), angle=float(angle))
 
 
 def make_obstacle_patch(obstacles: Obstacles, row: int, growth: float, **look: Any) -> Patch:
@@ -139,7 +137,7 @@ def compute_bounds(
 
     margin: as a share of the greater side.
     """
-    shapes = find_limits(obstacles, STDDEVS * obstacles.radius_stddev)
+    shapes = find_limits(obstacles, obstacles.radius_stddev)
     enclosed = np.concatenate([*shapes, *map(find_drawn_curve, candidates), np.reshape(goals, (-1, 2)), *points])
     low, high = (enclosed.min(axis=0), enclosed.max(axis=0)) if len(enclosed) else (np.zeros(2), np.ones(2))
     added = margin * max(*(high - low), 0.05)
@@ -157,7 +155,7 @@ def draw_scene(
     """
     holds_goal = np.any(find_holders(goals, obstacles), axis=0).tolist()
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
-        ring = STDDEVS * float(obstacles.radius_stddev[row])
+        ring = float(obstacles.radius_stddev[row])
         look = {'facecolor': '0.65', 'edgecolor': '0.35', 'linewidth': 0.8, 'zorder': 1.0, 'label': 'obstacle'}
         axes.add_patch(make_obstacle_patch(obstacles, row, 0.0, **look))
         if ring:

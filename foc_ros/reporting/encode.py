@@ -20,7 +20,7 @@ from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve
 
-from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, Span, compute_bounds, compute_ellipse_axes
+from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Bounds, Span, compute_bounds, compute_ellipse_axes
 from .tracks import CandidateTracks
 from .views import LIKELY, HandTrajectory, choose_moment, count_likely_paths, describe_ghost, list_unsolved
 
@@ -170,7 +170,7 @@ def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Predictio
     """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying paths."""
     points = [hand.positions]
     for each in snapshots:
-        points += [each.goal_positions, *find_limits(each.obstacles, STDDEVS * each.obstacles.radius_stddev)]
+        points += [each.goal_positions, *find_limits(each.obstacles, each.obstacles.radius_stddev)]
     paths = [find_drawn_curve(candidate) for each in snapshots for candidate in each]
     points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
     return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
@@ -188,7 +188,7 @@ def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.i
 
 def _encode_obstacles(obstacles: Obstacles) -> list[list[str | int]]:
     """Return obstacles: name, centre, radius and its standard deviation, then two vertices or more, relative to the centre."""
-    rows = np.column_stack([obstacles.centre, obstacles.radius, STDDEVS * obstacles.radius_stddev])
+    rows = np.column_stack([obstacles.centre, obstacles.radius, obstacles.radius_stddev])
     polygons = [obstacles.vertices[row, : corners if corners > 1 else 0] for row, corners in enumerate(obstacles.corners)]
     return [
         [name, *_quantise(row, LENGTH), *_quantise(polygon.ravel(), LENGTH)]
@@ -198,7 +198,7 @@ def _encode_obstacles(obstacles: Obstacles) -> list[list[str | int]]:
 
 def _encode_ellipses(centres: Array, covariance: Array) -> list[list[int]]:
     greater, smaller, angle = compute_ellipse_axes(covariance)
-    lengths = np.column_stack([centres, STDDEVS * greater, STDDEVS * smaller])
+    lengths = np.column_stack([centres, greater, smaller])
     return [[*_quantise(each, LENGTH), round(degrees)] for each, degrees in zip(lengths, angle.tolist(), strict=True)]
 
 
