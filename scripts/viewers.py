@@ -47,7 +47,7 @@ def find_messages() -> dict[str, Any]:
                 first_ns = step.sample.stamp_ns
             if step.prediction is None or first_ns is None or step.prediction.stamp_ns < first_ns + SHOWN_S * NANOSECONDS:
                 continue
-            outputs = encode_outputs(step.prediction, step.prediction.obstacles, config.plane, RosbagsTypes(TYPESTORE))
+            outputs = encode_outputs(step.prediction, config.plane, RosbagsTypes(TYPESTORE))
             return sent | {f'/foc/{name}': message for name, message in outputs.items()}
     raise SystemExit(f'{RECORDING.name} has no prediction after {SHOWN_S} s')
 

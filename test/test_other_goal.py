@@ -93,7 +93,7 @@ def test_the_share_is_published_and_read_back() -> None:
     )
     read = read_snapshot(cloud, table, 'xy', prediction.obstacles, prediction.goal_positions)
     assert read.other == prediction.other == encode_prediction(prediction)['other']
-    texts = [each.text for each in encode_markers(prediction, prediction.obstacles, 'xy', TYPES).markers]
+    texts = [each.text for each in encode_markers(prediction, 'xy', TYPES).markers]
     assert any(text.endswith(f'{100 * prediction.other:.0f} % another goal') for text in texts)
 
 

@@ -94,7 +94,7 @@ class Recording:
         """Record a prediction, and keep its snapshot for the report."""
         if not self._snapshots or snapshot.stamp_ns - self._snapshots[-1].stamp_ns >= PERIOD_NS:
             self._snapshots.append(snapshot)
-        self._add_outputs(encode_outputs(prediction, prediction.obstacles, 'xy', self._types, SENT))
+        self._add_outputs(encode_outputs(prediction, 'xy', self._types, SENT))
 
     def add_guidance(self, output: GuidanceOutput, place: Place) -> None:
         """Record guidance."""
