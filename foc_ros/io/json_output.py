@@ -59,7 +59,7 @@ def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
     }
     if height is not None:
         values |= {'height': height.mean[:, 0], 'height_velocity': height.mean[:, 1], 'height_stddev': height.stddev}
-    return _make_plain(values)
+    return {name: _make_plain(value) for name, value in values.items()}
 
 
 def encode_solution(solution: Solution) -> dict[str, Any]:
@@ -87,7 +87,7 @@ def encode_solution(solution: Solution) -> dict[str, Any]:
         'control': solution.control,
         'covariance': solution.covariance,
     }
-    return _make_plain(values)
+    return {name: _make_plain(value) for name, value in values.items()}
 
 
 def _make_plain(value: Any) -> Any:

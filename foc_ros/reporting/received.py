@@ -52,15 +52,14 @@ def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles
 
 
 def _read_candidate(label: str, ids: Collection[str], values: Array, rows: Any, plane: str) -> PredictedCandidate:
-    x, y = plane
+    x, y = plane[0], plane[1]
     mean = _stack(rows, (x, y, f'v{x}', f'v{y}'))
     pairs = x + x, plane, plane, y + y
-    covariance, motor = (_stack(rows, [prefix + pair for pair in pairs]).reshape(-1, 2, 2) for prefix in ('', 'motor_'))
+    total, motor = (_stack(rows, [prefix + pair for pair in pairs]).reshape(-1, 2, 2) for prefix in ('', 'motor_'))
     likelihood, effort, cost_ratio, eta = values.tolist()
     status, dt = STATUSES[int(rows['status'][0])], float(rows['t'][-1]) / max(len(rows) - 1, 1)
-    motor = None if np.array_equal(covariance, motor) else motor
-    head = status, '', dt, mean, covariance, np.zeros((0, 2)), effort, {}, 0.0, 0.0, eta
-    solution = Solution(*head, motor_covariance=motor)
+    only_motor = None if np.array_equal(total, motor) else motor
+    solution = Solution(status, '', dt, mean, total, np.zeros((0, 2)), effort, {}, 0.0, 0.0, eta, motor_covariance=only_motor)
     sides = parse_label(label, ids)[1]
     candidate = Candidate(label, int(rows['goal'][0]), tuple(sides.items()), mean[:, :2], 0.0)
     return PredictedCandidate(candidate, solution, sides, cost_ratio, likelihood, way=int(rows['way'][0]))
