@@ -17,13 +17,24 @@ CLEARANCE = 0.005
 GOAL = np.array([0.35, 0.0])
 AVOIDING = Path(__file__).parents[2] / 'shared' / 'data' / 'd3il_avoiding'
 
+ANY = 1e6
+"""A detour that leaves out no class."""
+
 
 def find(
-    obstacles: Obstacles, goals=GOAL, hand=(0.0, 0.0), velocity=(0.0, 0.0), k=6, steps=100, previous=(), clearance=CLEARANCE
+    obstacles: Obstacles,
+    goals=GOAL,
+    hand=(0.0, 0.0),
+    velocity=(0.0, 0.0),
+    k=6,
+    steps=100,
+    previous=(),
+    clearance=CLEARANCE,
+    detour=ANY,
 ) -> Search:
     goals = np.asarray(goals, dtype=float).reshape(-1, 2)
     mean = np.array([*hand, *velocity, 0.0, 0.0])
-    settings = HomotopyConfig(max_candidates=k, clearance=clearance)
+    settings = HomotopyConfig(max_candidates=k, max_detour=detour, clearance=clearance)
     return search(mean, goals, obstacles, settings, [1.0] * len(goals), steps, previous)
 
 

@@ -78,6 +78,22 @@ def test_a_turn_back_is_found_but_ranks_late():
     assert turned.candidates[0].length > turned.candidates[1].length
 
 
+def test_long_detours_are_seen_and_not_followed_but_of_each_goal_the_shortest_way_is():
+    obstacles = make_obstacles([[0.05, 0.0], [0.15, 0.0]], 0.03)
+    whole, few = (find(obstacles, goals=[[0.1, 0.0], [0.2, 0.0]], detour=each) for each in (1e6, 1.1))
+    assert {one.goal for one in few.candidates} == {0, 1} and not whole.unfollowed
+    shortest = {goal: min(one.length for one in whole.candidates if one.goal == goal) for goal in (0, 1)}
+    within = [one.label for one in whole.candidates if one.length <= 1.1 * shortest[one.goal]]
+    assert [one.label for one in few.candidates] == within and 2 < len(within) < len(whole.candidates)
+    left_out = {one.label for one in whole.candidates} - set(within)
+    assert {one.label for one in few.unfollowed} & left_out
+    before = next(one for one in whole.candidates if one.length > 1.1 * shortest[one.goal])
+    near = find(
+        obstacles, goals=[[0.1, 0.0], [0.2, 0.0]], detour=0.97 * before.length / shortest[before.goal], previous=(before,)
+    )
+    assert before.label in [one.label for one in near.candidates], 'a class that was followed stays a little longer'
+
+
 def test_the_guess_begins_at_the_present_speed_and_ends_at_rest():
     found = find(NOTHING, velocity=(0.3, 0.0), steps=100)
     speed = np.hypot(*np.diff(found.candidates[0].guess, axis=0).T) * 100

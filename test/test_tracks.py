@@ -15,7 +15,7 @@ from foc_ros.core.hand.kalman import update
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.predict import predict
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Status
-from foc_ros.core.tracks import NO_TRACKS, SMOOTHING_S, Track, Tracks
+from foc_ros.core.tracks import NO_TRACKS, REST_S, SMOOTHING_S, TURNS, Track, Tracks
 from foc_ros.core.types import HandSample, HandState
 
 CONFIG = replace_values(Config(), {'foc.steps': 20})
@@ -116,6 +116,29 @@ def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions_and_numb
         if one.way in numbers:
             assert one.solution.qp_solves < other.solution.qp_solves
         np.testing.assert_allclose(one.solution.path, other.solution.path, atol=1e-4)
+
+
+def test_unlikely_classes_are_solved_in_turns_unless_the_scene_changes() -> None:
+    config = CONFIG.with_values({'homotopy.max_detour': 100.0, 'likelihood.planning_horizon_s': 1000.0})
+    row = make_obstacles([[0.15, 0.05], [0.15, -0.05], [0.2, 0.0]], 0.02)
+    hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
+    first, tracks = predict(config, hand, row, GOALS, NO_TRACKS)
+    unlikely = {each.way for each in first.candidates if each.likelihood < 0.02 * first.candidates[0].likelihood}
+    assert 1 < len(unlikely) < len(first.candidates)
+    solved, ages = set(), []
+    for tick in range(1, TURNS + 1):
+        prediction, following = predict(config, replace(hand, stamp_ns=tick * STEP_NS), row, GOALS, tracks)
+        new = {each.way for each in prediction.candidates if not each.age_s}
+        assert new >= {each.way for each in first.candidates} - unlikely and len(new & unlikely) <= 1 + len(unlikely) // TURNS
+        assert all(np.hypot(*each.mean[0, :2]) < 1e-9 for each in prediction.candidates)
+        solved |= new
+        ages += [each.age_s for each in prediction.candidates]
+        tracks = following
+    assert solved >= unlikely and max(ages) <= REST_S + 1e-9
+    aside, wider, fewer = row.centre + np.array([0.0, 0.02]), row.radius + 0.02, row.take([0, 1])
+    for now, some_rest in ((row, True), (replace(row, centre=aside), False), (replace(row, radius=wider), False), (fewer, False)):
+        prediction, _ = predict(config, replace(hand, stamp_ns=TURNS * STEP_NS + 1_000_000), now, GOALS, tracks)
+        assert any('solved again soon' in each.solution.message for each in prediction.candidates) == some_rest
 
 
 def test_an_earlier_solution_on_another_side_is_no_start() -> None:

@@ -22,7 +22,7 @@ from foc_ros.core.types import HandState
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_markers
 
-CONFIG = replace_values(Config(), {'foc.steps': 20, 'likelihood.other_goal': 0.0})
+CONFIG = replace_values(Config(), {'foc.steps': 20, 'likelihood.other_goal': 0.0, 'homotopy.max_detour': 100.0})
 HAND = HandState(0, np.zeros(6), np.zeros((6, 6)), frame_id='world')
 ROW = make_obstacles([[0.15, 0.04], [0.15, -0.045]], 0.025, 0.001)
 GOALS = np.array([[0.3, 0.0]])

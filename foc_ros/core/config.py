@@ -158,8 +158,9 @@ class HomotopyConfig(Group):
     """Homotopy classes that are considered."""
 
     max_candidates: int = _p(
-        8, 'number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
+        24, 'largest number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
     )
+    max_detour: float = _p(1.5, 'length of the longest class to solve, relative to the shortest one to its goal', '', 1.0, 1e6)
     clearance: float = _p(0.005, 'distance that the hand needs from every obstacle: narrower gaps are closed', 'm', 0.0, 1.0)
     library: str = _p('', 'file of paths that learn or replay --learn wrote; empty: none', read_only=True)
 

@@ -77,6 +77,13 @@ class Obstacles(Record):
             return self
         return replace(self, centre=self.centre + seconds * self.velocity)
 
+    def is_near(self, other: Obstacles, distance: float) -> bool:
+        """Tell whether the other table has the same obstacles, of which no part has moved by more than a distance [m]."""
+        if self.ids != other.ids or self.vertices.shape != other.vertices.shape:
+            return False
+        pairs = ((self.centre, other.centre), (self.vertices, other.vertices), (self.radius, other.radius))
+        return all(bool((np.abs(one - two) <= distance).all()) for one, two in pairs)
+
 
 def make_obstacles(
     centre: ArrayLike = (),

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,7 +86,8 @@ def predict(
     found, candidates = _find_candidates(scene, config, known, library, deadline)
     matched = known.match(candidates, stamp_ns)
     reserve_s = (RESERVE_S + POOLING_S * bool(library.recordings)) * len(candidates)
-    solved = _solve(scene, config, candidates, matched, deadline.take_share(SOLVE_SHARE, reserve_s))
+    resting = known.find_resting(matched, obstacles, stamp_ns)
+    solved = _solve(scene, config, candidates, matched, resting, deadline.take_share(SOLVE_SHARE, reserve_s))
     held = [_hold_answer(*each, scene.hand) for each in zip(solved, matched, strict=True)]
     absent = known.find_absent(candidates, matched, stamp_ns)
     held += [each for track in absent if (each := _hold_absent(track, scene.hand)) is not None]
@@ -133,6 +134,7 @@ def predict(
         *known.follow(predicted, matched, solved, stamp_ns),
         stamp_ns,
         goals,
+        obstacles,
         dict(enumerate(scene.durations_s)),
         rest,
         None if best is None else best.way,
@@ -198,18 +200,34 @@ def _find_candidates(
 
 
 def _solve(
-    scene: _PredictionScene, config: Config, candidates: Sequence[Candidate], matched: Sequence[Track], deadline: Deadline
+    scene: _PredictionScene,
+    config: Config,
+    candidates: Sequence[Candidate],
+    matched: Sequence[Track],
+    resting: Collection[int],
+    deadline: Deadline,
 ) -> list[PredictedCandidate]:
-    """Solve the candidates, each from the solution of its track; return them with their numbers and predictive covariance."""
+    """Solve the candidates that do not rest, each from the solution of its track; return all with their numbers, in their order.
+
+    The solutions have predictive covariances. resting: numbers of tracks of which the rest of their last solution is taken.
+    """
+    found = [
+        _hold_track(track, candidate, scene.hand, 'unlikely, and solved again soon') if track.number in resting else None
+        for candidate, track in zip(candidates, matched, strict=True)
+    ]
+    open_rows = [row for row, each in enumerate(found) if each is None]
     by_goal = {
         row: build_problem(config, scene.hand, scene.in_the_way[row], scene.goals[row], scene.durations_s[row])
-        for row in {each.goal for each in candidates}
+        for row in {candidates[row].goal for row in open_rows}
     }
-    earlier = [each.solution if each.solved_ns == each.seen_ns else None for each in matched]
+    earlier = [None if matched[row].has_failed else matched[row].solution for row in open_rows]
+    tried = [candidates[row] for row in open_rows]
     until = Deadline(whole=deadline, goes_on=True)
-    solved = solve_candidates(candidates, [by_goal[each.goal] for each in candidates], config.foc, earlier, until)
-    numbered = [replace(each, way=track.number) for each, track in zip(solved, matched, strict=True)]
-    return [_widen_covariance(each, scene.covariances, scene.hand, config) for each in numbered]
+    solved = solve_candidates(tried, [by_goal[each.goal] for each in tried], config.foc, earlier, until)
+    for row, each in zip(open_rows, solved, strict=True):
+        numbered = replace(each, way=matched[row].number)
+        found[row] = _widen_covariance(numbered, scene.covariances, scene.hand, config)
+    return [each for each in found if each is not None]
 
 
 def _hold_answer(solved: PredictedCandidate, track: Track, hand: HandState) -> PredictedCandidate:

@@ -9,6 +9,8 @@ most sides, that was seen last, and is the most likely. No two candidates contin
 From its track a class has its number, the solution from which the next one starts, and its likelihood before. A class that could
 not be solved, or that the search has missed, keeps the rest of its last solution for at most `HOLD_S`: of an age a, a movement of
 duration T over [a, T], resampled at N steps of (T - a) / N, that begins where the hand is now and has the cost of that rest.
+So does an unlikely class, as long as the scene stays the same, until it is its turn to be solved again: of these classes, each
+prediction solves the part of `TURNS` whose solutions are oldest.
 
 Likelihoods change gradually: with p_i of this prediction, l_i before (0 for a new class), and the time h between both,
 
@@ -26,6 +28,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
 from .solution import Candidate, Solution
@@ -34,6 +37,9 @@ from .types import NANOSECONDS, Array, Record, Rest, as_readonly
 HOLD_S = 0.2
 """Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten
 predictions, within which a solver or a search that missed a class finds it again."""
+UNLIKELY, TURNS, REST_S = 0.02, 5, 0.1
+"""Likelihood, relative to the largest one, below which a class is not solved in every prediction; in how many predictions all of
+these classes are solved once; and the longest time that a class is not solved [s]."""
 SMOOTHING_S = 0.1
 """Time constant of the filter of the likelihoods [s]: half the time in which people react to what they see."""
 LEAD = 0.05
@@ -41,7 +47,7 @@ LEAD = 0.05
 LEAST_UNKNOWN = 1e-6
 """Unknown share that counts as none."""
 MOVED_M = 0.01
-"""A goal that moves by more than this between two predictions is another goal [m]."""
+"""A goal that moves by more than this between two predictions is another goal, and an obstacle is another obstacle [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +55,7 @@ class Track(Record):
     """A homotopy class that is followed.
 
     number: stays for as long as the class is followed; candidate: as it was last, at the stamp seen_ns; likelihood: its last one;
-    solution: the last one, found at solved_ns, None if there is none.
+    solution: the last one, found at solved_ns, None if there is none; has_failed: whether the class could not be solved since.
     """
 
     number: int
@@ -58,6 +64,7 @@ class Track(Record):
     likelihood: float = 0.0
     solution: Solution | None = None
     solved_ns: int = 0
+    has_failed: bool = False
 
     def is_solved_within(self, stamp_ns: int, seconds: float) -> bool:
         """Tell whether there is a solution that is not older at a stamp [ns] than some seconds [s]."""
@@ -69,15 +76,16 @@ class Tracks(Record):
     """What one prediction passes to the next.
 
     followed: the tracks of its candidates; absent: those that were not seen for a short time; stamp_ns: of the prediction, None
-    if there was none; goals (g, 2) [m]; durations_s: time to go to each [s]; rest: shares of the likelihood that no candidate
-    had; most_likely: number of the most likely class; next_number: of the next new class; next_goal: row of the goal at which the
-    search begins.
+    if there was none; goals (g, 2) [m]; obstacles: where they were; durations_s: time to go to each goal [s]; rest: shares of the
+    likelihood that no candidate had; most_likely: number of the most likely class; next_number: of the next new class; next_goal:
+    row of the goal at which the search begins.
     """
 
     followed: tuple[Track, ...] = ()
     absent: tuple[Track, ...] = ()
     stamp_ns: int | None = None
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    obstacles: Obstacles | None = None
     durations_s: dict[int, float] = field(default_factory=dict)
     rest: Rest = field(default_factory=Rest)
     most_likely: int | None = None
@@ -129,6 +137,15 @@ class Tracks(Record):
         numbers = iter(range(self.next_number, self.next_number + len(candidates)))
         return [found.get(place) or Track(next(numbers), each, stamp_ns) for place, each in enumerate(candidates)]
 
+    def find_resting(self, matched: Sequence[Track], obstacles: Obstacles, stamp_ns: int) -> set[int]:
+        """Return the numbers of the tracks whose last solution is good enough, because their classes are unlikely."""
+        if self.obstacles is None or not obstacles.is_near(self.obstacles, MOVED_M):
+            return set()
+        least = UNLIKELY * max([each.likelihood for each in matched], default=0.0)
+        unlikely = [each for each in matched if each.likelihood < least and each.is_solved_within(stamp_ns, REST_S)]
+        unlikely.sort(key=lambda each: (each.solved_ns, each.number))
+        return {each.number for each in unlikely[math.ceil(len(unlikely) / TURNS) :]}
+
     def find_absent(self, candidates: Sequence[Candidate], matched: Sequence[Track], stamp_ns: int) -> list[Track]:
         """Return the tracks with a solution of the last `HOLD_S` that are no candidates now, under any name."""
         numbers = {each.number for each in matched}
@@ -176,14 +193,16 @@ class Tracks(Record):
     ) -> tuple[tuple[Track, ...], tuple[Track, ...]]:
         """Return the tracks after a prediction: of its candidates, with new solutions where there are, and those not seen.
 
-        predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found.
+        predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found, or
+        with the rest of what it had found before.
         """
         likelihoods = {each.way: each.likelihood for each in predicted}
         present = []
         for track, found in zip(matched, solved, strict=True):
             seen = Track(track.number, found.candidate, stamp_ns, likelihoods.get(track.number, 0.0))
-            newest = (found.solution, stamp_ns) if found.has_likelihood else (track.solution, track.solved_ns)
-            present.append(replace(seen, solution=newest[0], solved_ns=newest[1]))
+            is_new = found.has_likelihood and not found.age_s
+            newest = (found.solution, stamp_ns) if is_new else (track.solution, track.solved_ns)
+            present.append(replace(seen, solution=newest[0], solved_ns=newest[1], has_failed=not found.has_likelihood))
         numbers = {each.number for each in matched}
         return tuple(present), tuple(each for each in self._find_recent(stamp_ns) if each.number not in numbers)
 

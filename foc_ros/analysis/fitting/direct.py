@@ -35,11 +35,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedPath, find_open_gaps
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedPath
 from foc_ros.analysis.intervals import CENTRAL, resample
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
-from foc_ros.core.classes.rows import find_direction, find_rows, locate_rows
 from foc_ros.core.config import Config, EstimatorConfig, clip_values, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
@@ -71,9 +70,6 @@ FACTORS = tuple(2.0 ** (np.arange(-10, 11) / 4.0))
 MIN_TIME_S = 0.1
 """Least time to the end of a sample that is used, because the end itself is known no better."""
 WAIT = 'duration.wait_s'
-CANDIDATES = 'homotopy.max_candidates'
-MAX_CLASSES = 24
-"""Most path classes that make room for candidates; goals do beyond it. A prediction takes a few ms for each candidate."""
 
 Sample = tuple[HandState, Array, float]
 """State of the hand, goal (2,) [m], time left [s]."""
@@ -297,26 +293,3 @@ def _compute_mean_wait(hand: RecordedHand, config: Config) -> float | None:
         elif onset_ns is not None:
             waits.append((onset_ns - state.stamp_ns) / NANOSECONDS)
     return float(np.mean(waits)) if waits else None
-
-
-def fit_max_candidates(hands: Sequence[RecordedHand], config: Config) -> Findings:
-    """Return the number of candidates that has room for every goal and path class, never less than the given one."""
-    classes, goals = max(count_classes(each, config.scene.hand_radius) for each in hands), max(len(each.goals) for each in hands)
-    given = config.homotopy.max_candidates
-    count = int(clip_to_bounds(CANDIDATES, max(given, min(classes, MAX_CLASSES), goals)))
-    warnings = [f'{CANDIDATES}: a recording has {classes} homotopy classes, {count} are followed'] if classes > count else []
-    if count == given:
-        return Findings(warnings=warnings)
-    found = Estimate(CANDIDATES, count, count, count, 'classes and goals in the recordings')
-    return Findings({CANDIDATES: found}, warnings=warnings)
-
-
-def count_classes(hand: RecordedHand, hand_radius: float = 0.0) -> int:
-    """Return how many path classes lead a hand of a radius [m] through the rows between the start and the farthest goal."""
-    start, obstacles = hand.positions[0], hand.obstacles
-    direction = find_direction(start, hand.goals)
-    row = find_rows(obstacles, direction, start, hand.goals)
-    position = locate_rows(obstacles.centre @ direction, row)
-    is_between = (position > start @ direction) & (position < (hand.goals @ direction).max())
-    open_gaps = [len(each) for each in find_open_gaps(obstacles, row, direction, hand_radius)]
-    return int(np.prod(np.array(open_gaps, dtype=float)[is_between]))

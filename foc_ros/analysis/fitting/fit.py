@@ -26,7 +26,7 @@ from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
 from . import Findings, clip_to_bounds, is_cross_validated
-from .direct import RecordedHand, fit_duration, fit_estimator, fit_fading, fit_max_candidates, fit_wait, read_hand
+from .direct import RecordedHand, fit_duration, fit_estimator, fit_fading, fit_wait, read_hand
 from .one_replay import COVERAGE_LEVEL, NO_WIDENING, fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
 
@@ -94,7 +94,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     if not hands:
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
     fit.recordings, usable = len(hands), {each.name: recordings[each.name] for each in hands}
-    for step in (fit_estimator, fit_fading, fit_duration, fit_wait, fit_max_candidates):
+    for step in (fit_estimator, fit_fading, fit_duration, fit_wait):
         fit.take(step(hands, fit.config))
     if config.foc.strategy == 'fixed':
         fit.found.warnings.append(f'foc.tau, foc.lam: kept as they are; {BY_EXAMPLE} finds them from movements')

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from bisect import insort
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import merge
 from itertools import chain
@@ -80,7 +80,8 @@ def search(
 ) -> Search:
     """Find the best `config.max_candidates` homotopy classes between the hand and the goals.
 
-    If there are more goals than that, the search finds one class to each goal, up to `MOST_CANDIDATES`. Obstacles are grown by
+    Those are left out that are more than `config.max_detour` times as long as the shortest one to their goal. If there are more
+    goals than candidates, the search finds one class to each goal, up to `MOST_CANDIDATES`. Obstacles are grown by
     `config.clearance`. The uncertainty of the radius is left to the chance constraint, which weighs it by eta.
 
     Parameters
@@ -92,7 +93,7 @@ def search(
     obstacles : Obstacles
         The obstacles, where they are now.
     config : HomotopyConfig
-        Number of candidates and clearance.
+        Number of candidates, largest detour and clearance.
     duration_s : Sequence[float]
         Time to go to each goal [s].
     steps : int
@@ -121,7 +122,7 @@ def search(
     if not len(goals):
         return Search(())
     scene = SearchScene(hand_mean, goals, obstacles, config, previous, turn.objects)
-    ranking = _Ranking(scene, {each.label for each in previous}, turn.deadline)
+    ranking = _Ranking(scene, {each.label for each in previous}, config.max_detour, turn.deadline)
     next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < turn.first_goal, goal)))
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
     chosen = ranking.choose(count)
@@ -136,12 +137,13 @@ class _Ranking:
     """Finds and ranks classes to all goals.
 
     A class ranks by its key, which is multiplied by STAY if it was followed in the previous prediction (labels), and by REPEAT if
-    it passes all obstacles as the shortest class to another goal does, or one that ranks before it. seen: classes that were
-    found, among them all that are not chosen.
+    it passes all obstacles as the shortest class to another goal does, or one that ranks before it. One that is more than
+    max_detour times as long as the shortest one to its goal is not chosen. seen: classes that were found, among them all that are
+    not chosen.
     """
 
-    def __init__(self, scene: SearchScene, followed: Collection[str], deadline: Deadline) -> None:
-        self._scene, self._followed, self._deadline = scene, followed, deadline
+    def __init__(self, scene: SearchScene, followed: Collection[str], max_detour: float, deadline: Deadline) -> None:
+        self._scene, self._followed, self._max_detour, self._deadline = scene, followed, max_detour, deadline
         self._bests: list[PathClass] = []
         self._shortest: list[PathClass] = []
         self._others: list[Iterable[PathClass]] = []
@@ -179,8 +181,20 @@ class _Ranking:
             best = min(seen, key=self._rank)
             self._bests.append(best)
             self._shortest.append(seen[0])
-            self._others.append(chain([each for each in seen if each is not best], stream))
+            others = chain([each for each in seen if each is not best], stream)
+            self._others.append(self._leave_out_detours(others, seen[0].key))
         self._scene.notes['no_way'] += not seen
+
+    def _leave_out_detours(self, stream: Iterable[PathClass], shortest: float) -> Iterator[PathClass]:
+        """Yield the classes of a stream that are not much longer than the shortest one [m]."""
+        longest = self._max_detour * shortest
+        for found in stream:
+            if self._rank(found)[0] <= longest:
+                yield found
+            else:
+                self.seen.append(found)
+                if STAY * found.key > longest:
+                    break
 
     def choose(self, count: int) -> list[PathClass]:
         """Choose some classes, shortest first: the best one to each goal, as far as there is room, then others by their rank.
