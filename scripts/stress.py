@@ -26,8 +26,6 @@ from __future__ import annotations
 import math
 import os
 import random
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +39,7 @@ from cyclopts import App, Parameter
 
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS, Array
-from foc_ros.ros.isolated_node import private_environment, reserve_domain, set_environment
+from foc_ros.ros.isolated_node import NodeProcess, isolated_graph
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RclpyTypes
 
@@ -58,23 +56,12 @@ BURST, BURST_NS, LATE_NS = 20, 100_000, 50_000_000
 """Number of poses sent at once, as after a stall of the network; least difference of their stamps; how late a late one is."""
 GROWTH, SLOWER = 1.05, 1.5
 """Largest accepted growth of the memory, and of the 99th percentile of the cycle time, after a third of the time."""
-LIMIT_S, START_S = 30.0, 120.0
-"""Times within which a node has to end and to start [s]."""
+START_S = 120.0
+"""Time within which a node has to start [s]."""
 STRATEGIES = ('lv', 'hc', 'optimal')
 GAP_S, ANSWER_S, PUNCTUAL = 1.3, 0.05, 0.999
 ASK_EVERY = 10
 """Number of periods between two calls of the service."""
-
-
-@contextmanager
-def isolated_graph() -> Iterator[None]:
-    """Join a ROS graph of its own within the context, with the processes that are started there."""
-    with (
-        tempfile.TemporaryDirectory(prefix='foc_ros_graph_') as logs,
-        reserve_domain() as domain,
-        set_environment(private_environment(domain, Path(logs))),
-    ):
-        yield
 
 
 class Player:
@@ -254,35 +241,15 @@ class Player:
         return int(self.health['hand_pose refused'].split(' of ')[1])
 
 
-@dataclass
-class Ended:
-    """How a node ended: exit code and output."""
-
-    code: int | None = None
-    errors: str = ''
-
-    @property
-    def is_clean(self) -> bool:
-        """Whether it ended without an error."""
-        return self.code == 0 and 'Traceback' not in self.errors
-
-
 @contextmanager
-def run_node(parameters: Mapping[str, object]) -> Iterator[tuple[int, Ended]]:
-    """Start a node with parameters, and stop it; yield its process id, and how it will have ended."""
+def run_node(parameters: Mapping[str, object]) -> Iterator[NodeProcess]:
+    """Start a node with parameters, and stop it."""
     options = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
-    command, ended = [sys.executable, '-m', 'foc_ros.ros.main', '--ros-args', *options], Ended()
-    with tempfile.TemporaryFile('w+') as log, subprocess.Popen(command, stdout=log, stderr=log, text=True) as process:
-        try:
-            yield process.pid, ended
-        finally:
-            process.terminate()
-            try:
-                ended.code = process.wait(LIMIT_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-            log.seek(0)
-            ended.errors = log.read()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        NodeProcess(os.environ, Path(folder) / 'node.txt', '--ros-args', *options) as node,
+    ):
+        yield node
 
 
 def measure_process(pid: int) -> dict[str, float]:
@@ -349,7 +316,7 @@ def measure_case(case: Case, strategy: str, seconds: float, *, is_faulty: bool =
     names = 'predictions', 'predict_too_late', 'predict_over_budget'
     with (
         Player(case.rows, case.goals, asks=not is_faulty) as player,
-        run_node({'foc.strategy': strategy, **case.parameters}) as (pid, ended),
+        run_node({'foc.strategy': strategy, **case.parameters}) as node,
     ):
         play_until_predicted(player)
         while 'hand_pose refused' not in player.health:
@@ -359,9 +326,9 @@ def measure_case(case: Case, strategy: str, seconds: float, *, is_faulty: bool =
         player.forget()
         before = [player.count(name) for name in names]
         player.play(seconds / 3.0, is_faulty)
-        first = measure_process(pid) | {'slower': player.read_percentiles('cycle')[1]}
+        first = measure_process(node.pid) | {'slower': player.read_percentiles('cycle')[1]}
         player.play(2.0 * seconds / 3.0, is_faulty)
-        last = measure_process(pid) | {'slower': player.read_percentiles('cycle')[1]}
+        last = measure_process(node.pid) | {'slower': player.read_percentiles('cycle')[1]}
         for _ in range(50):
             if player.count_received() >= sum(player.sent.values()):
                 break
@@ -380,7 +347,7 @@ def measure_case(case: Case, strategy: str, seconds: float, *, is_faulty: bool =
         'refused': sum(max(player.count(kind) - player.sent[name], 0) for name, kind in BAD_POSES.items()),
         'not finite': player.not_finite,
         **{name: last[name] / first[name] for name in first},
-        'errors': player.count('internal_errors') + (not ended.is_clean),
+        'errors': player.count('internal_errors') + (not node.is_clean),
     }
 
 
@@ -418,17 +385,17 @@ def measure_rates(seconds: float) -> dict[str, float]:
 
 def measure_intake(seconds: float) -> dict[str, float]:
     """Measure the CPU time of a node that hardly predicts, with a hand at 1 kHz and without."""
-    with Player(period_s=FAST_S) as player, run_node({'rate_hz': 0.1}) as (pid, _):
+    with Player(period_s=FAST_S) as player, run_node({'rate_hz': 0.1}) as node:
         while not player.is_connected:
             player.spin(0.1)
         player.play(2.0)
-        before, sent = read_cpu_s(pid), player.sent['good']
+        before, sent = read_cpu_s(node.pid), player.sent['good']
         player.play(seconds)
-        used, hertz = read_cpu_s(pid) - before, (player.sent['good'] - sent) / seconds
+        used, hertz = read_cpu_s(node.pid) - before, (player.sent['good'] - sent) / seconds
         player.spin(1.0)
-        before = read_cpu_s(pid)
+        before = read_cpu_s(node.pid)
         player.spin(seconds)
-        idle = read_cpu_s(pid) - before
+        idle = read_cpu_s(node.pid) - before
     cost = (used - idle) / seconds * 1e3 / hertz
     return {'poses published [Hz]': hertz, 'cost of 1 kHz [cores]': cost, 'without a hand [cores]': idle / seconds}
 

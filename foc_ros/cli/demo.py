@@ -7,10 +7,10 @@ It shows the predictions, and leaves a bag and a report.
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -35,7 +35,7 @@ from foc_ros.reporting.received import read_snapshot
 from foc_ros.reporting.report import describe_late, write_report
 from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
+from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, isolated_graph
 from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, STAMP
 
@@ -171,26 +171,24 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: thread
         if name in (*PAIR, DIAGNOSTICS):
             recorder.add_received(name, TYPESTORE.deserialize_cdr(raw, RECEIVED[topic]), now)
 
-    with tempfile.TemporaryDirectory(prefix='foc_ros_demo_') as logs, reserve_domain() as domain:
-        environment = private_environment(domain, Path(logs))
-        with set_environment(environment), NodeProcess(environment, Path(logs) / 'node.txt') as node, show_live() as show:
-            from foc_ros.ros.player import Player  # rclpy reads the environment when it is imported
+    with isolated_graph() as (domain, logs), NodeProcess(os.environ, logs / 'node.txt') as node, show_live() as show:
+        from foc_ros.ros.player import Player  # rclpy reads the environment when it is imported
 
-            def tick() -> bool:
-                node.check()
+        def tick() -> bool:
+            node.check()
+            now = time.monotonic()
+            if recorder.snapshots:
+                show(now, recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
+            return not stopped.is_set()
+
+        with Player(items, RECEIVED, receive, tick, domain) as player:
+            if not player.connect(lambda: recorder.is_scene_known):
+                return
+            began = time.monotonic()
+            for item in player.play():
                 now = time.monotonic()
-                if recorder.snapshots:
-                    show(now, recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
-                return not stopped.is_set()
-
-            with Player(items, RECEIVED, receive, tick, domain) as player:
-                if not player.connect(lambda: recorder.is_scene_known):
-                    return
-                began = time.monotonic()
-                for item in player.play():
-                    now = time.monotonic()
-                    recorder.add_sent(item, now)
-                    note(f'/{item.role}', topics.TYPES[item.role], item.raw, now)
+                recorder.add_sent(item, now)
+                note(f'/{item.role}', topics.TYPES[item.role], item.raw, now)
 
 
 @contextmanager
