@@ -123,16 +123,9 @@ function fillTable(frame) {
     [row.dataset.track, row.dataset.share] = [each.track, view.share];
     row.classList.toggle('faded', faded(each.track));
     row.addEventListener('click', () => { state.focus = state.focus === each.track ? null : each.track; drawLikelihoods(); show(state.frame); });
-    const letter = document.createElement('span');
-    [letter.className, letter.textContent] = ['letter', letterOf(view.slot)];
-    letter.style.borderColor = colourOf(view.slot);
+    const [letter, bar] = makeSigns(view.slot, view.share);
     cell(row, '').append(letter);
     cell(row, percent(view.share), 'number');
-    const bar = document.createElement('span');
-    bar.className = 'bar';
-    const filling = document.createElement('i');
-    filling.style.cssText = `width: ${100 * view.share}%; background: ${colourOf(view.slot)}`;
-    bar.append(filling);
     cell(row, '').append(bar);
     cell(row, data.labels[each.label], 'label');
     cell(row, view.ghost ? `${view.words}; ${view.ghost}` : view.words);
