@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which goals an operator prefers: how often each was reached, against how often its distance leads to expect.
+"""Which goals an operator prefers, and where reaches end: hands stop at the near side of objects, and tools have a length.
 
 By the rule of `core.goals`, a hand that begins to move at the distance d_i from goal i goes there with the probability q_i, which
 is proportional to d_i^(-2 beta) where no obstacle is in the way. With the number n_i of reaches that ended at the goal, and the
@@ -12,13 +12,15 @@ This is the mean of a rate of Poisson events relative to the expected one, whose
 the variance c.
 
 A goal is the one of before if it is the only one in an obstacle with the same id, or, where it is in none, at the same place.
+
+Reaches are expected to end at the mean displacement from their goal of the n earlier ones, times n / (n + `PRIOR_REACHES`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +41,8 @@ LEAST_M = 1e-3
 """Least distance of a goal with which its probability is computed [m]."""
 MOST_KNOWN = 64
 """Number of goals that are remembered, the last ones."""
+PRIOR_REACHES = 3
+"""Number of reaches as many as which it counts that they should end at their goals."""
 
 
 class KnownGoal(NamedTuple):
@@ -67,10 +71,16 @@ class Reach(Record):
 
 @dataclass(frozen=True, eq=False)
 class Habits(Record):
-    """The goals that were announced in earlier reaches, and the present reach, None at rest."""
+    """What earlier reaches say.
+
+    known: the goals that were announced; present: the reach that has not ended, None at rest; reaches: number of those that ended
+    at a goal; missed (2,): sum of the displacements of their ends from it [m].
+    """
 
     known: tuple[KnownGoal, ...] = ()
     present: Reach | None = None
+    reaches: int = 0
+    missed: Array = field(default_factory=lambda: np.zeros(2))
 
     def follow(self, hand: HandState, scene: Scene, beta: float) -> Habits:
         """Return the habits after the next state of the hand; beta: `likelihood.beta`."""
@@ -96,12 +106,16 @@ class Habits(Record):
         found = [self._find(*each) for each in zip(name_goals(goals, obstacles, objects), goals, strict=True)]
         return np.array([(1.0 + past_goals * each.reached) / (1.0 + past_goals * each.expected) for each in found])
 
+    def find_ends(self, goals: Array) -> Array:
+        """Return where reaches to goals (g, 2) [m] are expected to end, (g, 2) [m]."""
+        return goals + self.missed / (self.reaches + PRIOR_REACHES)
+
     def _end(self, reach: Reach, beta: float) -> Habits:
         """Return the habits after a reach, which counts if it ended at a goal."""
-        first = np.hypot(*(reach.goals - reach.onset).T)
         goal, left = find_goal_at_end(reach.position[None], reach.goals)
-        if left > MOST_LEFT * first[goal]:
+        if left > MOST_LEFT * math.dist(reach.onset, reach.goals[goal]):
             return self.interrupt()
+        first = np.hypot(*(self.find_ends(reach.goals) - reach.onset).T)
         expected = normalise_logs(-2.0 * beta * np.log(np.maximum(first, LEAST_M)))
         before = [self._find(*each) for each in zip(reach.names, reach.goals, strict=True)]
         now = [
@@ -109,7 +123,8 @@ class Habits(Record):
             for row, (name, place, each) in enumerate(zip(reach.names, reach.goals, before, strict=True))
         ]
         others = [each for each in self.known if all(each is not other for other in before)]
-        return Habits(tuple([*others, *now][-MOST_KNOWN:]))
+        missed = self.missed + reach.position - reach.goals[goal]
+        return Habits(tuple([*others, *now][-MOST_KNOWN:]), None, self.reaches + 1, missed)
 
     def _find(self, name: str | None, place: Array) -> KnownGoal:
         """Return what is known of a goal, nothing where it is new."""

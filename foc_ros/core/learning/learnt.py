@@ -97,5 +97,5 @@ class Learnt:
             self.pace if before.duration == now.duration else Pace(),
             Dispersion() if is_dispersed else self.dispersion,
             self.movements if is_recorded else Movements(),
-            self.habits,
+            self.habits if before.likelihood == now.likelihood else Habits(),
         )
