@@ -113,11 +113,12 @@ def test_a_movement_that_ends_far_from_all_goals_says_nothing_and_a_reset_forget
 
 
 def test_reaches_are_expected_to_end_where_the_earlier_ones_did() -> None:
-    session = Session([NEAR, (NEAR[0], NEAR[1] - 0.05)], **{'likelihood.past_goals': 0.01})
-    before = session.share(1)
+    goals = [NEAR, (NEAR[0], NEAR[1] - 0.05)]
+    session = Session(goals, **{'likelihood.past_goals': 1e-6})
     for _ in range(6):
         session.move((NEAR[0], NEAR[1] - 0.02))
         session.return_home()
     habits = session.pipeline.learnt.habits
     np.testing.assert_allclose(habits.find_ends(np.zeros((1, 2))), [[0.0, -0.02 * 6 / 9]], atol=1e-3)
-    assert session.share(1) > before  # its end is nearer now
+    ends = np.hypot(*habits.find_ends(np.array(goals)).T)
+    assert odds(session.share(1)) == pytest.approx((ends[0] / ends[1]) ** (2 * BETA), rel=0.01)
