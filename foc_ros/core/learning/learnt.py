@@ -86,8 +86,8 @@ class Learnt:
 
     def interrupt(self) -> Learnt:
         """Return what is known where the samples of the hand stop: the present movement ends there."""
-        parts = self.pace, self.dispersion, self.movements, self.habits
-        return Learnt(*(each.interrupt() for each in parts))
+        pace, dispersion = self.pace.interrupt(), self.dispersion.interrupt()
+        return Learnt(pace, dispersion, self.movements.interrupt(), self.habits.interrupt())
 
     def reconfigure(self, before: Config, now: Config) -> Learnt:
         """Return what still holds with other parameters: what depends on one that changed is forgotten."""
