@@ -25,7 +25,6 @@ from foc_ros.ros.intake import DROPPED, Intake
 from foc_ros.ros.messages.encode_guidance import Place
 from foc_ros.ros.transforms import Transforms, TransformTree
 
-
 LATEST_NS = 2**63 - 1
 """Stamp that is later than those of all messages [ns]."""
 
