@@ -46,6 +46,8 @@ SETTINGS = {
 }
 PICK = Config().with_values({'rate_hz': 4.0})
 GOAL_SETTINGS = {'defaults, past goals not counted': PICK.with_values({'likelihood.past_goals': 0.0}), 'defaults': PICK}
+OTHER_SCORES = {'area_under_curve_half_way': 2, 'calibration_error': 3, 'loss': 3}
+"""Scores of the share of another goal, with their digits."""
 POINTS = np.arange(1, 10)
 """Tenths of the way at which goals are asked for."""
 PUBLISHED = Baseline('published', partial(forecast_shares, published_shares), (None,))
@@ -84,11 +86,10 @@ def format_ways(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
     return tuple(f'{value:.{digits}f}' for value, digits in zip(values, (3, 1, 3, 2), strict=True))
 
 
-def format_goals(recordings: Sequence[ObservedRecording], left_out: Sequence[ObservedRecording], prior: float) -> tuple[str, ...]:
-    """Return scores of the goals at the nearest of `POINTS`, each of which counts the same, and of the share of another goal.
+def format_goals(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
+    """Return scores of the goals at the nearest of `POINTS`, each of which counts the same.
 
-    These are gain, the least gain, shares correct of all and half way, and calibration error; then area under the curve half way,
-    calibration error and loss. left_out: the recordings without the goal that was reached; prior: `likelihood.other_goal`.
+    These are gain, the least gain, shares correct of all and half way, and calibration error.
     """
     scores = score(recordings, GOAL)
     point = np.round(scores.progress * 10.0)
@@ -97,11 +98,15 @@ def format_goals(recordings: Sequence[ObservedRecording], left_out: Sequence[Obs
         np.array([values[point == each].mean() for each in POINTS])
         for values in (scores.log_likelihood + np.log(scores.possible), scores.correct)
     )
-    other = score_other_goal(recordings, left_out, prior)
-    assert other is not None
     values = gain.mean(), gain.min(), 100 * right.mean(), 100 * right[4], found['expected_calibration_error']
-    others = other['area_under_curve_half_way'], other['calibration_error'], other['loss']
-    return tuple(f'{value:.{digits}f}' for value, digits in zip((*values, *others), (3, 2, 1, 1, 3, 2, 3, 3), strict=True))
+    return tuple(f'{value:.{digits}f}' for value, digits in zip(values, (3, 2, 1, 1, 3), strict=True))
+
+
+def format_other(recordings: Sequence[ObservedRecording], left_out: Sequence[ObservedRecording], prior: float) -> tuple[str, ...]:
+    """Return area under the curve half way, calibration error and loss; arguments as in `score_other_goal`."""
+    found = score_other_goal(recordings, left_out, prior)
+    assert found is not None
+    return tuple(f'{found[name]:.{digits}f}' for name, digits in OTHER_SCORES.items())
 
 
 def format_positions(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
@@ -136,17 +141,19 @@ def main() -> None:
             ways.append((data, setting, *format_ways(recordings)))
             positions.append((data, setting, *format_positions(recordings)))
         items = {person: found[:: arguments.every] for person, found in find_persons(SHARED / PICKS).items()}
-        without = {person: [*leave_goals_out({each.name: each for each in found}).values()] for person, found in items.items()}
         for setting, config in GOAL_SETTINGS.items():
-            recordings, left_out = (observe_persons(each, config, f'{PICKS}: {setting}') for each in (items, without))
-            goals.append((setting, *format_goals(recordings, left_out, config.likelihood.other_goal)))
+            recordings = observe_persons(items, config, f'{PICKS}: {setting}')
+            goals.append((setting, *format_goals(recordings)))
+        without = {person: [*leave_goals_out({each.name: each for each in found}).values()] for person, found in items.items()}
+        left_out = observe_persons(without, config, f'{PICKS}: without the goals that were reached')
+        others = format_other(recordings, left_out, config.likelihood.other_goal)
     heads = 'gain [nat]', 'right [%]', 'ECE', 'worst tenth [nat]'
     measures = 'error [mm]', 'NLPD', 'NLPD, Singer', 'in 50 % region [%]', 'in 90 % region [%]'
     asked = 'gain [nat]', 'worst point [nat]', 'right [%]', 'right half way [%]', 'ECE'
-    other = 'other: area half way', 'other: calibration error', 'other: loss [nat]'
     tables = {
         'ways': (('data', 'parameters', *heads), ways),
-        'goals': (('parameters', *asked, *other), goals),
+        'goals': (('parameters', *asked), goals),
+        'other': (('area half way', 'calibration error', 'loss [nat]'), [others]),
         'positions': (('data', 'parameters', *measures), positions),
     }
     write_blocks({name: format_table(*table) for name, table in tables.items()}, PAGE)

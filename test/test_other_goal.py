@@ -9,7 +9,7 @@ import pytest
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import ParameterError
-from foc_ros.core.goals import compare_goals, compute_least_costs, find_common_time, find_other_share
+from foc_ros.core.goals import compare_goals, find_common_time, find_other_share
 from foc_ros.core.guidance.guide import weigh_candidates
 from foc_ros.core.hand.straight import compute_straight_effort
 from foc_ros.core.obstacle_table import make_obstacles
@@ -139,7 +139,7 @@ def test_ratios_between_candidates_to_one_goal_stay_as_they_are() -> None:
     pipeline.add_hand_sample(HandSample(0, np.zeros(2), 0.0, 'world'))
     prediction = pipeline.predict()
     assert prediction is not None
-    compared = compare_goals(prediction.candidates, compute_least_costs(hand, prediction.goal_positions, [0.9, 1.2]))
+    compared = compare_goals(prediction.candidates, hand, prediction.goal_positions, [0.9, 1.2])
     for goal in (0, 1):
         pairs = [pair for pair in zip(compared, prediction.candidates, strict=True) if pair[1].candidate.goal == goal]
         assert len(pairs) > 1

@@ -9,14 +9,9 @@ goals are therefore compared for the common time
     T = max(`LEAST_COMMON_S`, min_i min(T_i, `HALF_WAY` D_i / v)),
 
 with the distance D_i of the goal: the second term is what a hand half way of a minimum-jerk movement has left. M_i(T) is the
-least integral of squared jerk that brings the hand to rest at goal i at T. By the rule of the likelihoods, the goals have the
-probabilities
-
-    q_i ~ w_i M_i(T)^-beta,
-
-with the weights w_i of goals of the past (`learning.habits`), and the candidates to a goal share its q_i by their likelihoods.
-Obstacles decide on the way, and not on the goal: people want an object that stands behind others no less. The costs of all
-candidates to a goal get the factor M_i(T) / J_i, with the cost J_i of the best one, so that costs are comparable between goals.
+least integral of squared jerk that brings the hand to rest at goal i at T. The costs of all candidates to a goal get the factor
+M_i(T) / J_i, with the cost J_i of the best one. Ratios between candidates to one goal stay as they are. Obstacles decide on the
+way, and not on the goal (`likelihood.share_among_goals`): people want an object that stands behind others no less.
 
 The hand may also go to a goal that nobody announced. Without obstacles, M_i(T) = 720 / T^5 (|g_i - e|^2 + (v T)^2 / 60), with e =
 x + v T / 2 the goal that takes least effort. As a density of the goal, M^-2 is a bivariate t distribution about e,
@@ -40,9 +35,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .config import LikelihoodConfig
 from .hand.straight import compute_straight_effort
-from .likelihood import compute_likelihoods
 from .prediction import PredictedCandidate
 from .safety_preference import COST_FLOOR
 from .types import Array, HandState
@@ -57,30 +50,27 @@ BEYOND = 1.5
 """Farthest goal that nobody announced, relative to the farthest one that was."""
 
 
-def compute_least_costs(hand: HandState, goals: Array, durations_s: Sequence[float]) -> Array:
-    """Return M_i(T), (g,) > 0 [m^2/s^5], for a hand that is moved by jerk; goals (g, 2) [m], with the times to go [s]."""
-    common_s = np.full(len(goals), find_common_time(hand, goals, durations_s))
-    return compute_straight_effort(hand.mean.reshape(3, 2), goals, common_s) + COST_FLOOR
+def compare_goals(
+    candidates: Sequence[PredictedCandidate], hand: HandState, goals: Array, durations_s: Sequence[float]
+) -> list[PredictedCandidate]:
+    """Return candidates of a hand that is moved by jerk, with costs that are comparable between goals (g, 2) [m].
 
-
-def compare_goals(candidates: Sequence[PredictedCandidate], least: Array) -> list[PredictedCandidate]:
-    """Return candidates with costs that are comparable between goals; least (g,): M_i(T) [m^2/s^5]."""
+    durations_s: times to go [s].
+    """
     best: dict[int, float] = {}
     for each in candidates:
         if each.has_likelihood:
             goal = each.candidate.goal
             best[goal] = min(max(each.cost, COST_FLOOR), best.get(goal, np.inf))
+    if len(best) < 2:
+        return list(candidates)
+    common_s = np.full(len(goals), find_common_time(hand, goals, durations_s))
+    least = compute_straight_effort(hand.mean.reshape(3, 2), goals, common_s) + COST_FLOOR
     factors = {goal: float(least[goal]) / cost for goal, cost in best.items()}
     return [
         replace(each, cost=factors[each.candidate.goal] * max(each.cost, COST_FLOOR)) if each.candidate.goal in factors else each
         for each in candidates
     ]
-
-
-def weigh_goals(least: Array, config: LikelihoodConfig, weights: Array | None) -> Array:
-    """Return q_i, (g,), which sum to one; least (g,): M_i(T) [m^2/s^5]; weights (g,): w_i, one if None."""
-    shares = compute_likelihoods(least, config)
-    return shares if weights is None else shares * weights / float(shares @ weights)
 
 
 def find_common_time(hand: HandState, goals: Array, durations_s: Sequence[float]) -> float:

@@ -16,7 +16,7 @@ from .classes import Search, Turn, find_path_sides, search
 from .classes.library import GuessTiming, recall_demonstrations
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
 from .deadline import NEVER, Deadline
-from .goals import compare_goals, compute_least_costs, find_other_share, weigh_goals
+from .goals import compare_goals, find_other_share
 from .hand.duration import estimate_times_to_go, is_passing, limit_change
 from .height import HeightPredictor
 from .learning.dispersion import scale_covariance
@@ -93,12 +93,11 @@ def predict(
     held += [each for track in absent if (each := _hold_absent(track, scene.hand)) is not None]
     answered = estimate_unsolved(held, scene.in_the_way)
     others = estimate_unfollowed(found.unfollowed, answered, scene.durations_s)
-    compared, ends, shares = [*answered, *others], habits.find_ends(goals), None
-    if len(goals) > 1 and isinstance(make_plant_model(config.foc), TripleIntegratorModel):
-        least = compute_least_costs(scene.hand, ends, scene.durations_s)
-        shares = weigh_goals(least, config.likelihood, habits.weigh(goals, obstacles, objects, config.likelihood.past_goals))
-        compared = compare_goals(compared, least)
-    all_ranked = rank_candidates(compared, config.likelihood, scene.near, scene.hand, goals, planning_spread, shares)
+    compared, ends = [*answered, *others], habits.find_ends(goals)
+    if isinstance(make_plant_model(config.foc), TripleIntegratorModel):
+        compared = compare_goals(compared, scene.hand, ends, scene.durations_s)
+    weights = habits.weigh(goals, obstacles, objects, config.likelihood.past_goals)
+    all_ranked = rank_candidates(compared, config.likelihood, scene.near, scene.hand, goals, planning_spread, weights)
     ranked, unknown = split_unknown(all_ranked, {each.label for each in others})
     pooled = pool_recordings(ranked, library, hand, scene.blocking, goals)
     rest = Rest(unknown)
