@@ -139,7 +139,8 @@ def share_among_goals(
     np.minimum.at(least, group, costs)
     of_goal = compute_likelihoods(least, config) if weights is None else compute_likelihoods(least, config) * weights[rows]
     shared: Array = shares * (of_goal / np.maximum(np.bincount(group, shares, len(rows)), np.finfo(float).tiny))[group]
-    return shared / shared.sum()
+    shared /= shared.sum()
+    return shared
 
 
 def compute_lookahead_share(time_s: float, config: LikelihoodConfig, planning_spread: float) -> float:
