@@ -4,11 +4,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections import Counter
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,67 +15,26 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from matplotlib import pyplot as plt
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.patches import Circle, Ellipse, Polygon
-from report_samples import START_NS, prediction, predictions, samples, scene, widen
+from matplotlib.patches import Circle, Ellipse
+from report_samples import START_NS, prediction, predictions, samples, widen
 
-from foc_ros.core.config import Config
-from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles import shapes
-from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
-from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
-from foc_ros.io.bags import BagReader
 from foc_ros.reporting.draw import (
-    CLASS_COLOURS,
     ELLIPSES_PER_CANDIDATE,
     GHOST_COLOUR,
-    draw_candidates,
     get_candidate_style,
-    make_stddev_ellipse,
-    save_figure,
 )
 from foc_ros.reporting.figures import make_moment_figure, make_scene_figure, plot_prediction, write_picture
-from foc_ros.reporting.views import build_hand_trajectory, build_snapshot, find_entered, list_unsolved
-from foc_ros.ros.intake import Intake
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot, list_unsolved
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
 ROOT = Path(__file__).resolve().parents[1]
-RECORDING = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
-WALL = shapes.Box((0.1, 0.0), (0.6, 0.02), 0.3, radius_stddev=0.01)
 PNG = b'\x89PNG\r\n\x1a\n'
 NOWHERE = np.zeros(2)
-
-
-def test_an_ellipse_is_the_level_set_of_the_covariance() -> None:
-    root = np.random.default_rng(0).normal(size=(2, 2))
-    covariance, centre = root @ root.T, np.array([0.3, -0.1])
-    ellipse = make_stddev_ellipse(centre, covariance)
-    edge = ellipse.get_patch_transform().transform(np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])) - centre
-    np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 1.0, rtol=1e-9)
-    ellipse = make_stddev_ellipse(NOWHERE, np.array([[0.0, 0.0], [0.0, -1e-18]]))
-    assert (ellipse.width, ellipse.height) == (0.0, 0.0)
-
-
-def luminance(colour: tuple[float, float, float]) -> float:
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
-    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
-
-
-def test_colours_show_on_white_and_differ_for_the_colour_blind() -> None:
-    """The colours differ as seen by a deuteranope and a protanope (Vienot, Brettel, Mollon 1999, linear RGB)."""
-    assert all(1.05 / (luminance(colour) + 0.05) > 1.5 for colour in (*CLASS_COLOURS, GHOST_COLOUR))
-    deuteranope = np.array([[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]])
-    protanope = np.array([[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]])
-    linear = np.array([to_rgb(colour) for colour in CLASS_COLOURS]) ** 2.2
-    for seen in (np.clip(linear @ matrix.T, 0.0, 1.0) ** (1 / 2.2) for matrix in (deuteranope, protanope)):
-        gaps = np.linalg.norm(seen[:, None] - seen[None], axis=2)[np.triu_indices(len(seen), 1)]
-        assert gaps.min() > 0.1
 
 
 def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dotted_and_says_its_eta() -> None:
@@ -129,25 +85,6 @@ def test_a_scene_holds_every_obstacle_goal_and_candidate() -> None:
         assert any(np.array_equal(line, points) for line in drawn)
 
 
-def test_every_path_begins_at_the_hand_also_that_of_an_answer_from_before() -> None:
-    """Every other prediction of the packaged recording has no time, so that answers from before are shown."""
-    intake, drawn, kept = Intake(Pipeline(Config().with_values({'rate_hz': 25.0, 'foc.steps': 20}))), 0, 0
-    with BagReader(RECORDING) as reader:
-        for item in islice(reader, 190):
-            intake.take(item.role, item.message)
-            if not intake.pipeline.is_due:
-                continue
-            made = intake.pipeline.predict(Deadline(1e-9 if drawn % 2 else None))
-            if made is None or intake.sample is None:
-                continue
-            kept, drawn = kept + any(each.age_s for each in made.candidates), drawn + 1
-            axes = Figure().subplots()
-            draw_candidates(axes, build_snapshot(made), {})
-            for line in axes.lines:
-                np.testing.assert_allclose(line.get_xydata()[0], intake.sample.position, atol=2e-3)
-    assert drawn > 10 and kept > 5
-
-
 def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it() -> None:
     made = prediction(START_NS, NOWHERE)  # its third candidate leads through `post`, the last one could not be solved
     axes = axes_of(made)
@@ -171,18 +108,6 @@ def test_goals_are_called_by_their_names() -> None:
     bowl = make_obstacles([made.goal_positions[0], [0.1, 0.2]], 0.02, ids=('bowl', 'plate'))
     written = [text.get_text() for text in axes_of(replace(made, obstacles=bowl)).texts]
     assert (written.count('bowl'), written.count('plate')) == (1, 2), 'an object that is a goal has its name once'
-
-
-def test_an_obstacle_that_is_passed_above_or_has_moved_away_makes_no_ghost() -> None:
-    made = build_snapshot(prediction(START_NS, NOWHERE))
-    through = made.candidates[2]
-    assert find_entered(made, through)[0] == 'post'
-    assert find_entered(replace(made, cleared=(False, True)), through)[0] == ''
-    away = replace(made.obstacles, velocity=np.array([[0.0, 0.0], [0.0, 0.3]]))
-    assert find_entered(replace(made, obstacles=away), through)[0] == ''
-    for place in (NOWHERE, through.solution.path[-1]):  # the hand is in it, or it is the goal
-        around = make_obstacles([place], 0.02, ids=('glove',))
-        assert find_entered(replace(made, obstacles=around), through)[0] == ''
 
 
 def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse_widens_the_axes() -> None:
@@ -261,28 +186,6 @@ def test_a_plot_survives_subplots_and_savefig(name: str, tmp_path: Path) -> None
     plt.close('all')
 
 
-def test_boxes_are_drawn_with_their_outlines_and_fit_into_the_picture() -> None:
-    obstacles, goals = shapes.collect_obstacles([WALL, shapes.Circle((0.2, 0.1), 0.02)]), scene()[1]
-    axes = make_scene_figure(Prediction(0, '', 0.0, (), None, obstacles=obstacles, goal_positions=goals)).axes[0]
-    box, ring = (patch.get_xy() for patch in axes.patches if isinstance(patch, Polygon))
-    np.testing.assert_allclose(box, trace_obstacle(obstacles, 0))
-    np.testing.assert_allclose(measure_offsets(ring, obstacles)[1][:, 0], 0.01)
-    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    assert left < ring[:, 0].min() and ring[:, 0].max() < right and bottom < ring[:, 1].min() and ring[:, 1].max() < top
-
-
-@pytest.mark.parametrize(('suffix', 'start'), [('png', PNG), ('pdf', b'%PDF'), ('svg', b'<?xml')])
-def test_equal_input_gives_equal_pictures_in_every_format(tmp_path: Path, suffix: str, start: bytes) -> None:
-    for name in ('one', 'two'):
-        write_picture(tmp_path / f'{name}.{suffix}', prediction(START_NS, NOWHERE))
-    content = (tmp_path / f'one.{suffix}').read_bytes()
-    assert content.startswith(start)
-    if suffix == 'png':
-        save_figure(make_scene_figure(build_snapshot(prediction(START_NS, NOWHERE))), tmp_path / 'two.png')
-    if suffix != 'svg':  # whose marks have random names
-        assert content == (tmp_path / f'two.{suffix}').read_bytes()
-
-
 def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_start(tmp_path: Path) -> None:
     made = prediction(START_NS, NOWHERE)
     lost = [each for each in made.candidates if not each.is_solved]
@@ -302,19 +205,3 @@ def test_a_file_that_cannot_be_written(tmp_path: Path, name: str, expected: str)
     with pytest.raises(InputError, match=expected):
         write_picture(tmp_path / name, prediction(START_NS, NOWHERE))
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(('missing', 'module'), [('matplotlib', 'draw'), ('jinja2', 'report')])
-def test_a_missing_library_is_reported_in_one_line_with_how_to_install_it(missing: str, module: str) -> None:
-    program = f"""
-import sys
-sys.modules['{missing}'] = None
-from foc_ros.core.errors import FocError
-try:
-    import foc_ros.reporting.{module}
-except FocError as error:
-    print(error)
-"""
-    printed = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, check=True, cwd=ROOT).stdout
-    assert 'pip install' in printed
-    assert printed.count('\n') == 1

@@ -15,22 +15,19 @@ from foc_ros.analysis.csv_recordings import EPOCH_NS
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
 from foc_ros.analysis.evaluation.observations import (
     ObservedRecording,
-    interpolate_path,
-    interpolate_steps,
     observe,
     observe_in_order,
 )
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
-from foc_ros.analysis.evaluation.truth import TIMES_S, RecordedPath, find_open_gaps, find_rows_ahead
+from foc_ros.analysis.evaluation.truth import RecordedPath, find_rows_ahead
 from foc_ros.analysis.recordings import BagRecording, convert_tables, find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core import tracks
-from foc_ros.core.classes.rows import find_direction, find_rows, locate_rows
+from foc_ros.core.classes.rows import find_rows
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.shapes import Box, Circle, Shape, collect_obstacles
-from foc_ros.core.solution import LEFT, RIGHT, Solution, Status
+from foc_ros.core.solution import LEFT
 from foc_ros.io.bags import TYPESTORE, BagReader, Item
 from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -54,17 +51,6 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def observe_one(data: Path, config: Config) -> ObservedRecording:
     return observe(find_recordings(data)['one'], config)
-
-
-@pytest.mark.parametrize('config', [PLAIN, AHEAD])
-def test_the_published_likelihoods_follow_from_the_observations(data: Path, config: Config) -> None:
-    recording = observe_one(data, config)
-    assert len(recording.observations) >= 4
-    for each in recording.observations:
-        np.testing.assert_allclose(
-            power_rule_shares(each, config.likelihood)[each.candidates.has_likelihood],
-            each.candidates.likelihood[each.candidates.has_likelihood],
-        )
 
 
 def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_them(data: Path) -> None:
@@ -118,17 +104,6 @@ def test_no_goal_is_true_for_predictions_with_other_goals(data: Path) -> None:
     assert all(each.truth.goal == (0 if len(each.goals) == 2 else None) for each in recording.observations)
 
 
-@pytest.mark.parametrize('dt', [0.011, 0.13])
-def test_predictions_are_compared_at_the_exact_time(dt: float) -> None:
-    steps = dt * np.arange(8)
-    states = np.column_stack([steps**3, steps**2, 3.0 * steps**2, 2.0 * steps, 6.0 * steps, np.full(8, 2.0)])
-    plan = Solution(Status.SOLVED, '', dt, states, np.tile(np.eye(6), (8, 1, 1)), np.zeros((7, 2)), 0.0, {}, 0.0, 0.0, 0.9)
-    expected = np.minimum(TIMES_S, steps[-1])
-    np.testing.assert_allclose(interpolate_path(plan), np.column_stack([expected**3, expected**2]), atol=1e-12)
-    np.testing.assert_allclose(interpolate_steps(2.0 * steps, dt), 2.0 * expected)
-    assert interpolate_steps(np.zeros((8, 2, 2)), dt).shape == (len(TIMES_S), 2, 2)
-
-
 @pytest.mark.parametrize('duration_s', [0.4, 1.0])
 def test_in_order_a_recording_has_its_own_hand_and_obstacles_only(tmp_path: Path, duration_s: float) -> None:
     """Markers stay until they are deleted; those of another recording are not in the scene of this one."""
@@ -158,62 +133,11 @@ def test_obstacles_that_overlap_along_the_direction_stand_in_one_row() -> None:
     assert find_rows(make_obstacles(), DIRECTION, *ends).shape == (0,)
 
 
-def test_a_row_stands_at_the_middle_of_its_obstacles() -> None:
-    np.testing.assert_allclose(locate_rows(np.array([3.0, 1.0, 1.2]), np.array([1, 0, 0])), [1.1, 3.0])
-
-
 def test_a_row_is_passed_for_good_only_when_the_path_does_not_come_back() -> None:
     place = np.array([0.0, 1.5, 0.5, 2.5])
     assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place).tolist() == [True, True, False]
     assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place[1:]).tolist() == [True, True, False]
     assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place[3:]).tolist() == [False, False, False]
-
-
-def test_the_direction_is_towards_the_mean_of_the_goals() -> None:
-    np.testing.assert_allclose(find_direction(np.array([1.0, 1.0]), np.array([[2.0, 3.0], [0.0, 3.0]])), [0.0, 1.0])
-    np.testing.assert_allclose(find_direction(np.zeros(2), np.zeros((1, 2))), [1.0, 0.0])
-
-
-START, END = np.zeros(2), np.array([[2.0, 0.0]])
-WALLS = [Box((1.0, side * 0.5), (3.0, 0.1), name=f'wall{side}') for side in (-1, 1)]
-
-
-def find_ways(*shapes: Shape, hand_radius: float = 0.0) -> tuple[list[int], list[list[list[int]]]]:
-    """Return the row of each obstacle, and the sides of the open gaps of each row."""
-    obstacles = collect_obstacles(shapes)
-    row = find_rows(obstacles, DIRECTION, START, END)
-    return row.tolist(), [sides.tolist() for sides in find_open_gaps(obstacles, row, DIRECTION, hand_radius)]
-
-
-def test_a_wall_is_in_no_row_and_a_box_across_the_way_is() -> None:
-    across = Box((0.5, 0.0), (0.05, 0.4)), Box((1.5, 0.1), (0.4, 0.05), np.pi / 2)
-    assert find_ways(*across, *WALLS)[0] == [0, 1, -1, -1]
-    assert find_ways(Box((1.0, 0.3), (1.0, 0.05)), Box((2.5, 0.0), (0.1, 2.0)))[0] == [0, -1]  # beside a part; behind the goal
-    assert find_ways(Circle((1.0, 30.0), radius=20.0))[0] == [0]
-
-
-def test_boxes_overlap_along_the_direction_with_their_extents() -> None:
-    long, turned = Box((1.0, 0.3), (1.0, 0.1)), Box((1.0, 0.3), (1.0, 0.1), np.pi / 2)
-    assert find_ways(long, Box((1.4, -0.3), (0.1, 0.1)))[0] == [0, 0]
-    assert find_ways(turned, Box((1.4, -0.3), (0.1, 0.1)))[0] == [0, 1]
-    assert find_ways(Box((1.0, 0.3), (0.2, 0.1), radius=0.3), Box((1.4, -0.3), (0.1, 0.1)))[0] == [0, 0]
-
-
-def test_gaps_too_narrow_for_the_hand_are_closed() -> None:
-    right, left = Box((1.0, -0.2), (0.1, 0.3)), Box((1.0, 0.2), (0.1, 0.2))  # gaps of 0.10, 0.15 and 0.15 m
-    through = [[RIGHT, RIGHT], [LEFT, RIGHT], [LEFT, LEFT]]
-    for hand_radius, is_open in ((0.0, [True] * 3), (0.06, [False, True, True]), (0.08, [False] * 3)):
-        row, (gaps,) = find_ways(right, left, *WALLS, hand_radius=hand_radius)
-        assert row == [0, 0, -1, -1]
-        assert gaps == [[*sides, 0, 0] for sides, each in zip(through, is_open, strict=True) if each]
-    assert find_ways(right, left, hand_radius=0.08)[1] == [[through[0], through[2]]]
-
-
-def test_the_gap_between_turned_boxes_is_their_distance() -> None:
-    for gap, count in ((0.1, 3), (0.099, 2)):
-        first = Box((1.0, 0.0), (0.2, 0.2), np.pi / 4)
-        second = Box((1.0, 0.1 * np.sqrt(2.0) + gap + 0.02 + 0.05), (0.3, 0.1), radius=0.02)
-        assert len(find_ways(first, second, hand_radius=0.04999)[1][0]) == count
 
 
 TRUE_GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])
@@ -229,10 +153,6 @@ TRUE_GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])
 )
 def test_the_goal_reached_is_the_last_one_that_the_path_came_near(path, expected) -> None:
     assert find_reached_goal(np.array(path), TRUE_GOALS) == expected
-
-
-def test_a_single_goal_is_reached_wherever_the_path_is_nearest() -> None:
-    assert find_reached_goal(np.array([(0.0, 0.0), (0.5, 0.0), (0.4, 0.0)]), TRUE_GOALS[:1]) == (0, 1)
 
 
 def test_progress_is_the_share_of_distance_and_noise_at_rest_adds_none() -> None:

@@ -24,7 +24,7 @@ from foc_ros.analysis.replay import Replay  # noqa: E402
 from foc_ros.core.classes.library import is_same_recording  # noqa: E402
 from foc_ros.core.config import Config, flatten, replace_values  # noqa: E402
 from foc_ros.io.bags import BagReader  # noqa: E402
-from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs  # noqa: E402
+from foc_ros.ros.messages.encode_prediction import encode_outputs  # noqa: E402
 
 SECONDS = 0.3
 LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
@@ -86,18 +86,3 @@ def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, cas
     live, learnt = (each.learnt.movements.finish().learnt for each in (bench.node.pipeline, replay.pipeline))
     assert (len(live) > 0) == (case == 'learning')
     assert all(is_same_recording(*each) for each in zip(live, learnt, strict=True))
-
-
-def test_the_case_with_heights_has_heights(tmp_path: Path) -> None:
-    """The low obstacle, number 0, is cleared, and the height and its variance change along the path."""
-    bag = write_bag(tmp_path / 'reach', messages_in_space())
-    for is_named, config in ((False, CONFIG), (True, replace_values(CONFIG, {'predict_height': False}))):
-        with BagReader(bag) as reader:
-            made = [step.prediction for step in Replay(config).steps(reader) if step.prediction is not None]
-        assert made
-        for each in made:
-            answer = encode_outputs(each, 'xy', TYPES)
-            label = answer['likelihoods'].layout.dim[0].label
-            assert ('+0' in label or '-0' in label) == is_named
-            rows = np.frombuffer(bytes(answer['prediction'].data), CLOUD_ROW)
-            assert is_named or (np.ptp(rows['z']) > 0.1 and np.ptp(rows['vz']) > 0.1 and np.ptp(rows['zz']) > 1e-5)

@@ -9,9 +9,8 @@ import pytest
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import ParameterError
-from foc_ros.core.goals import compare_goals, find_common_time, find_other_share
+from foc_ros.core.goals import find_common_time
 from foc_ros.core.guidance.guide import weigh_candidates
-from foc_ros.core.hand.straight import compute_straight_effort
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
@@ -64,22 +63,6 @@ def test_the_share_grows_if_the_hand_goes_between_the_goals_and_falls_if_it_goes
     assert max(each.other for each in met) < 1.5 * PRIOR
 
 
-def test_the_share_does_not_depend_on_the_length_unit_but_for_the_spread_of_end_points() -> None:
-    state = np.array([0.1, 0.01, 0.5, 0.1, 0.0, 0.0])
-    goals, times_s = np.array([LEFT_GOAL, RIGHT_GOAL]), [0.6, 0.7]
-
-    def ask(scale: float) -> float:
-        hand = HandState(0, scale * state, np.zeros((6, 6)), onset_ns=0, onset_position=np.zeros(2))
-        return find_other_share(hand, scale * goals, times_s, 0.1, scale * 0.03)
-
-    assert ask(3.0) == pytest.approx(ask(1.0), rel=1e-9)
-
-
-def test_a_hand_at_a_goal_where_it_began_has_a_share_too() -> None:
-    hand = HandState(0, np.zeros(6), np.zeros((6, 6)), onset_ns=0, onset_position=np.zeros(2))
-    assert 0.0 < find_other_share(hand, np.zeros((1, 2)), [0.3], 0.1, 0.0) < 1.0
-
-
 def test_guidance_yields_to_another_goal() -> None:
     alone, beside = weigh_candidates(np.array([0.5])), weigh_candidates(np.array([0.5]), 0.0, 0.5)
     assert alone == pytest.approx([1.0]) and beside == pytest.approx([0.5])
@@ -125,25 +108,3 @@ def test_goals_are_compared_by_the_effort_to_be_there_at_a_common_time() -> None
     # free paths from rest: the efforts at a common time are as the squares of the distances, and beta is 2
     by_goal = shares_of_goals(prediction)
     assert by_goal[0] / by_goal[1] == pytest.approx((0.17 / 0.04) ** 2, rel=0.05)
-
-
-def test_ratios_between_candidates_to_one_goal_stay_as_they_are() -> None:
-    obstacles = make_obstacles([[0.15, 0.01]], 0.03)
-    hand = HandState(0, np.zeros(6), 1e-6 * np.eye(6))
-    pipeline = Pipeline(Config().with_values({'foc.steps': 20}), is_timed=False)
-    pipeline.set_obstacles('cloud', obstacles, None, 'world')
-    pipeline.set_goals(np.array([[0.3, 0.0], [0.4, 0.1]]), 'world')
-    pipeline.add_hand_sample(HandSample(0, np.zeros(2), 0.0, 'world'))
-    prediction = pipeline.predict()
-    assert prediction is not None
-    compared = compare_goals(prediction.candidates, hand, prediction.goal_positions, [0.9, 1.2])
-    for goal in (0, 1):
-        pairs = [pair for pair in zip(compared, prediction.candidates, strict=True) if pair[1].candidate.goal == goal]
-        assert len(pairs) > 1
-        factors = [after.cost / before.cost for after, before in pairs]
-        assert factors == pytest.approx([factors[0]] * len(factors))
-
-
-def test_the_effort_of_a_straight_reach_is_that_of_minimum_jerk() -> None:
-    effort = compute_straight_effort(np.zeros((3, 2)), np.array([[0.3, 0.4]]), np.array([2.0]))
-    assert effort == pytest.approx([720.0 * 0.25 / 32.0])

@@ -136,13 +136,6 @@ def test_a_long_recording_is_thinned_out_and_its_page_stays_below_a_megabyte_and
     assert len(json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))['predictions']) == 4_500
 
 
-def test_ghosts_say_why(tmp_path: Path) -> None:
-    report(tmp_path)
-    data = page_data_of(tmp_path)
-    ghosts = {data['labels'][each['ghost']] for frame in data['frames'] for each in (*frame['candidates'], *frame['unsolved'])}
-    assert {'', 'leads through obstacle post', 'eta unreachable'} <= ghosts
-
-
 def end_with(snapshot: Prediction, *statuses: Status) -> Prediction:
     """Return a snapshot whose likeliest candidates have ended otherwise, and without one that is lost."""
     shown = snapshot.candidates_with_likelihood

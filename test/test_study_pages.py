@@ -9,24 +9,19 @@ from datetime import datetime
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.reporting import evaluation_report, simulation_report
-from foc_ros.reporting import page as pages
-from foc_ros.reporting.draw import open_figure
-from foc_ros.reporting.evaluation_report import _draw_reliability
 from foc_ros.reporting.example import FEW, draw_example, warn_of_few
 from foc_ros.reporting.fit_report import write_report
-from foc_ros.reporting.page import Section, explain_tables, make_chart, write_page
+from foc_ros.reporting.page import Section, write_page
 
 RECORDING = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 ANSWER = {
@@ -66,26 +61,6 @@ def test_a_fit_without_parameters_has_tables_only_and_a_folder_that_cannot_be_wr
         write_report(tmp_path / 'file', 'x', ANSWER)
 
 
-BINS = [
-    {'count': 3, 'confidence': 0.45, 'right': 0.5, 'interval': [0.2, 0.7]},
-    {'count': 0, 'confidence': None, 'right': None, 'interval': None},
-    {'count': 40, 'confidence': 0.85, 'right': 0.9, 'interval': [0.8, 0.95]},
-]
-
-
-def test_a_reliability_plot_has_error_bars_and_counts() -> None:
-    names = PUBLISHED, REFITTED, BOLTZMANN
-    with open_figure(3.0, 3.0) as figure:
-        axes = figure.subplots()
-        _draw_reliability(axes, 'way', {name: {'reliability': BINS} for name in names})
-    assert len(axes.containers) == len(names)
-    for container in axes.containers:
-        _, _, (bars,) = container.lines
-        ends = [segment[:, 1].tolist() for segment in bars.get_segments()]
-        assert ends == [pytest.approx([0.2, 0.7]), pytest.approx([0.8, 0.95])]
-    assert [text.get_text() for text in axes.texts] == ['3', '40']
-
-
 class Recorded:
     """The packaged recording, as one of a folder of recordings, or one that cannot be read."""
 
@@ -120,12 +95,6 @@ def test_a_page_names_what_made_it_and_no_path(tmp_path: Path) -> None:
     assert 'All parameters have their defaults.' in (tmp_path / 'x.html').read_text(encoding='utf-8')
 
 
-def test_words_are_explained_once_where_they_stand_first() -> None:
-    tables = (('First', ('', 'gain [nat]'), [('foc', '1')]), ('Second', ('', 'gain [nat]', 'ECE'), [('foc', '1', '0')]))
-    sections = explain_tables(tables, {'nat': 'a unit', 'ECE': 'an error', 'Brier': 'not here'})
-    assert [(each.heading, each.notes) for each in sections] == [('First', ['nat: a unit']), ('Second', ['ECE: an error'])]
-
-
 def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
     assert warn_of_few(FEW, 'recordings') == [] and warn_of_few(FEW - 1, 'recordings')[0].startswith(
         f'Few recordings ({FEW - 1})'
@@ -134,20 +103,6 @@ def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
     page = (tmp_path / 'fit.html').read_text(encoding='utf-8')
     assert '<p class="warning">Few recordings (2)' in page and 'held out: scored on' in page
     assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
-
-
-def test_legends_are_below_the_axes_and_cover_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def draw(axes: Any) -> None:
-        for number in range(6):
-            axes.plot([0, 1], [0, number], label=f'baseline number {number}')
-        axes.plot([0, 1], [1, 0], label='baseline number 0')
-
-    monkeypatch.setattr(pages, 'make_picture', lambda figure, _: figure)
-    figure: Any = make_chart((6.4, 4.6), '', draw)
-    figure.draw_without_rendering()
-    (legend,) = figure.legends
-    assert len(legend.get_texts()) == 6
-    assert not legend.get_window_extent().overlaps(figure.axes[0].get_tightbbox())
 
 
 def test_results_are_told_in_plain_words_first() -> None:

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import pytest
 import yaml
 
 from foc_ros.io import topics
@@ -62,29 +61,3 @@ def test_foxglove_shows_topics_of_the_node_in_its_panels() -> None:
     assert TYPES[scene['publish']['poseTopic']] == 'geometry_msgs/msg/PoseStamped'
     for i, line in enumerate(layout['configById']['Plot!likelihoods']['paths']):
         assert line['value'] == f'/foc/likelihoods.data[{i * len(LIKELIHOOD_COLUMNS)}]'
-
-
-def test_the_drawing_has_every_display_in_the_view_of_the_configuration() -> None:
-    """`scripts/viewers.py` draws the messages of the node: lines, ellipses and labels, and the range that the view shows."""
-    pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-    from message_helpers import message_types, pose_array, pose_stamped
-    from prediction_samples import three_ways
-    from test_readme_picture import script
-
-    from foc_ros.ros.messages.encode_prediction import encode_outputs
-
-    bags = message_types('rosbags')
-    messages = {f'/foc/{name}': message for name, message in encode_outputs(three_ways(), 'xy', bags).items()}
-    messages |= {'/hand_pose': pose_stamped(bags, (0.0, 0.0, 0.0)), '/goals': pose_array(bags, [(0.3, 0.0, 0.0)])}
-    configuration = {'Visualization Manager': rviz(), 'Window Geometry': {'Width': 1200, 'Height': 900}}
-    (axes,) = script('viewers').draw(configuration, messages).axes
-    assert axes.get_xlim() == pytest.approx((0.15 - 0.4, 0.15 + 0.4))
-    assert axes.get_ylim() == pytest.approx((-0.3, 0.3))
-    markers = messages['/foc/markers'].markers
-    labels = [each.text for each in markers if each.type == 9]
-    assert [each.get_text() for each in axes.texts if each.get_text()] == labels
-    arms = 2 + 1
-    assert len(axes.texts) == len(labels) + arms, 'two axes of the hand, one arrow of the goal'
-    assert len(axes.patches) == sum(each.type == 3 for each in markers)
-    (dots,) = axes.collections
-    assert len(dots.get_offsets()) == messages['/foc/prediction'].width

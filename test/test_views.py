@@ -8,58 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from report_samples import START_NS, prediction, predictions, samples, scene, widen
+from report_samples import START_NS, prediction, predictions, samples, scene
 
 from foc_ros.core.prediction import Prediction
-from foc_ros.core.solution import LEFT, RIGHT, Status, describe_class
-from foc_ros.core.types import HandSample
+from foc_ros.core.solution import LEFT, RIGHT, Status
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.received import read_snapshot
 from foc_ros.reporting.tracks import Slots, build_candidate_tracks
 from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory, build_snapshot, is_late, parse_label
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
-from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
+from foc_ros.ros.messages.ranking import compute_cost_ratios
 from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
 NOWHERE = np.zeros(2)
-
-
-def test_a_snapshot_holds_the_numbers_of_its_prediction_and_names_classes_in_words() -> None:
-    made = replace(prediction(START_NS, NOWHERE, 0.6), most_likely='goal0:-1')
-    snapshot = build_snapshot(made)
-    labels = ['goal0:-1', 'goal0:+1', 'goal1:+1-post', 'goal1:+1+post']
-    assert [each.label for each in snapshot] == labels, 'the one called most likely comes first'
-    best, known = snapshot.candidates[0], made.candidates[1]
-    np.testing.assert_array_equal(best.solution.path, known.solution.path)
-    np.testing.assert_allclose(best.covariance[-1], np.diag([0.011**2, 0.005**2]))
-    assert (snapshot.stamp_ns, best.cost, best.description) == (START_NS, known.cost, 'goal0: right of 1')
-    words = [describe_candidate(snapshot.candidates[row], 1) for row in (0, 3)]
-    assert words == ['right of 1', 'left of 1, left of post'] and describe_class(()) == 'direct'
-
-
-def test_the_motor_noise_and_the_unknown_share_are_kept() -> None:
-    made = replace(prediction(START_NS, NOWHERE), unknown=0.25)
-    assert build_snapshot(made).candidates[0].solution.motor_covariance is None
-    snapshot = build_snapshot(widen(made))
-    assert snapshot.unknown == 0.25
-    np.testing.assert_array_equal(snapshot.candidates[0].covariance, 3.0 * snapshot.candidates[0].motor_covariance)
-
-
-def test_a_trajectory_leaves_late_samples_out() -> None:
-    made = samples()
-    hand = build_hand_trajectory([*made[:20], made[5], made[19], *made[20:]])
-    assert list(hand.stamps_ns) == [sample.stamp_ns for sample in made]
-    np.testing.assert_array_equal(hand.positions, [sample.position for sample in made])
-
-
-def test_velocity() -> None:
-    stamps = START_NS + np.cumsum(np.random.default_rng(1).integers(5, 80, 40)) * 1_000_000
-    positions = np.outer((stamps - START_NS) * 1e-9, [0.3, -0.2])
-    np.testing.assert_allclose(HandTrajectory(stamps, positions).velocity, np.tile([0.3, -0.2], (40, 1)), atol=1e-9)
-    np.testing.assert_array_equal(build_hand_trajectory([HandSample(5, np.ones(2))]).velocity, np.zeros((1, 2)))
-    empty = build_hand_trajectory([])
-    assert (empty.velocity.shape, empty.find_movements(0.05)) == ((0, 2), [])
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none() -> None:
