@@ -85,46 +85,23 @@ def load_reference(file: Path, build: Callable[[Any], Problem]) -> list[tuple[di
     return [(case, build(case), reach_helpers.case_guess(case)) for case in json.loads(file.read_text(encoding='utf-8'))]
 
 
-def format_agreement() -> str:
-    """Return the table of relative differences of effort."""
-    head = ['case', 'obstacles', 'c', 'η', '`fixed` / quadprog − 1', '`optimal` / IPOPT − 1', 'η achieved']
+def format_agreement(*, has_shapes: bool) -> str:
+    """Return the table of relative differences of effort, or of cost and effort among boxes, capsules, hulls and circles."""
+    peer, columns = ('IPOPT', ['obstacles']) if has_shapes else ('quadprog', ['obstacles', 'c'])
+    head = ['case', *columns, 'η', f'`fixed` / {peer} − 1', '`optimal` / IPOPT − 1', 'η achieved']
+    file, build = (SHAPES, reach_helpers.shapes_problem) if has_shapes else (CASES, reach_helpers.case_problem)
     rows = []
-    for number, (case, problem, guess) in enumerate(load_reference(CASES, reach_helpers.case_problem)):
-        qp, least = case['converged_qp'], case['min_effort_at_eta']
-        fixed = reach_helpers.solved(problem, guess, 'fixed', tau=qp['tau'], lam=qp['lam'])
-        optimal = reach_helpers.solved(problem, guess, 'optimal')
-        rows.append(
-            [
-                str(number),
-                str(len(problem.obstacles)),
-                f'{problem.noise[0]:g}',
-                f'{least["eta"]:g}',
-                f'{fixed.effort / qp["effort"] - 1:.0e}',
-                f'{optimal.effort / least["ipopt_effort"] - 1:.1e}',
-                f'{optimal.eta:.5f}',
-            ]
-        )
-    return format_table(head, rows)
-
-
-def format_shapes() -> str:
-    """Return the table of relative differences of cost and effort in scenes of boxes, capsules, hulls and circles."""
-    head = ['case', 'obstacles', 'η', '`fixed` / IPOPT − 1', '`optimal` / IPOPT − 1', 'η achieved']
-    rows = []
-    for number, (case, problem, guess) in enumerate(load_reference(SHAPES, reach_helpers.shapes_problem)):
-        reference, least = case['fixed'], case['min_effort_at_eta']
+    for number, (case, problem, guess) in enumerate(load_reference(file, build)):
+        reference, least = case['fixed' if has_shapes else 'converged_qp'], case['min_effort_at_eta']
         fixed = reach_helpers.solved(problem, guess, 'fixed', tau=reference['tau'], lam=reference['lam'])
         optimal = reach_helpers.solved(problem, guess, 'optimal')
-        rows.append(
-            [
-                str(number),
-                ', '.join(each['kind'] for each in case['obstacles']),
-                f'{least["eta"]:g}',
-                f'{(fixed.costs["effort"] + fixed.costs["lambda_variance"]) / reference["cost"] - 1:.0e}',
-                f'{optimal.effort / least["ipopt_effort"] - 1:.1e}',
-                f'{optimal.eta:.5f}',
-            ]
-        )
+        ratio = fixed.effort / reference['effort']
+        cells = [str(len(problem.obstacles)), f'{problem.noise[0]:g}']
+        if has_shapes:
+            ratio = (fixed.costs['effort'] + fixed.costs['lambda_variance']) / reference['cost']
+            cells = [', '.join(each['kind'] for each in case['obstacles'])]
+        differences = f'{ratio - 1:.0e}', f'{optimal.effort / least["ipopt_effort"] - 1:.1e}', f'{optimal.eta:.5f}'
+        rows.append([str(number), *cells, f'{least["eta"]:g}', *differences])
     return format_table(head, rows)
 
 
@@ -331,7 +308,7 @@ def _compute_efforts(scene: Scene, strategy: str, etas: Array) -> Array:
 
 def measure_reference() -> dict[str, str]:
     """Return the comparison with independent solvers."""
-    return {'reference': format_agreement(), 'shapes': format_shapes()}
+    return {'reference': format_agreement(has_shapes=False), 'shapes': format_agreement(has_shapes=True)}
 
 
 def measure_clear() -> dict[str, str]:

@@ -15,49 +15,25 @@ Times = dict[str, list[float]]
 
 
 @dataclass(frozen=True)
-class Timing:
-    """What was timed, in words, and the median of its times [ms]."""
-
-    description: str
-    median_ms: float
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """Whether the answers of both sides differ by no more than the tolerance, and the difference in words."""
-
-    holds: bool
-    description: str
-
-
-@dataclass(frozen=True)
 class Result:
-    """Measurement of one row; details are further numbers by name."""
+    """Measurement of one row.
 
-    ours: Timing
-    peer: Timing
-    agreement: Agreement
+    ours, peer: what was timed, in words; ours_ms, peer_ms: the medians of its times [ms]; agree: whether the answers differ by no
+    more than the tolerance; agreement: the difference in words; details: further numbers by name.
+    """
+
+    ours: str
+    ours_ms: float
+    peer: str
+    peer_ms: float
+    agree: bool
+    agreement: str
     repetitions: int
     details: dict[str, Any] = field(default_factory=dict)
 
-    @property
-    def ratio(self) -> float:
-        """How many times as long the peer takes."""
-        return self.peer.median_ms / self.ours.median_ms
-
     def to_json(self) -> dict[str, Any]:
-        """Return the result as a JSON object."""
-        return {
-            'ours': self.ours.description,
-            'peer': self.peer.description,
-            'ours_ms': self.ours.median_ms,
-            'peer_ms': self.peer.median_ms,
-            'ratio': self.ratio,
-            'agree': self.agreement.holds,
-            'agreement': self.agreement.description,
-            'repetitions': self.repetitions,
-            'details': self.details,
-        }
+        """Return the result as a JSON object; ratio: how many times as long the peer takes."""
+        return {**vars(self), 'ratio': self.peer_ms / self.ours_ms}
 
 
 def time_call(task: Callable[[], object]) -> float:

@@ -18,7 +18,7 @@ from unittest.mock import patch
 
 import numpy as np
 import scenes
-from measurement import Agreement, Result, Timing, compute_median_ms, time_call, time_in_turn
+from measurement import Result, compute_median_ms, time_call, time_in_turn
 
 from foc_ros.analysis.replay import replay
 from foc_ros.core import predict as predictor
@@ -55,11 +55,11 @@ def measure_cold(build: Callable[[], Obstacles], name: str, is_quick: bool) -> R
     times = time_in_turn({'ours': solve, 'peer': lambda: peer.solve(arguments)}, repetitions)
     ours, control = solve(), peer.read_control(problem, peer.solve(arguments))
     return Result(
-        Timing('one class, from a guess', compute_median_ms(times['ours'])),
-        Timing(
-            f'{name}, from the least effort through the middle of the guess, built beforehand', compute_median_ms(times['peer'])
-        ),
-        _compare([ours], [control if peer.converged else None]),
+        'one class, from a guess',
+        compute_median_ms(times['ours']),
+        f'{name}, from the least effort through the middle of the guess, built beforehand',
+        compute_median_ms(times['peer']),
+        *_compare([ours], [control if peer.converged else None]),
         repetitions,
         {'qps_ours': ours.qp_solves, 'iterations_peer': peer.iterations},
     )
@@ -91,9 +91,11 @@ def measure_warm(build: Callable[[], Obstacles], name: str, is_quick: bool) -> R
         found.append(ours)
         theirs.append(control if peer.converged else None)
     return Result(
-        Timing('one class, from the solution of 10 ms ago', compute_median_ms(times)),
-        Timing(f'{name}, from its solution of 10 ms ago, built beforehand', compute_median_ms(peer_times)),
-        _compare(found, theirs),
+        'one class, from the solution of 10 ms ago',
+        compute_median_ms(times),
+        f'{name}, from its solution of 10 ms ago, built beforehand',
+        compute_median_ms(peer_times),
+        *_compare(found, theirs),
         ticks,
         {'slowest_ms': 1e3 * max(times), 'slowest_peer_ms': 1e3 * max(peer_times)},
     )
@@ -108,14 +110,14 @@ def _follow_plan(solution: Solution, generator: np.random.Generator) -> Array:
     return state
 
 
-def _compare(ours: Sequence[Solution], theirs: Sequence[Array | None], tolerance: float = TOLERANCE) -> Agreement:
-    """Compare efforts with those of controls, None where a peer did not converge."""
+def _compare(ours: Sequence[Solution], theirs: Sequence[Array | None], tolerance: float = TOLERANCE) -> tuple[bool, str]:
+    """Return whether efforts agree with those of controls, None where a peer did not converge, and the difference in words."""
     pairs = zip(ours, theirs, strict=True)
     excess = [mine.effort / float((control**2).sum()) - 1 for mine, control in pairs if control is not None]
     solved = sum(each.status is Status.SOLVED for each in ours)
     converged = sum(each is not None for each in theirs)
     worst = max(excess, key=abs, default=np.inf)
-    return Agreement(
+    return (
         solved == converged == len(ours) and abs(worst) < tolerance,
         f'solved {solved} of {len(ours)}, the peer {converged}; '
         f'efforts differ by up to {100 * worst:+.3f} % ({100 * tolerance:g} % allowed)',
@@ -181,9 +183,11 @@ def measure_tick(build: Callable[[], scenes.Reach], scene: str, tolerance: float
     ticks = [sequence.tick() for _ in range(repetitions)]
     control = peer.read_control(problem, peer.solve(arguments))
     return Result(
-        Timing(f'a warm tick, {scene}', compute_median_ms(ticks)),
-        Timing('IPOPT, its most likely class alone, from our solution of 10 ms ago', compute_median_ms(times['peer'])),
-        _compare([best.solution], [control if peer.converged else None], tolerance),
+        f'a warm tick, {scene}',
+        compute_median_ms(ticks),
+        'IPOPT, its most likely class alone, from our solution of 10 ms ago',
+        compute_median_ms(times['peer']),
+        *_compare([best.solution], [control if peer.converged else None], tolerance),
         repetitions,
         {'solved': sequence.describe(), 'slowest_ms': 1e3 * max(ticks), 'first_tick_ms': 1e3 * cold},
     )
@@ -199,9 +203,12 @@ def measure_change(values: Mapping[str, object], far: int, change: str, is_quick
     likelihoods = [{c.label: c.likelihood for c in each.predictions[-1].candidates} for each in sequences.values()]
     differences = [abs(likelihoods[0].get(name, 0.0) - likelihoods[1].get(name, 0.0)) for name in set().union(*likelihoods)]
     return Result(
-        Timing('a warm tick, 4 classes, 8 circles, N = 50', compute_median_ms(times['ours'])),
-        Timing(f'the same {change}', compute_median_ms(times['peer'])),
-        Agreement(max(differences) < 0.02, f'likelihoods differ by up to {max(differences):.1e} (0.02 allowed)'),
+        'a warm tick, 4 classes, 8 circles, N = 50',
+        compute_median_ms(times['ours']),
+        f'the same {change}',
+        compute_median_ms(times['peer']),
+        max(differences) < 0.02,
+        f'likelihoods differ by up to {max(differences):.1e} (0.02 allowed)',
         repetitions,
         {'solved': sequences['peer'].describe()},
     )
@@ -215,9 +222,12 @@ def measure_replay(is_quick: bool) -> Result:
     stamps = [each.stamp_ns for each in answers[0]]
     first, last = ([[c.likelihood for c in each.candidates] for each in answer] for answer in (answers[0], answers[-1]))
     return Result(
-        Timing(f'replay of the packaged recording, {len(stamps)} predictions', compute_median_ms(times)),
-        Timing('the time it took to record', (stamps[-1] - stamps[0]) / NANOSECONDS * 1e3),
-        Agreement(first == last, 'the first and the last replay are the same to the last bit'),
+        f'replay of the packaged recording, {len(stamps)} predictions',
+        compute_median_ms(times),
+        'the time it took to record',
+        (stamps[-1] - stamps[0]) / NANOSECONDS * 1e3,
+        first == last,
+        'the first and the last replay are the same to the last bit',
         len(times),
         {'ms_per_prediction': compute_median_ms(times) / len(stamps)},
     )

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The benchmark. Each row is a ratio of medians within one run.
 
-    python benchmarks/run.py [--json | --markdown] [--report FILE] [--only NAME ...] [--quick]
+    python benchmarks/run.py [--json | --markdown] [--only NAME ...] [--quick]
 
 Each row is measured in a process of its own, with one thread for BLAS and OpenMP. Ours and the peer take turns on the identical
 problem, and their answers are compared.
@@ -15,15 +15,12 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
 from rows import ROWS
 
-from foc_ros.reporting import page
+from foc_ros.io.terminal import show_table
 
 HERE = Path(__file__).resolve().parent
 ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'), '1')
@@ -59,22 +56,6 @@ def format_cells(row: Row) -> tuple[str, ...]:
     return row['name'], *numbers, 'yes' if row['agree'] else 'no'
 
 
-def build_table(rows: Iterable[Row]) -> Table:
-    """Return the rows as a table for a terminal."""
-    table = Table(*HEADINGS, title='One thread; ratios of medians, measured in turn')
-    for row in rows:
-        table.add_row(*format_cells(row))
-    return table
-
-
-def build_page(rows: list[Row]) -> str:
-    """Return the rows as an HTML page, with a description of what each compares."""
-    compared = [(row['name'], f'{row["ours"]}, against: {row["peer"]}', row['agreement']) for row in rows if 'error' not in row]
-    body = page.render_table(HEADINGS, map(format_cells, rows))
-    body += page.render_table(('row', 'of what', 'agreement'), compared, 'What is compared')
-    return page.render_page('Benchmark', body, [f'{row["name"]}: {row["error"]}' for row in rows if 'error' in row])
-
-
 def build_markdown(rows: list[Row]) -> str:
     """Return the rows as a table for doc/speed.md, followed by a description of what each compares."""
     lines = ['| ' + ' | '.join(HEADINGS) + ' |', '|---' * len(HEADINGS) + '|']
@@ -100,7 +81,6 @@ def main() -> int:
     output.add_argument('--in-this-process', action='store_true', help=argparse.SUPPRESS)
     parser.add_argument('--only', nargs='+', choices=ROWS, default=list(ROWS), metavar='NAME', help=', '.join(ROWS))
     parser.add_argument('--quick', action='store_true', help='few repetitions, for a first look')
-    parser.add_argument('--report', type=Path, metavar='FILE', help='write an HTML page')
     chosen = parser.parse_args()
     if chosen.in_this_process:
         for name in chosen.only:
@@ -110,14 +90,12 @@ def main() -> int:
     for name in chosen.only:
         rows.append(run_row(name, chosen.quick))
         print(*format_cells(rows[-1]), sep='  ', file=sys.stderr, flush=True)  # a whole run takes minutes
-    if chosen.report is not None:
-        chosen.report.write_text(build_page(rows), encoding='utf-8')
     if chosen.json:
         print(json.dumps(rows, indent=1))
     elif chosen.markdown:
         print(build_markdown(rows))
     else:
-        Console().print(build_table(rows))
+        show_table(HEADINGS, map(format_cells, rows), 'One thread; ratios of medians, measured in turn')
     return int(any('error' in row for row in rows))
 
 

@@ -13,30 +13,31 @@ left out.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import count, product
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from page import ROOT, SHARED, format_table
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.interpolate import CubicSpline
 
 from foc_ros.analysis.recordings import Recording, find_recordings
+from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
-from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.scene import Scene
-from foc_ros.core.types import NANOSECONDS, Array, HandSample
+from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.io.topics import HAND
-from foc_ros.ros.intake import Intake
+from foc_ros.ros.messages.decode_poses import decode_stamp
+from foc_ros.ros.messages.encode_inputs import encode_hand_pose
+from foc_ros.ros.messages.types import RosbagsTypes
 
 DEMO = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
 RATE_HZ = 100.0
 STRATEGIES, NOISE_M = ('lv', 'hc', 'optimal'), (0.0, 0.0005, 0.001)
-FRAME = 'world'
+TYPES = RosbagsTypes(TYPESTORE)
 CHANGE = 0.1
 """Change of a likelihood from one tick to the next that counts."""
 SHORT_TICKS, RETURN_S, LONGEST_S = 10, 0.2, 0.05
@@ -84,66 +85,27 @@ HEAD = (
 )
 
 
-class ClassTracker:
-    """Gives each homotopy class a number that stays when its label changes; remembers classes for SHORT_TICKS ticks."""
-
-    def __init__(self) -> None:
-        self._numbers = count()
-        self._known: dict[int, tuple[int, PredictedCandidate]] = {}
-        self._tick = 0
-
-    def identify(self, candidates: Iterable[PredictedCandidate]) -> tuple[dict[int, PredictedCandidate], int]:
-        """Return the candidates of the next tick by number, and how many of them were absent for a short time."""
-        self._tick += 1
-        self._known = {number: each for number, each in self._known.items() if self._tick - each[0] <= SHORT_TICKS}
-        rest: list[PredictedCandidate] = list(candidates)
-        found: dict[int, PredictedCandidate] = {}
-        for is_same in (_has_same_label, _is_renamed):
-            pairs = [
-                (-tick, compute_sideways_move(before, each), -before.likelihood, number, place)
-                for number, (tick, before) in self._known.items()
-                for place, each in enumerate(rest)
-                if number not in found and is_same(before, each)
-            ]
-            for *_, number, place in sorted(pairs):  # of several names the one whose path is nearest
-                if number not in found and rest[place] not in found.values():
-                    found[number] = rest[place]
-            rest = [each for each in rest if each not in found.values()]
-        absences = sum(self._known[number][0] < self._tick - 1 for number in found)
-        found |= {next(self._numbers): each for each in rest}
-        self._known |= {number: (self._tick, each) for number, each in found.items()}
-        return found, absences
-
-
-def _has_same_label(one: PredictedCandidate, other: PredictedCandidate) -> bool:
-    return one.label == other.label
-
-
-def _is_renamed(one: PredictedCandidate, other: PredictedCandidate) -> bool:
-    """Tell whether the label of one class is that of the other with obstacles left out."""
-    sides, others = set(one.candidate.sides), set(other.candidate.sides)
-    return one.candidate.goal == other.candidate.goal and (sides <= others or others <= sides)
-
-
 def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> None:
-    """Add the ticks of one recording to a total. A change of goals or obstacles begins anew."""
+    """Add the ticks of one recording to a total, with classes by their numbers. A change of goals or obstacles begins anew."""
     before: Prediction | None = None
-    tracker = ClassTracker()
     last: dict[int, PredictedCandidate] = {}
+    seen: dict[int, int] = {}  # the last tick of each class
     leads: list[tuple[float, int]] = []
-    for now in predictions:
-        if before is None or not _is_same_scene(before, now):
-            tracker, last, leads = ClassTracker(), {}, []
-        found, absences = tracker.identify(now.candidates_with_likelihood)
-        if last or leads:
+    for tick, now in enumerate(predictions):
+        is_first = before is None or not _is_same_scene(before, now)
+        if is_first:
+            last, seen, leads = {}, {}, []
+        found = {each.way: each for each in now.candidates_with_likelihood}
+        if before is not None and not is_first:
             total.ticks += 1
-            total.seconds += now.t - before.t if before is not None else 0.0
-            total.absences += absences
+            total.seconds += now.t - before.t
+            total.absences += sum(1 < tick - seen.get(way, -SHORT_TICKS) <= SHORT_TICKS for way in found)
             total.changed += _compute_largest_change(last, found) > CHANGE
             total.sideways += [compute_sideways_move(last[each], found[each]) for each in last.keys() & found.keys()]
-        leads += [(now.t, number) for number, each in found.items() if each.label == now.most_likely]
+        leads += [(now.t, way) for way, each in found.items() if each.label == now.most_likely]
         total.returns += _has_returned(leads)
         before, last = now, found
+        seen |= dict.fromkeys(found, tick)
 
 
 def _is_same_scene(before: Prediction, now: Prediction) -> bool:
@@ -168,17 +130,10 @@ def _has_returned(leads: list[tuple[float, int]]) -> bool:
     return any(number == leader and end - time <= RETURN_S + 1e-9 for time, number in leads[:-2])
 
 
-def refine_path(candidate: PredictedCandidate) -> Array:
-    """Return the mean path of a candidate as points (m, 2) [m] on the cubic through its steps."""
-    times = candidate.times
-    fine = np.linspace(times[0], times[-1], FINE * (len(times) - 1) + 1)
-    points: Array = CubicHermiteSpline(times, candidate.mean[:, :2], candidate.mean[:, 2:4])(fine)
-    return points
-
-
 def compute_sideways_move(before: PredictedCandidate, now: PredictedCandidate) -> float:
     """Return the largest distance [m] of a mean path from that of the tick before, perpendicular to the latter."""
-    return float(measure_distances(now.mean[:, :2], refine_path(before)).max())
+    line = before.position_at(np.linspace(0.0, before.times[-1], FINE * (len(before.times) - 1) + 1))
+    return float(measure_distances(now.solution.path, line).max())
 
 
 def measure_distances(points: Array, line: Array) -> Array:
@@ -191,66 +146,29 @@ def measure_distances(points: Array, line: Array) -> Array:
     return distances
 
 
-@dataclass(frozen=True, eq=False)
-class Track:
-    """The hand of a recording: stamps_ns (m,), positions (m, 2) [m], and the scene at each sample, None before there is one."""
-
-    name: str
-    stamps_ns: NDArray[np.int64]
-    positions: Array
-    scenes: tuple[Scene | None, ...]
-
-    def resample(self, rate_hz: float) -> Track:
-        """Return the track at a constant rate, by cubic interpolation."""
-        stamps = np.arange(self.stamps_ns[0], self.stamps_ns[-1] + 1, round(NANOSECONDS / rate_hz))
-        last = np.searchsorted(self.stamps_ns, stamps, side='right') - 1
-        positions = CubicSpline(self.stamps_ns - stamps[0], self.positions)(stamps - stamps[0])
-        return Track(self.name, stamps, positions, tuple(self.scenes[each] for each in last))
-
-    def add_noise(self, stddev: float, seed: int) -> Track:
-        """Return the track with Gaussian noise [m] on every position."""
-        noise = np.random.default_rng(seed).normal(0.0, stddev, self.positions.shape)
-        return replace(self, positions=self.positions + noise)
-
-
-def read_track(recording: Recording) -> Track:
-    """Return the hand of a recording and its scenes; a sample with the stamp of the one before is left out."""
-    pipeline = Pipeline(Config())
-    intake = Intake(pipeline)
-    stamps: list[int] = []
-    positions: list[Array] = []
-    scenes: list[Scene | None] = []
-    for item in recording.items():
-        status = intake.take(item.role, item.message)
-        if item.role == HAND and status is not None and status.is_taken:
-            assert intake.sample is not None
-            stamps.append(intake.sample.stamp_ns)
-            positions.append(intake.sample.position)
-            scenes.append(pipeline.scene if pipeline.not_ready_reason() is None else None)
-    return Track(recording.name, np.array(stamps), np.array(positions), tuple(scenes))
-
-
-def predict_track(track: Track, config: Config) -> Iterator[Prediction]:
-    """Yield the predictions that the pipeline makes from a track."""
-    pipeline, scene = Pipeline(config), None
-    for stamp_ns, position, now in zip(track.stamps_ns.tolist(), track.positions, track.scenes, strict=True):
-        if now is not None and now is not scene:
-            assert now.goals is not None
-            pipeline.set_obstacles('recorded', now.obstacles(stamp_ns), None, FRAME)
-            pipeline.set_goals(now.goals, FRAME)
-            scene = now
-        pipeline.add_hand_sample(HandSample(stamp_ns, position, 0.0, FRAME))
-        prediction = pipeline.predict() if scene is not None and pipeline.is_due else None
-        if prediction is not None:
-            yield prediction
+def resample(recording: Recording, stddev: float, seed: int) -> list[Item]:
+    """Return the messages of a recording with the hand at RATE_HZ, by cubic interpolation, with Gaussian noise [m] in x and y."""
+    items = list(recording.items())
+    poses = {decode_stamp(each.message.header): each for each in items if each.role == HAND}
+    known, first = np.array(sorted(poses)), poses[min(poses)]
+    points = [poses[stamp_ns].message.pose.position for stamp_ns in known.tolist()]
+    stamps = np.arange(known[0], known[-1] + 1, round(NANOSECONDS / RATE_HZ))
+    positions = CubicSpline(known - known[0], [(each.x, each.y, each.z) for each in points])(stamps - known[0])
+    positions[:, :2] += np.random.default_rng(seed).normal(0.0, stddev, (len(stamps), 2))
+    frame_id, late_ns = first.message.header.frame_id, first.log_ns - int(known[0])
+    hand = [
+        Item(HAND, first.topic, stamp_ns + late_ns, encode_hand_pose(TYPES, stamp_ns, frame_id, position), b'')
+        for stamp_ns, position in zip(stamps.tolist(), positions.tolist(), strict=True)
+    ]
+    return sorted([*(each for each in items if each.role != HAND), *hand], key=lambda each: each.log_ns)
 
 
 def measure(recordings: Sequence[Recording], strategy: str, noise: float, config: Config) -> Steadiness:
     """Predict recordings with noise [m] on the measured positions; each has its own seed."""
     total, config = Steadiness(), config.with_values({'foc.strategy': strategy})
     for seed, recording in enumerate(recordings):
-        track = read_track(recording).resample(RATE_HZ).add_noise(noise, seed)
-        measure_steadiness(predict_track(track, config), total)
+        steps = Replay(config).steps(resample(recording, noise, seed))
+        measure_steadiness((each.prediction for each in steps if each.prediction is not None), total)
     return total
 
 

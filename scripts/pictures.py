@@ -33,9 +33,11 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.analysis.solve import solve_to_values
 from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, LikelihoodConfig
+from foc_ros.core.interpolation import interpolate_position
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.plant.covariance import stack_noise
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import BagReader
 from foc_ros.io.scene_file import load_scene
@@ -44,7 +46,7 @@ from foc_ros.reporting.draw import compute_bounds, draw_scene, get_class_style, 
 from foc_ros.reporting.figures import make_moment_figure, make_scene_figure
 from foc_ros.reporting.report import ReportCollector
 from foc_ros.reporting.tracks import CandidateTracks, build_candidate_tracks
-from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory, build_snapshot
 from foc_ros.ros.parameters import dump_parameter_file
 
 sys.path.append(str(ROOT / 'test'))
@@ -75,7 +77,7 @@ CURVE = np.arange(0.0, 27.0, 0.1)
 
 
 @cache
-def replayed() -> tuple[HandTrajectory, list[Snapshot]]:
+def replayed() -> tuple[HandTrajectory, list[Prediction]]:
     """Return the hand's trajectory and all predictions of the recording."""
     collected = ReportCollector()
     with BagReader(RECORDING) as reader:
@@ -84,7 +86,7 @@ def replayed() -> tuple[HandTrajectory, list[Snapshot]]:
     return build_hand_trajectory(collected.samples), collected.snapshots
 
 
-def scene(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
+def scene(hand: HandTrajectory, snapshots: list[Prediction]) -> Figure:
     """Return the picture of the chosen prediction."""
     span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
@@ -93,22 +95,22 @@ def scene(hand: HandTrajectory, snapshots: list[Snapshot]) -> Figure:
 
 
 def pictures(
-    hand: HandTrajectory, snapshots: list[Snapshot], chosen: tuple[int, ...] = SHOWN_MOVEMENTS
+    hand: HandTrajectory, snapshots: list[Prediction], chosen: tuple[int, ...] = SHOWN_MOVEMENTS
 ) -> Iterator[tuple[Figure, int]]:
     """Yield the pictures, each with its duration [ms]."""
     spans = hand.find_movements(Config().estimator.onset_speed)
-    goals = np.unique(np.concatenate([each.goals for each in snapshots]), axis=0)
+    goals = np.unique(np.concatenate([each.goal_positions for each in snapshots]), axis=0)
     bounds = compute_bounds(snapshots[0].obstacles, goals, (), hand.positions)
     for start_ns, end_ns in (spans[number] for number in chosen):
-        during = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.candidates]
-        tracks = build_candidate_tracks([replace(each, candidates=select_likely(each)) for each in during])
+        during = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.candidates_with_likelihood]
+        tracks = build_candidate_tracks([select_likely(each) for each in during])
         rows = np.unique(np.linspace(0, len(tracks.snapshots) - 1, PICTURES).round().astype(int))
         for row in rows:
             snapshot = tracks.snapshots[row]
             with open_figure(8.4, 4.5) as figure:
                 scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
                 scene.grid(False)
-                draw_scene(scene, snapshot.obstacles, snapshot.goals, bounds)
+                draw_scene(scene, snapshot.obstacles, snapshot.goal_positions, bounds)
                 draw.draw_candidates(scene, snapshot, tracks.slots_at(row))
                 draw.draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
                 draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)
@@ -128,14 +130,15 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
         known = np.flatnonzero(np.isfinite(values))
         row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]
         draw.draw_tag(axes, (times[first + row], values[row]), draw.get_letter(tracks.slots[track]), colour)
-    unknown = np.array([each.unknown_share + each.other_share for each in tracks.snapshots])
+    unknown = np.array([each.unknown + each.other for each in tracks.snapshots])
     look = {'facecolor': 'none', 'edgecolor': '0.6', 'hatch': '////', 'linewidth': 0.0, 'step': 'mid'}
     axes.fill_between(times, 1.0 - unknown, 1.0, **look)
 
 
-def select_likely(snapshot: Snapshot) -> tuple[CandidateView, ...]:
-    """Return the candidates that the animation shows."""
-    return tuple(each for each in snapshot.candidates if each.likelihood >= SHOWN)
+def select_likely(snapshot: Prediction) -> Prediction:
+    """Return a snapshot with the candidates that the animation shows; ghosts without a likelihood stay."""
+    shown = tuple(each for each in snapshot if each.likelihood >= SHOWN or not each.has_likelihood)
+    return replace(snapshot, candidates=shown)
 
 
 def make_signs() -> list[tuple[Any, str]]:
@@ -339,17 +342,6 @@ def follow_with_rows_at_steps() -> Array:
     return np.array(found)
 
 
-def interpolate(solution: foc_ros.Solution, times: Array) -> Array:
-    """Return the mean (k, 2) [m] at times in steps: the cubic through positions and velocities at the steps."""
-    step = np.minimum(times.astype(int), STEPS - 1)
-    a = (times - step)[:, None]
-    position, velocity = solution.mean[:, :2], solution.mean[:, 2:4] * solution.dt
-    weights = 2 * a**3 - 3 * a**2 + 1, a**3 - 2 * a**2 + a, 3 * a**2 - 2 * a**3, a**3 - a**2
-    parts = position[step], velocity[step], position[step + 1], velocity[step + 1]
-    mean: Array = sum(weight * part for weight, part in zip(weights, parts, strict=True))
-    return mean
-
-
 def contacts() -> Figure:
     """Return the picture: the mean against the circle, a close-up of the contact, effort over eta."""
     solution = reach([TOUCHED], TOUCHED_ETA, 'lv', c=TOUCHED_NOISE)
@@ -357,8 +349,8 @@ def contacts() -> Figure:
     centre, radius = np.array(TOUCHED.centre), TOUCHED.radius
     kept = float(np.sqrt(radius**2 + TOUCHED.radius_stddev**2 + solution.tau))
     blue, orange = get_class_style(0)[0], get_class_style(1)[0]
-    fine = interpolate(solution, np.linspace(0.0, STEPS, 20 * STEPS + 1))
-    contact = interpolate(solution, np.array([time]))[0]
+    fine = interpolate_position(solution.mean, solution.dt, solution.dt * np.linspace(0.0, STEPS, 20 * STEPS + 1))
+    contact = interpolate_position(solution.mean, solution.dt, np.array(solution.dt * time))
     normal = (contact - centre) / np.linalg.norm(contact - centre)
     with open_figure(10.0, 3.4) as figure:
         overview, close_up, curves = figure.subplots(1, 3, width_ratios=(1.35, 1.0, 1.15))

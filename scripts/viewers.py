@@ -26,14 +26,12 @@ from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import TYPESTORE, BagReader
-from foc_ros.ros.messages.encode_prediction import encode_outputs
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
 
 RECORDING, SHOWN_S = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', 6.24
 """The recording, and the time of it that is drawn [s]: early in a movement, with several likely paths."""
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
-FORMATS = dict(enumerate(('i1', 'u1', '<i2', '<u2', '<i4', '<u4', '<f4', '<f8'), start=1))
-"""Types of the columns of a PointCloud2, by their numbers."""
 VIOLET_HUE = 0.8
 """Hue of the least intensity; that of the largest one is 0, red."""
 POINTS_PER_INCH, PIXELS_PER_INCH = 72, 100
@@ -49,7 +47,7 @@ def find_messages() -> dict[str, Any]:
                 first_ns = step.sample.stamp_ns
             if step.prediction is None or first_ns is None or step.prediction.stamp_ns < first_ns + SHOWN_S * NANOSECONDS:
                 continue
-            outputs = encode_outputs(step.prediction, step.prediction.obstacles, config.plane, RosbagsTypes(TYPESTORE))
+            outputs = encode_outputs(step.prediction, config.plane, RosbagsTypes(TYPESTORE))
             return sent | {f'/foc/{name}': message for name, message in outputs.items()}
     raise SystemExit(f'{RECORDING.name} has no prediction after {SHOWN_S} s')
 
@@ -74,10 +72,7 @@ def draw_markers(axes: Any, array: Any, points_per_m: float) -> None:
 
 def draw_cloud(axes: Any, display: dict[str, Any], cloud: Any, points_per_m: float) -> None:
     """Draw the rows of a table as dots in the colours of a rainbow."""
-    names, offsets = [field.name for field in cloud.fields], [field.offset for field in cloud.fields]
-    formats = [FORMATS[field.datatype] for field in cloud.fields]
-    layout = np.dtype({'names': names, 'formats': formats, 'offsets': offsets, 'itemsize': cloud.point_step})
-    rows, low, high = np.frombuffer(cloud.data, layout), display['Min Intensity'], display['Max Intensity']
+    rows, low, high = np.frombuffer(cloud.data, CLOUD_ROW), display['Min Intensity'], display['Max Intensity']
     hues = VIOLET_HUE * (1.0 - np.clip((rows[display['Channel Name']] - low) / (high - low), 0.0, 1.0))
     colours = hsv_to_rgb(np.column_stack([hues, np.ones(len(rows)), np.ones(len(rows))]))
     axes.scatter(rows['x'], rows['y'], s=(display['Size (m)'] * points_per_m) ** 2, c=colours, linewidths=0, zorder=3)

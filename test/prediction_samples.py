@@ -51,7 +51,7 @@ def outcome(
 def prediction(*outcomes: PredictedCandidate, stamp_ns: int = 5_000_000_000, **changes: Any) -> Prediction:
     """Return a prediction of these outcomes, the first being the most likely."""
     solved = [each.candidate.label for each in outcomes if each.has_likelihood]
-    values = {'frame_id': 'world', 'height': 0.2, 'most_likely': solved[0] if solved else None}
+    values = {'frame_id': 'world', 'height': 0.2, 'most_likely': solved[0] if solved else None, 'obstacles': OBSTACLES}
     return Prediction(stamp_ns=stamp_ns, candidates=outcomes, **(values | changes))
 
 

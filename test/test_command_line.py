@@ -30,23 +30,24 @@ def start(program: str, *arguments: str, **options: Any) -> subprocess.Completed
 def test_the_program_exits_with_the_code_of_its_command() -> None:
     program = 'import runpy, sys; sys.argv[0] = "foc_ros"; runpy.run_module("foc_ros", run_name="__main__", alter_sys=True)'
     result = start(program, 'fly')
-    assert (result.returncode, result.stdout) == (2, '') and result.stderr.startswith('foc_ros: there is no command fly; demo, ')
+    assert (result.returncode, result.stdout) == (2, '') and result.stderr.startswith('foc_ros fly: Unknown command "fly".')
 
 
 @pytest.mark.parametrize(
     ('arguments', 'line'),
     [
-        ([], 'foc_ros: no command is given; demo, '),
-        (['fly'], 'foc_ros: there is no command fly; demo, '),
-        (['evalute', 'bags'], 'foc_ros: there is no command evalute (did you mean evaluate?)'),
-        (['convert'], 'foc_ros convert: CSV: expected a value, got none'),
-        (['replay', '.', '--prams', 'a'], 'foc_ros replay: unrecognized arguments: --prams (did you mean --params?)\n'),
+        (['fly'], 'foc_ros fly: Unknown command "fly". Available commands: demo, play, '),
+        (['evalute', 'bags'], 'foc_ros evalute: Unknown command "evalute". Did you mean "evaluate"?'),
+        (['convert'], 'foc_ros convert: Command "convert" parameter CSV requires an argument.'),
+        (['replay', '.', '--prams', 'a'], 'foc_ros replay: Unknown option: --prams. Did you mean --params?\n'),
+        (['replay', '.', 'more'], "foc_ros replay: Unused Tokens: ['more']."),
+        (['evaluate', '.', '--workers', '0'], 'foc_ros evaluate: Invalid value "0" for --workers. Must be >= 1.'),
         (['replay', '.', '--json=maybe'], 'foc_ros replay: Invalid value for --json: unable to convert "maybe" into bool.'),
         (['evaluate', '.', '--workers', '2', '--scheduler', 'host:8786'], 'foc_ros evaluate: --scheduler: expected either '),
-        (['replay', '.', '--output', 'a', '--output', 'b'], 'foc_ros replay: argument --output: given twice'),
+        (['replay', '.', '--output', 'a', '--output', 'b'], 'foc_ros replay: Parameter --output specified multiple times.'),
         (['evaluate', 'x' * 300], 'foc_ros evaluate: [Errno 36] File name too long'),
         (['paper'], 'foc_ros paper: the studies of the paper are an example now: python examples/paper/paper.py\n'),
-        (['replay', 'no_such_bag'], 'foc_ros replay: no_such_bag: no such file or directory'),
+        (['replay', 'no_such_bag'], 'foc_ros replay: Invalid value "no_such_bag" for BAG. "no_such_bag" does not exist.'),
     ],
 )
 def test_wrong_arguments_exit_2_with_one_line(arguments: list[str], line: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -81,7 +82,7 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_help_names_every_command_and_explains_every_argument(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command_line.main(['--help']) == 0
+    assert command_line.main(['--help']) == command_line.main([]) == 0
     shown = capsys.readouterr().out
     for command in command_line.list_commands():
         assert f' {command} ' in shown

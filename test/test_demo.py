@@ -49,8 +49,8 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         'The node starts ...',
         ' of 2.0 s   hand samples ',
         'The report is written ...',
-        'report/index.html',
         'predictions were made',
+        'report/index.html',
     ]
     places = [printed.find(words) for words in told]
     assert places == sorted(places) and places[0] == 0

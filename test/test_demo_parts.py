@@ -77,12 +77,11 @@ def test_recorder_keeps_every_prediction_with_its_scene() -> None:
     stamps = [START_NS + n * STEP_NS for n in range(5)]
     assert [each.stamp_ns for each in recorder.samples] == [each.stamp_ns for each in recorder.snapshots] == stamps
     snapshot, expected = recorder.snapshots[3], build_snapshot(make(3))
-    shares = [[(each.label, each.likelihood) for each in view.candidates] for view in (snapshot, expected)]
+    shares = [[(each.label, each.likelihood) for each in view.candidates_with_likelihood] for view in (snapshot, expected)]
     assert shares[0] == shares[1]
     assert snapshot.obstacles.ids == ('1',)
-    np.testing.assert_allclose(snapshot.goals, [[0.3, 0.0], [0.3, 0.12]])
+    np.testing.assert_allclose(snapshot.goal_positions, [[0.3, 0.0], [0.3, 0.12]])
     np.testing.assert_allclose(recorder.delays, 0.005)
-    assert (recorder.rates(0.09), recorder.rates(3.0)) == ((5, 5), (0, 0)), 'messages of the last second'
 
 
 @pytest.mark.parametrize('lost', ['prediction', 'likelihoods'])
@@ -96,14 +95,16 @@ def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
     items = [Item('goals', '/goals', START_NS + after_ns, None, b'') for after_ns in (0, 5 * NANOSECONDS)]
     with show_live(console) as show:
         for now in times if recorder.snapshots else ():
-            show(float(now), recorder.snapshots[-1], recorder.describe(float(now), items), recorder.samples[-1].position)
+            show(float(now), recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
     return screen.getvalue()
 
 
 def test_without_a_terminal_a_line_is_printed_each_second() -> None:
-    lines = shown(filled(), False, np.arange(0.0, 3.0, 0.01)).splitlines()
+    recorder = filled()
+    recorder.health = {'hand_pose rate [Hz]': '99.8', 'prediction rate [Hz]': '49.9'}
+    lines = shown(recorder, False, np.arange(0.0, 3.0, 0.01)).splitlines()
     assert len(lines) == 3
-    assert lines[0].startswith(' 0.1 of 5.0 s   hand samples 5/s, predictions 5/s, delay 5 ms')
+    assert lines[0].startswith(' 0.1 of 5.0 s   hand samples 99.8/s, predictions 49.9/s, delay 5 ms')
     assert '56 % goal0: right of 1' in lines[0]
     assert '34 % goal0: left of 1' in lines[0]
     assert '\x1b' not in ''.join(lines)
@@ -111,7 +112,7 @@ def test_without_a_terminal_a_line_is_printed_each_second() -> None:
 
 def test_on_a_terminal_a_table_is_shown() -> None:
     text = shown(filled(), True, np.array([0.2]))
-    for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1:+1-post', '0.90', 'x 1.15'):
+    for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1: left of 1, right of post', '0.90', 'x 1.15'):
         assert part in text
     assert '█' in text
     assert '…' not in text and '...  ' not in text
@@ -176,7 +177,7 @@ sys.exit(main(['demo']))
     command = [sys.executable, '-c', program]
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False)
     assert (result.returncode, result.stderr) == (130, '')
-    assert result.stdout.startswith('A recorded hand moves ') and result.stdout.endswith(' []\n')
+    assert result.stdout.startswith('Welcome to foc_ros. A recorded hand moves ') and result.stdout.endswith(' []\n')
 
 
 def test_the_scene_is_drawn_with_hand_goals_obstacles_and_candidates() -> None:
@@ -202,7 +203,7 @@ def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:
         f'{len(snapshots)} predictions were made. The hand moved to a goal 1 times, for 0.8 s; this goal was the most '
     )
     assert 'most likely one from 0.8 s before the arrival' in words
-    others = [replace(each, most_likely='goal1:+1-post') for each in snapshots]
+    others = [replace(each, candidates=each.candidates[::-1]) for each in snapshots]
     assert 'from 0.0 s before the arrival' in describe_lead(build_hand_trajectory(made), others)
     assert describe_lead(build_hand_trajectory(made[:5]), snapshots).endswith('no movement ended at a goal.')
 

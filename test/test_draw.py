@@ -44,8 +44,9 @@ from foc_ros.reporting.draw import (
     save_figure,
 )
 from foc_ros.reporting.figures import make_moment_figure, make_scene_figure, plot_prediction, write_picture
-from foc_ros.reporting.views import Snapshot, build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot, find_entered, list_unsolved
 from foc_ros.ros.intake import Intake
+from foc_ros.ros.messages.ranking import find_drawn_curve
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
@@ -57,9 +58,9 @@ NOWHERE = np.zeros(2)
 def test_an_ellipse_is_the_level_set_of_the_covariance() -> None:
     root = np.random.default_rng(0).normal(size=(2, 2))
     covariance, centre = root @ root.T, np.array([0.3, -0.1])
-    ellipse = make_stddev_ellipse(centre, covariance, 2.0)
+    ellipse = make_stddev_ellipse(centre, covariance)
     edge = ellipse.get_patch_transform().transform(np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]])) - centre
-    np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 4.0, rtol=1e-9)
+    np.testing.assert_allclose(np.einsum('ki,ij,kj->k', edge, np.linalg.inv(covariance), edge), 1.0, rtol=1e-9)
     ellipse = make_stddev_ellipse(NOWHERE, np.array([[0.0, 0.0], [0.0, -1e-18]]))
     assert (ellipse.width, ellipse.height) == (0.0, 0.0)
 
@@ -124,7 +125,7 @@ def test_a_scene_holds_every_obstacle_goal_and_candidate() -> None:
     radii = sorted(patch.radius for patch in axes.patches if isinstance(patch, Circle))
     np.testing.assert_allclose(radii, [0.02, 0.03, 0.033], err_msg='a ring where the radius is uncertain only')
     drawn = [line.get_xydata() for line in axes.lines]
-    for points in (*(each.curve for each in build_snapshot(made).candidates), *made.goal_positions[:, None]):
+    for points in (*map(find_drawn_curve, build_snapshot(made).candidates_with_likelihood), *made.goal_positions[:, None]):
         assert any(np.array_equal(line, points) for line in drawn)
 
 
@@ -164,30 +165,30 @@ def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it() -> No
 
 
 def test_goals_are_called_by_their_names() -> None:
-    words = {text.get_text() for text in axes_of(prediction(START_NS, NOWHERE).with_goal_names(('bowl', 'plate'))).texts}
+    made = prediction(START_NS, NOWHERE).with_goal_names(('bowl', 'plate'))
+    words = {text.get_text() for text in axes_of(made).texts}
     assert {'bowl', 'plate'} <= words and not words & {'goal0', 'goal1'}
+    bowl = make_obstacles([made.goal_positions[0], [0.1, 0.2]], 0.02, ids=('bowl', 'plate'))
+    written = [text.get_text() for text in axes_of(replace(made, obstacles=bowl)).texts]
+    assert (written.count('bowl'), written.count('plate')) == (1, 2), 'an object that is a goal has its name once'
 
 
 def test_an_obstacle_that_is_passed_above_or_has_moved_away_makes_no_ghost() -> None:
     made = build_snapshot(prediction(START_NS, NOWHERE))
     through = made.candidates[2]
-    assert made.find_entered(through)[0] == 'post'
-    assert replace(made, cleared=('post',)).find_entered(through)[0] == ''
+    assert find_entered(made, through)[0] == 'post'
+    assert find_entered(replace(made, cleared=(False, True)), through)[0] == ''
     away = replace(made.obstacles, velocity=np.array([[0.0, 0.0], [0.0, 0.3]]))
-    assert replace(made, obstacles=away).find_entered(through)[0] == ''
-    for place in (NOWHERE, through.path[-1]):  # the hand is in it, or it is the goal
+    assert find_entered(replace(made, obstacles=away), through)[0] == ''
+    for place in (NOWHERE, through.solution.path[-1]):  # the hand is in it, or it is the goal
         around = make_obstacles([place], 0.02, ids=('glove',))
-        assert replace(made, obstacles=around).find_entered(through)[0] == ''
+        assert find_entered(replace(made, obstacles=around), through)[0] == ''
 
 
 def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse_widens_the_axes() -> None:
     made = build_snapshot(prediction(START_NS, NOWHERE))
-    wide = replace(
-        made,
-        candidates=tuple(
-            replace(each, covariance=1e4 * each.covariance, motor_covariance=each.covariance) for each in made.candidates
-        ),
-    )
+    solutions = [each.solution.with_covariance(1e4 * each.covariance) for each in made]
+    wide = replace(made, candidates=tuple(replace(each, solution=new) for each, new in zip(made, solutions, strict=True)))
     limits = []
     for each in (made, wide):
         axes = make_scene_figure(each).axes[0]
@@ -199,7 +200,7 @@ def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse
         assert all(patch.get_facecolor()[3] >= 0.3 for patch in ellipses if patch not in dashed)
     assert limits[0] == limits[1]
     left, right, bottom, top = limits[0]
-    paths = np.concatenate([each.path for each in (*made.candidates, *made.unsolved)])
+    paths = np.concatenate([each.solution.path for each in made])
     assert (paths >= [left, bottom]).all() and (paths <= [right, top]).all() and right - left < 0.35
 
 
@@ -221,9 +222,10 @@ def test_everything_drawn_is_in_the_legend_once_and_the_hand_has_past_and_future
     np.testing.assert_array_equal(later[0].get_xydata()[0], now)
 
 
-def sorted_shares(snapshot: Snapshot) -> list[str]:
+def sorted_shares(snapshot: Prediction) -> list[str]:
     """Return the shares of the candidates in the legend, those without one last."""
-    return [f'{100 * each.likelihood:.0f}' for each in snapshot.candidates] + ['-'] * len(snapshot.unsolved)
+    shares = [f'{100 * each.likelihood:.0f}' for each in snapshot.candidates_with_likelihood]
+    return shares + ['-'] * len(list_unsolved(snapshot))
 
 
 def layouts() -> dict[str, Any]:
@@ -261,7 +263,7 @@ def test_a_plot_survives_subplots_and_savefig(name: str, tmp_path: Path) -> None
 
 def test_boxes_are_drawn_with_their_outlines_and_fit_into_the_picture() -> None:
     obstacles, goals = shapes.collect_obstacles([WALL, shapes.Circle((0.2, 0.1), 0.02)]), scene()[1]
-    axes = make_scene_figure(Snapshot(0, obstacles, goals, (), None)).axes[0]
+    axes = make_scene_figure(Prediction(0, '', 0.0, (), None, obstacles=obstacles, goal_positions=goals)).axes[0]
     box, ring = (patch.get_xy() for patch in axes.patches if isinstance(patch, Polygon))
     np.testing.assert_allclose(box, trace_obstacle(obstacles, 0))
     np.testing.assert_allclose(measure_offsets(ring, obstacles)[1][:, 0], 0.01)
@@ -287,8 +289,8 @@ def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_s
     nothing = replace(made, candidates=tuple(lost), most_likely=None, obstacles=make_obstacles())
     write_picture(tmp_path / 'none.png', nothing)
     assert (tmp_path / 'none.png').read_bytes().startswith(PNG)
-    snapshot = replace(build_snapshot(replace(made, candidates=tuple(lost))), hand=np.array([-0.1, 0.02]))
-    axes = make_scene_figure(snapshot).axes[0]
+    begun = [replace(each, candidate=replace(each.candidate, guess=np.array([[-0.1, 0.02], [0.3, 0.0]]))) for each in lost]
+    axes = make_scene_figure(replace(made, candidates=tuple(begun))).axes[0]
     assert any(np.array_equal(line.get_xydata(), [[-0.1, 0.02]]) for line in axes.lines)
     assert axes.get_xlim()[0] < -0.1
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from message_helpers import STORE, both_kinds, message_types
-from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
+from prediction_samples import DT, STEPS, outcome, prediction, three_ways
 from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import FocError
@@ -31,7 +31,7 @@ NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS), 'goal', 'way', 's
 
 
 def made(name: str, of: Prediction, types: MessageTypes = BAGS, plane: str = 'xy') -> Any:
-    return encode_outputs(of, OBSTACLES, plane, types, [name])[name]
+    return encode_outputs(of, plane, types, [name])[name]
 
 
 def columns(cloud: Any) -> dict[str, np.ndarray]:
@@ -129,7 +129,7 @@ def test_the_candidate_called_most_likely_is_first_even_if_another_is_likelier()
 @both_kinds
 @pytest.mark.parametrize('outcomes', [(), (outcome(status=Status.INFEASIBLE),)])
 def test_nothing_solved_is_an_empty_answer(types: MessageTypes, outcomes: tuple[PredictedCandidate, ...]) -> None:
-    messages = encode_outputs(prediction(*outcomes), OBSTACLES, 'xy', types)
+    messages = encode_outputs(prediction(*outcomes), 'xy', types)
     assert (messages['prediction'].width, len(messages['prediction'].data)) == (0, 0)
     assert [field.name for field in messages['prediction'].fields] == NAMES
     assert (messages['likelihoods'].layout.dim[0].size, len(messages['likelihoods'].data)) == (0, 0)
@@ -245,7 +245,7 @@ def test_a_candidate_without_a_path_shows_its_guess() -> None:
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
 def test_a_box_is_drawn_as_triangles_that_cover_it(types: MessageTypes, plane: str) -> None:
     shapes = collect_obstacles([Box((0.1, 0.0), (0.1, 0.04), 0.5, radius_stddev=0.01), Circle((0.2, 0.1), 0.02)])
-    markers = encode_outputs(three_ways(), shapes, plane, types, ['markers'])['markers'].markers
+    markers = encode_outputs(replace(three_ways(), obstacles=shapes), plane, types, ['markers'])['markers'].markers
     for name, radius in (('obstacle', 0.0), ('obstacle_deviation', 0.01)):
         box, disc = (each for each in markers if each.ns == name)
         assert (box.type, disc.type, box.id, disc.id) == (11, 3, 0, 1)
@@ -260,14 +260,14 @@ def test_a_box_is_drawn_as_triangles_that_cover_it(types: MessageTypes, plane: s
 
 def test_the_nearest_of_many_obstacles_are_drawn() -> None:
     crowd = make_obstacles([[0.01 * i, 0.0] for i in range(1000, 0, -1)], 0.001)
-    markers = encode_outputs(three_ways(), crowd, 'xy', BAGS, ['markers'])['markers'].markers
+    markers = encode_outputs(replace(three_ways(), obstacles=crowd), 'xy', BAGS, ['markers'])['markers'].markers
     drawn = [each.pose.position.x for each in markers if each.ns == 'obstacle']
     assert sorted(drawn) == pytest.approx([0.01 * i for i in range(1, 129)])
 
 
 @both_kinds
 def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> None:
-    for name, message in encode_outputs(three_ways(), OBSTACLES, 'xy', types).items():
+    for name, message in encode_outputs(three_ways(), 'xy', types).items():
         kind = OUTPUTS[name][0]
         if hasattr(message, '__msgtype__'):
             raw = STORE.serialize_cdr(message, kind)
@@ -276,5 +276,5 @@ def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> No
 
             raw = serialize_message(message)
         back = STORE.deserialize_cdr(raw, kind)
-        twin = encode_outputs(three_ways(), OBSTACLES, 'xy', BAGS, [name])[name]
+        twin = encode_outputs(three_ways(), 'xy', BAGS, [name])[name]
         assert bytes(STORE.serialize_cdr(back, kind)) == bytes(STORE.serialize_cdr(twin, kind))

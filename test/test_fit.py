@@ -170,7 +170,7 @@ def _check_node_starts(printed: str, config: Config) -> None:
 @pytest.mark.parametrize(
     ('arguments', 'expected'),
     [
-        (['nowhere', '--output', 'out.yaml'], 'nowhere: no such file or directory'),
+        (['nowhere', '--output', 'out.yaml'], 'Invalid value "nowhere" for DATA. "nowhere" does not exist.'),
         (['.', '--output', 'nowhere/out.yaml'], '--output: expected a file in a directory that exists'),
         (['.', '--output', 'out.yaml', '--params', 'nowhere.yaml'], 'nowhere.yaml: cannot be read'),
     ],

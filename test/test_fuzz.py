@@ -92,7 +92,7 @@ def test_any_messages_in_any_order() -> None:
             seen['predicted'] += 1
             stamp = message.header.stamp
             assert prediction.stamp_ns == stamp.sec * 1_000_000_000 + stamp.nanosec
-            sent = encode_outputs(prediction, pipeline.scene.obstacles(prediction.stamp_ns), 'xy', TYPES)
+            sent = encode_outputs(prediction, 'xy', TYPES)
             assert all(is_finite(name, each) for name, each in sent.items())
             assert pipeline.predict() is None, 'predicted twice from one pose'
 

@@ -10,7 +10,7 @@ import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 from numpy.testing import assert_allclose, assert_array_equal
 from object_messages import collision_object, detection, detections
-from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction
+from prediction_samples import DT, STEPS, outcome, prediction
 
 from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.core.config import Config, replace_values
@@ -128,7 +128,7 @@ def test_every_plane_has_the_same_heights(plane: str) -> None:
         assert one.height is not None and other.height is not None
         assert_allclose(one.height.mean, other.height.mean, atol=1e-12)
         assert_allclose(one.height.covariance, other.height.covariance, atol=1e-12)
-    rows = np.frombuffer(encode_outputs(made, made.obstacles, plane, TYPES, ['prediction'])['prediction'].data, CLOUD_ROW)
+    rows = np.frombuffer(encode_outputs(made, plane, TYPES, ['prediction'])['prediction'].data, CLOUD_ROW)
     normal = next(axis for axis in 'xyz' if axis not in plane)
     first = made.candidates[0].height
     assert first is not None
@@ -157,7 +157,7 @@ def test_path_and_markers_rise(plane: str) -> None:
     (candidate,) = given.candidates
     assert candidate.height is not None
     heights = candidate.height.mean[:, 0]
-    messages = encode_outputs(given, OBSTACLES, plane, TYPES)
+    messages = encode_outputs(given, plane, TYPES)
     points = [[getattr(each.pose.position, axis) for axis in 'xyz'] for each in messages['path'].poses]
     assert_allclose(points, lift(candidate.solution.path, heights, plane))
     assert len(messages['path'].poses) == len(np.arange(0.0, STEPS * DT + DT / 2, DT))

@@ -71,8 +71,7 @@ def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, cas
         for step in replay.steps(reader):
             bench.deliver(step.item.role, bytes(step.item.raw))
             if step.prediction is not None:
-                obstacles = step.scene.obstacles(step.prediction.stamp_ns)
-                expected.append(encode_outputs(step.prediction, obstacles, 'xy', TYPES))
+                expected.append(encode_outputs(step.prediction, 'xy', TYPES))
     count = len(expected)
     assert count > 3
     assert max(each['prediction'].width for each in expected) == 2 * (config.foc.steps + 1)
@@ -97,7 +96,7 @@ def test_the_case_with_heights_has_heights(tmp_path: Path) -> None:
             made = [step.prediction for step in Replay(config).steps(reader) if step.prediction is not None]
         assert made
         for each in made:
-            answer = encode_outputs(each, each.obstacles, 'xy', TYPES)
+            answer = encode_outputs(each, 'xy', TYPES)
             label = answer['likelihoods'].layout.dim[0].label
             assert ('+0' in label or '-0' in label) == is_named
             rows = np.frombuffer(bytes(answer['prediction'].data), CLOUD_ROW)

@@ -19,7 +19,6 @@ from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.reporting.received import read_snapshot
-from foc_ros.reporting.views import build_snapshot
 from foc_ros.ros.messages.encode_markers import encode_markers
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -93,10 +92,8 @@ def test_the_share_is_published_and_read_back() -> None:
         1.0
     )
     read = read_snapshot(cloud, table, 'xy', prediction.obstacles, prediction.goal_positions)
-    assert (
-        read.other_share == build_snapshot(prediction).other_share == prediction.other == encode_prediction(prediction)['other']
-    )
-    texts = [each.text for each in encode_markers(prediction, prediction.obstacles, 'xy', TYPES).markers]
+    assert read.other == prediction.other == encode_prediction(prediction)['other']
+    texts = [each.text for each in encode_markers(prediction, 'xy', TYPES).markers]
     assert any(text.endswith(f'{100 * prediction.other:.0f} % another goal') for text in texts)
 
 

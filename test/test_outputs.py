@@ -16,7 +16,7 @@ from report_samples import START_NS, prediction, predictions, samples
 
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
-from foc_ros.io.outputs import check_replaceable, check_report
+from foc_ros.io.outputs import REPORT_FILES, check_page, check_replaceable
 from foc_ros.reporting.figures import write_picture
 from foc_ros.reporting.page import write_page
 from foc_ros.reporting.report import write_report
@@ -48,13 +48,13 @@ def test_a_report_is_replaced_by_the_next_one(tmp_path: Path) -> None:
     made = samples()
     for _ in range(2):
         write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], {})
-    write_page(tmp_path, 'index.html', 'made by foc_ros')
+    write_page(tmp_path, 'index.html', 'x', (), (), None)
 
 
 @pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png'])
 def test_a_report_overwrites_no_other_file(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text('mine', 'utf-8')
     with pytest.raises(InputError, match='--report: expected a new file, or one that foc_ros has made'):
-        check_report('--report', tmp_path)
+        check_page('--report', tmp_path, *REPORT_FILES)
     (tmp_path / name).rename(tmp_path / 'other.html')
-    check_report('--report', tmp_path)
+    check_page('--report', tmp_path, *REPORT_FILES)

@@ -126,12 +126,6 @@ def test_an_interrupt_of_the_terminal_ends_command_and_workers(tmp_path: Path) -
     assert 'Warning' not in errors and errors.count('Traceback') == 1
 
 
-@pytest.mark.parametrize('given', [('--workers', '0'), ('--workers', '2000')])
-def test_a_wrong_number_of_workers_is_refused(given: tuple[str, ...]) -> None:
-    with pytest.raises(InputError, match=r'--workers: expected a whole number in \[1, 1024\], got'):
-        parse_study(*given)
-
-
 def test_a_scheduler_that_is_not_there_or_has_no_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
     monkeypatch.setattr('foc_ros.analysis.parallel.CONNECT_S', 0.3)

@@ -18,11 +18,12 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
 
 from foc_ros.core.errors import InputError
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import HandSample
 from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
 from foc_ros.reporting.report import describe_late, write_report
-from foc_ros.reporting.views import Snapshot, build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
 
@@ -121,8 +122,8 @@ def test_a_long_recording_is_thinned_out_and_its_page_stays_below_a_megabyte_and
     many = [replace(each, candidates=each.candidates[:3] * 2) for each in predictions(made, every=1)]
     snapshots = []
     for view in map(build_snapshot, many):
-        named = tuple(replace(each, way=row, label=f'{each.label}{row}') for row, each in enumerate(view.candidates))
-        snapshots.append(replace(view, candidates=named))
+        named = [(row, each, replace(each.candidate, label=f'{each.label}{row}')) for row, each in enumerate(view)]
+        snapshots.append(replace(view, candidates=tuple(replace(each, way=row, candidate=new) for row, each, new in named)))
     write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
     assert (tmp_path / 'index.html').stat().st_size < 1_500_000
     data = page_data_of(tmp_path)
@@ -142,18 +143,19 @@ def test_ghosts_say_why(tmp_path: Path) -> None:
     assert {'', 'leads through obstacle post', 'eta unreachable'} <= ghosts
 
 
-def end_with(snapshot: Snapshot, *statuses: Status) -> Snapshot:
+def end_with(snapshot: Prediction, *statuses: Status) -> Prediction:
     """Return a snapshot whose likeliest candidates have ended otherwise, and without one that is lost."""
-    pairs = zip(snapshot.candidates, statuses, strict=False)
-    ended = [replace(each, status=status) for each, status in pairs]
-    return replace(snapshot, candidates=(*ended, *snapshot.candidates[len(ended) :]), unsolved=())
+    shown = snapshot.candidates_with_likelihood
+    pairs = zip(shown, statuses, strict=False)
+    ended = [replace(each, solution=replace(each.solution, status=status)) for each, status in pairs]
+    return replace(snapshot, candidates=(*ended, *shown[len(ended) :]))
 
 
 def test_a_busy_computer_is_told_once_with_what_to_change_and_an_estimate_is_not_called_compromised(tmp_path: Path) -> None:
     made = [build_snapshot(each) for each in predictions(samples())]
     hand = build_hand_trajectory(samples())
 
-    def told(snapshots: list[Snapshot]) -> tuple[list[str], dict[str, str]]:
+    def told(snapshots: list[Prediction]) -> tuple[list[str], dict[str, str]]:
         write_report(tmp_path, 'x', hand, snapshots, {})
         numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
         return numbers['warnings'], numbers['summary']
@@ -188,7 +190,8 @@ def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path: Pa
     assert 'In 3 of 3 predictions no candidate could be solved.' in Page(files[0]).text
     still = build_hand_trajectory([HandSample(START_NS + n * 10_000_000, np.zeros(2)) for n in range(50)])
     view = build_snapshot(prediction(int(still.stamps_ns[20]), np.zeros(2)))
-    unknown = replace(view, candidates=(replace(view.candidates[0], eta=float('nan')), *view.candidates[1:]))
+    strange = replace(view.candidates[0], solution=replace(view.candidates[0].solution, eta=float('nan')))
+    unknown = replace(view, candidates=(strange, *view.candidates[1:]))
     files = write_report(tmp_path / 'still', 'x', still, [unknown], {})
     assert (tmp_path / 'still' / 'overview.png') in files
     text = files[1].read_text(encoding='utf-8')

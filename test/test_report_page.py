@@ -184,7 +184,7 @@ def test_a_warning_leads_to_its_first_moment(browser: Any, tmp_path: Path) -> No
     made = samples()
     snapshots = [build_snapshot(each) for each in predictions(made)]
     # only from the eleventh prediction on is a candidate lost
-    snapshots[:10] = [replace(each, unsolved=()) for each in snapshots[:10]]
+    snapshots[:10] = [replace(each, candidates=each.candidates_with_likelihood) for each in snapshots[:10]]
     write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {'rejected': 'hand_late 3', 'hand poses': '150'})
     assert show(browser, tmp_path / 'index.html') == []
     (button,) = browser.find_elements('css selector', '.warning button.moment')
@@ -202,12 +202,12 @@ def test_the_page_opens_on_the_way_where_several_paths_are_likely_and_the_filter
     best = next(row for row, each in enumerate(snapshots) if each.stamp_ns > START_NS + 2_300_000_000)
     for row, snapshot in enumerate(snapshots):
         shares = (0.3, 0.3, 0.25) if row == best else (0.9, 0.03, 0.02)
-        candidates = tuple(replace(each, likelihood=share) for each, share in zip(snapshot.candidates, shares, strict=True))
+        candidates = tuple(replace(each, likelihood=share) for each, share in zip(snapshot, shares, strict=False))
         snapshots[row] = replace(snapshot, candidates=candidates)
     unsettled = next(row for row, each in enumerate(snapshots) if each.stamp_ns > START_NS + 2_250_000_000)
     wide = tuple(
-        replace(each, likelihood=0.3, covariance=100.0 * each.covariance, motor_covariance=each.covariance)
-        for each in snapshots[unsettled].candidates
+        replace(each, likelihood=0.3, solution=each.solution.with_covariance(100.0 * each.covariance))
+        for each in snapshots[unsettled]
     )
     snapshots[unsettled] = replace(snapshots[unsettled], candidates=wide)
     write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})

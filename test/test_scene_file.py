@@ -188,14 +188,14 @@ def test_numbers_of_base_60_are_texts_as_for_ros(tmp_path: Path, number: str) ->
 
 
 @pytest.mark.parametrize('name', ['s.json', 's.yaml'])
-@pytest.mark.parametrize('number', ['9' * 25, '-' + '9' * 400, '9' * 5000, '1e400'])
+@pytest.mark.parametrize('number', ['9' * 25, '-' + '9' * 400, '9' * 4000, '1e400'])
 @pytest.mark.parametrize('field', ['steps', 'duration_s'])
 def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(
     tmp_path: Path, name: str, number: str, field: str
 ) -> None:
     (tmp_path / name).write_text(f'{{"start": [0, 0], "goal": [1, 0], "{field}": {number}}}', 'utf-8')
     with pytest.raises(
-        SceneError, match=rf"^{field}: expected a .*number in \[.*\].*, got '?-?(9999|1e400|1.0e\+400|inf)"
+        SceneError, match=rf"^{field}: expected a .*number in \[.*\].*, got '?-?(9999|1e400|1.0e\+400|inf|a whole number of)"
     ) as caught:
         load_scene(tmp_path / name)
     assert len(str(caught.value)) < 300

@@ -169,8 +169,8 @@ def test_the_command_prints_equal_cells_whatever_the_workers_and_writes_a_report
         (['--operators', 'noisy,careless'], '--operators: expected names of accurate, noisy'),
         (['--assistance', 'magic'], '--assistance: expected names of none, foc'),
         (['--operators', 'human_paths'], '--recordings: expected recordings of people for the operator human_paths, got none'),
-        (['--trials', '0'], '--trials: expected a whole number in [1, 100000], got 0'),
-        (['--seed', '-1'], '--seed: expected a whole number in [0, 100000], got -1'),
+        (['--trials', '0'], 'Invalid value "0" for --trials. Must be >= 1.'),
+        (['--seed', '-1'], 'Invalid value "-1" for --seed. Must be >= 0.'),
     ],
 )
 def test_wrong_options_are_refused(options: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:

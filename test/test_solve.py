@@ -152,8 +152,8 @@ def test_nothing_solved_is_exit_3_with_one_line(tmp_path: Path, capsys: pytest.C
     ('scene', 'options', 'line'),
     [
         ({**SCENE, 'eta': 2}, (), 'foc_ros solve: eta: expected a number in [0, 0.999], got 2'),
-        (SCENE, ('--monte-carlo', '0'), 'foc_ros solve: --monte-carlo: expected a whole number in [1, 10000000], got 0'),
-        (SCENE, ('--monte-carlo', 'x'), 'foc_ros solve: --monte-carlo: expected a whole number in [1, 10000000], got x'),
+        (SCENE, ('--monte-carlo', '0'), 'foc_ros solve: Invalid value "0" for --monte-carlo. Must be >= 1.'),
+        (SCENE, ('--monte-carlo', 'x'), 'foc_ros solve: Invalid value for --monte-carlo: unable to convert "x" into int.'),
     ],
 )
 def test_wrong_input_is_exit_2_with_one_line(

@@ -9,6 +9,7 @@ from datetime import datetime
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,11 +21,12 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.reporting import evaluation_report, simulation_report
+from foc_ros.reporting import page as pages
 from foc_ros.reporting.draw import open_figure
 from foc_ros.reporting.evaluation_report import _draw_reliability
-from foc_ros.reporting.example import FEW, render_example, warn_of_few
+from foc_ros.reporting.example import FEW, draw_example, warn_of_few
 from foc_ros.reporting.fit_report import write_report
-from foc_ros.reporting.page import place_legend, render_page, render_tables
+from foc_ros.reporting.page import Section, explain_tables, make_chart, write_page
 
 RECORDING = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 ANSWER = {
@@ -99,26 +101,29 @@ class Recorded:
 
 def test_a_recording_is_pictured_with_its_prediction_and_one_that_cannot_be_read_is_passed_over() -> None:
     config = Config().with_values({'rate_hz': 10.0, 'foc.steps': 20})
-    html = render_example({'broken': Recorded(is_broken=True), 'whole': Recorded()}, config)
-    assert html.count('<img') == 1 and 'whole, 0.' in html and 'after the hand began to move' in html
-    assert render_example({'broken': Recorded(is_broken=True)}, config) == ''
+    (section,) = draw_example({'broken': Recorded(is_broken=True), 'whole': Recorded()}, config)
+    ((_, caption),) = section.pictures
+    assert caption.startswith('whole, 0.') and caption.endswith('after the hand began to move.')
+    assert draw_example({'broken': Recorded(is_broken=True)}, config) == []
 
 
-def test_a_page_names_what_made_it_and_no_path() -> None:
+def test_a_page_names_what_made_it_and_no_path(tmp_path: Path) -> None:
     config = Config().with_values({'foc.eta': 0.8, 'homotopy.library': '/elsewhere/mine.json'})
-    page = render_page('x', '<p>body</p>', (), config)
+    write_page(tmp_path, 'x.html', 'x', [Section('In short', ['a < b'])], (), config)
+    page = (tmp_path / 'x.html').read_text(encoding='utf-8')
+    assert '<li>a &lt; b</li>' in page
     footer = page.partition('<footer')[2].partition('</footer>')[0]
     assert f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; ' in footer
     assert 'processors' in footer and 'foc.eta = 0.8' in footer and 'homotopy.library = mine.json' in footer
     assert 'someone' not in page and str(Path.cwd()) not in page
-    assert 'All parameters have their defaults.' in render_page('x', '', (), Config())
+    write_page(tmp_path, 'x.html', 'x', [], (), Config())
+    assert 'All parameters have their defaults.' in (tmp_path / 'x.html').read_text(encoding='utf-8')
 
 
 def test_words_are_explained_once_where_they_stand_first() -> None:
     tables = (('First', ('', 'gain [nat]'), [('foc', '1')]), ('Second', ('', 'gain [nat]', 'ECE'), [('foc', '1', '0')]))
-    html = render_tables(tables, {'nat': 'a unit', 'ECE': 'an error', 'Brier': 'not here'})
-    assert html.count('nat: a unit') == html.count('ECE: an error') == 1 and 'Brier' not in html
-    assert html.index('First') < html.index('nat: a unit') < html.index('Second') < html.index('ECE: an error')
+    sections = explain_tables(tables, {'nat': 'a unit', 'ECE': 'an error', 'Brier': 'not here'})
+    assert [(each.heading, each.notes) for each in sections] == [('First', ['nat: a unit']), ('Second', ['ECE: an error'])]
 
 
 def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
@@ -131,17 +136,18 @@ def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
     assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
 
 
-def test_legends_are_below_the_axes_and_cover_nothing() -> None:
-    with open_figure(6.4, 4.6) as figure:
-        axes = figure.subplots()
+def test_legends_are_below_the_axes_and_cover_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def draw(axes: Any) -> None:
         for number in range(6):
             axes.plot([0, 1], [0, number], label=f'baseline number {number}')
         axes.plot([0, 1], [1, 0], label='baseline number 0')
-        place_legend(figure)
-        figure.draw_without_rendering()
+
+    monkeypatch.setattr(pages, 'make_picture', lambda figure, _: figure)
+    figure: Any = make_chart((6.4, 4.6), '', draw)
+    figure.draw_without_rendering()
     (legend,) = figure.legends
     assert len(legend.get_texts()) == 6
-    assert not legend.get_window_extent().overlaps(axes.get_tightbbox())
+    assert not legend.get_window_extent().overlaps(figure.axes[0].get_tightbbox())
 
 
 def test_results_are_told_in_plain_words_first() -> None:

@@ -97,7 +97,7 @@ def test_the_unknown_share_is_published() -> None:
     rows = np.asarray(table.data).reshape(-1, 4)
     assert rows[:, 0].sum() == pytest.approx(1.0) and np.isnan(rows[1, 1:]).all() and rows[1, 0] == one.unknown
     assert 'unknown' not in encode_likelihoods(whole, TYPES).layout.dim[0].label
-    texts = [each.text for each in encode_markers(one, one.obstacles, 'xy', TYPES).markers]
+    texts = [each.text for each in encode_markers(one, 'xy', TYPES).markers]
     assert any(text.endswith(f'{100 * one.unknown:.0f} % unknown') for text in texts)
     assert encode_prediction(one)['unknown'] == one.unknown
 

@@ -68,13 +68,13 @@ def test_the_drawing_has_every_display_in_the_view_of_the_configuration() -> Non
     """`scripts/viewers.py` draws the messages of the node: lines, ellipses and labels, and the range that the view shows."""
     pytest.importorskip('matplotlib', reason='matplotlib is not installed')
     from message_helpers import message_types, pose_array, pose_stamped
-    from prediction_samples import OBSTACLES, three_ways
+    from prediction_samples import three_ways
     from test_readme_picture import script
 
     from foc_ros.ros.messages.encode_prediction import encode_outputs
 
     bags = message_types('rosbags')
-    messages = {f'/foc/{name}': message for name, message in encode_outputs(three_ways(), OBSTACLES, 'xy', bags).items()}
+    messages = {f'/foc/{name}': message for name, message in encode_outputs(three_ways(), 'xy', bags).items()}
     messages |= {'/hand_pose': pose_stamped(bags, (0.0, 0.0, 0.0)), '/goals': pose_array(bags, [(0.3, 0.0, 0.0)])}
     configuration = {'Visualization Manager': rviz(), 'Window Geometry': {'Width': 1200, 'Height': 900}}
     (axes,) = script('viewers').draw(configuration, messages).axes

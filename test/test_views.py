@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 from report_samples import START_NS, prediction, predictions, samples, scene, widen
 
-from foc_ros.core.errors import MessageError
-from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Status, describe_class
 from foc_ros.core.types import HandSample
 from foc_ros.io.bags import TYPESTORE
-from foc_ros.reporting.received import is_same_prediction, read_snapshot
+from foc_ros.reporting.received import read_snapshot
 from foc_ros.reporting.tracks import Slots, build_candidate_tracks
-from foc_ros.reporting.views import CandidateView, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot, parse_label
+from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory, build_snapshot, is_late, parse_label
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
+from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
@@ -27,32 +26,23 @@ NOWHERE = np.zeros(2)
 
 
 def test_a_snapshot_holds_the_numbers_of_its_prediction_and_names_classes_in_words() -> None:
-    made = prediction(START_NS, NOWHERE, 0.6)
+    made = replace(prediction(START_NS, NOWHERE, 0.6), most_likely='goal0:-1')
     snapshot = build_snapshot(made)
-    assert [each.label for each in snapshot.candidates] == ['goal0:+1', 'goal0:-1', 'goal1:+1-post']
-    words = ['goal0: left of 1', 'goal0: right of 1', 'goal1: left of 1, right of post']
-    assert [each.description for each in snapshot.candidates] == words
-    (lost,) = snapshot.unsolved
-    assert (lost.label, lost.status) == ('goal1:+1+post', 'eta_unreachable')
-    assert lost.reason == f'eta unreachable: out of reach; remedy: {Status.ETA_UNREACHABLE.remedy}'
-    best = snapshot.candidates[0]
-    np.testing.assert_array_equal(best.path, made.candidates[0].solution.path)
+    labels = ['goal0:-1', 'goal0:+1', 'goal1:+1-post', 'goal1:+1+post']
+    assert [each.label for each in snapshot] == labels, 'the one called most likely comes first'
+    best, known = snapshot.candidates[0], made.candidates[1]
+    np.testing.assert_array_equal(best.solution.path, known.solution.path)
     np.testing.assert_allclose(best.covariance[-1], np.diag([0.011**2, 0.005**2]))
-    np.testing.assert_array_equal(snapshot.hand, NOWHERE)
-    assert (snapshot.stamp_ns, best.cost_ratio) == (START_NS, 1.0)
-    assert snapshot.candidates[1].cost_ratio == pytest.approx(made.candidates[1].cost / made.candidates[0].cost)
-    lengths = np.linalg.norm(np.diff(best.path, axis=0), axis=1)
-    assert np.sum((best.speed[1:] + best.speed[:-1]) / 2 * 0.05) == pytest.approx(lengths.sum(), rel=0.02)
-    one = build_snapshot(replace(made, goal_positions=made.goal_positions[:1]))
-    assert [each.description for each in (*one.candidates[:1], *one.unsolved)] == ['left of 1', 'left of 1, left of post']
-    assert describe_class(()) == 'direct'
+    assert (snapshot.stamp_ns, best.cost, best.description) == (START_NS, known.cost, 'goal0: right of 1')
+    words = [describe_candidate(snapshot.candidates[row], 1) for row in (0, 3)]
+    assert words == ['right of 1', 'left of 1, left of post'] and describe_class(()) == 'direct'
 
 
 def test_the_motor_noise_and_the_unknown_share_are_kept() -> None:
     made = replace(prediction(START_NS, NOWHERE), unknown=0.25)
-    assert not build_snapshot(made).candidates[0].is_widened
+    assert build_snapshot(made).candidates[0].solution.motor_covariance is None
     snapshot = build_snapshot(widen(made))
-    assert snapshot.candidates[0].is_widened and snapshot.unknown_share == 0.25
+    assert snapshot.unknown == 0.25
     np.testing.assert_array_equal(snapshot.candidates[0].covariance, 3.0 * snapshot.candidates[0].motor_covariance)
 
 
@@ -95,45 +85,33 @@ def test_the_messages_hold_everything_that_a_report_shows(plane: str) -> None:
     carried = [TYPESTORE.deserialize_cdr(TYPESTORE.serialize_cdr(each, each.__msgtype__), each.__msgtype__) for each in messages]
     read, known = read_snapshot(*carried, plane, *scene()), build_snapshot(made)
     assert (read.stamp_ns, read.most_likely) == (known.stamp_ns, known.most_likely)
-    assert [each.label for each in read.candidates] == [each.label for each in known.candidates]
+    assert [each.label for each in read] == [each.label for each in known.candidates_with_likelihood]
     assert read.candidates[0].label == 'goal1:+1-post'
-    assert read.is_late and {each.status for each in read.candidates} == set(statuses)
-    for got, expected in zip(read.candidates, known.candidates, strict=True):
-        for name in ('description', 'status', 'likelihood', 'effort', 'cost_ratio', 'eta'):
+    assert is_late(read) and {each.status for each in read.candidates} == set(statuses)
+    ratios = [compute_cost_ratios(each.candidates_with_likelihood) for each in (read, known)]
+    assert ratios[0] == pytest.approx(ratios[1])
+    for got, expected in zip(read, known.candidates_with_likelihood, strict=True):
+        for name in ('description', 'status', 'likelihood', 'effort', 'eta'):
             assert getattr(got, name) == getattr(expected, name)
-        for name in ('times', 'path', 'velocity', 'speed', 'covariance', 'motor_covariance'):
+        for name in ('times', 'mean', 'covariance', 'motor_covariance'):
             np.testing.assert_allclose(getattr(got, name), getattr(expected, name), rtol=1e-6, atol=1e-8)
 
 
-def test_messages_of_unknown_obstacles_of_nothing_and_of_different_predictions() -> None:
-    made, other = prediction(START_NS, NOWHERE), prediction(START_NS + 20_000_000, NOWHERE)
+def test_messages_of_unknown_obstacles_and_of_nothing() -> None:
+    made = prediction(START_NS, NOWHERE)
     cloud, likelihoods = encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES)
     read = read_snapshot(cloud, likelihoods, 'xy', made.obstacles.take([1]), made.goal_positions)
-    assert [each.description for each in read.candidates] == ['', '', '']
+    assert [each.description for each in read] == [each.description for each in made.candidates_with_likelihood]
     above = replace(made.obstacles, heights=np.array([[-np.inf, np.inf], [0.2, 0.3]]))
-    assert read_snapshot(cloud, likelihoods, 'xy', above, made.goal_positions).cleared == ['post'], (
+    assert read_snapshot(cloud, likelihoods, 'xy', above, made.goal_positions).cleared == (False, True), (
         'the hand is at a height of 0.1 m'
     )
     nothing = Prediction(START_NS, 'world', 0.1, (), None)
     read = read_snapshot(encode_prediction_cloud(nothing, 'xy', TYPES), encode_likelihoods(nothing, TYPES), 'xy', *scene())
     assert (read.candidates, read.most_likely) == ((), None)
-    assert is_same_prediction(cloud, likelihoods) and not is_same_prediction(cloud, encode_likelihoods(other, TYPES))
-    with pytest.raises(MessageError, match='likelihoods'):
-        read_snapshot(cloud, encode_likelihoods(other, TYPES), 'xy', *scene())
 
 
 IDS = ('1', '12', 'post-2', '+')
-STEP_NS = 20_000_000
-WAYS: dict[str, int] = {}
-"""Number of the class of each label."""
-
-
-def snapshot(number: int, *labels: str, goals: tuple[tuple[float, float], ...] = ((1.0, 0.0), (1.0, 1.0))) -> Snapshot:
-    obstacles = make_obstacles([[0.1 * i, 0.0] for i in range(len(IDS))], 0.01, ids=IDS)
-    empty = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2, 2))
-    head = '', False, 1.0 / max(len(labels), 1), 1.0, 1.0, 0.9, np.zeros(0)
-    candidates = tuple(CandidateView(label, *head, *empty, WAYS.setdefault(label, len(WAYS))) for label in labels)
-    return Snapshot(number * STEP_NS, obstacles, np.array(goals), candidates, labels[0] if labels else None)
 
 
 @pytest.mark.parametrize(
@@ -164,11 +142,9 @@ def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_abs
 
 def test_tracks_are_numbered_from_0_whatever_the_classes_are_called() -> None:
     """The rows of a report's tracks are their numbers, and its recording may begin after the classes were numbered."""
-    renamed = [
-        replace(each, candidates=tuple(replace(view, way=view.way + 70) for view in each.candidates))
-        for each in (snapshot(0, 'goal0:+1', 'goal0:-1'), snapshot(1, 'goal0:-1', 'goal1:'))
-    ]
-    tracks = build_candidate_tracks(renamed)
-    assert [dict(each) for each in tracks.tracks] == [{'goal0:+1': 0, 'goal0:-1': 1}, {'goal0:-1': 1, 'goal1:': 2}]
+    made = prediction(START_NS, NOWHERE)
+    first, second, third = (replace(each, way=each.way + 70) for each in made.candidates_with_likelihood)
+    tracks = build_candidate_tracks([replace(made, candidates=(first, second)), replace(made, candidates=(second, third))])
+    assert [dict(each) for each in tracks.tracks] == [{'goal0:+1': 0, 'goal0:-1': 1}, {'goal0:-1': 1, 'goal1:+1-post': 2}]
     assert list(tracks.likelihoods()) == [0, 1, 2]
     assert [build_snapshot(each).stamp_ns for each in predictions(samples())] == [each.stamp_ns for each in samples()[::4]]

@@ -63,7 +63,7 @@ def replay_to(
             if predictions is not None:
                 _write_element(predictions, encode_prediction(step.prediction))
             if writer is not None:
-                for name, message in encode_outputs(step.prediction, step.prediction.obstacles, plane, types).items():
+                for name, message in encode_outputs(step.prediction, plane, types).items():
                     writer.write(f'{NODE}/{name}', message, step.item.log_ns)
 
 

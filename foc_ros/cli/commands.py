@@ -19,7 +19,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from foc_ros.core.errors import FocError
-from foc_ros.io.outputs import check_folder, check_picture, check_report
+from foc_ros.io.outputs import REPORT_FILES, check_folder, check_page, check_picture
 
 from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Learning, Params, Port, Remaps, Samples, app, warn_all
 
@@ -36,8 +36,8 @@ def demo(*, output: Path = Path('demo_output')) -> int:
     check_folder('--output', output)
     if find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: run `make setup`, or source a ROS 2 installation, or install the extra `ros`')
-    words = 'A recorded hand moves among a box (obstacle 1), three posts (2, 3, 4) and a wall (5)'
-    print(f'{words}; the node predicts where it goes. Loading ...', flush=True)
+    print('Welcome to foc_ros. A recorded hand moves among a box (obstacle 1), three posts (2, 3, 4) and a wall (5);')
+    print('the node predicts where it goes, for 20 s. Then open the report:', output / 'report' / 'index.html', flush=True)
     from .demo import perform  # not before: its import takes seconds
 
     return perform(output)
@@ -162,7 +162,7 @@ def replay(
     from foc_ros.io.bags import check_bag, check_new_bag
 
     if report is not None:
-        check_report('--report', report)
+        check_page('--report', report, *REPORT_FILES)
     learning.check(params)
     check_bag(bag)
     if output is not None:

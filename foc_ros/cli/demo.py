@@ -7,13 +7,12 @@ It shows the predictions, and leaves a bag and a report.
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import sys
-import tempfile
 import threading
 import time
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +24,7 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
@@ -33,9 +33,9 @@ from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
 from foc_ros.reporting.received import read_snapshot
 from foc_ros.reporting.report import describe_late, write_report
-from foc_ros.reporting.views import HandTrajectory, Snapshot, build_hand_trajectory, parse_label
+from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, private_environment, reserve_domain, set_environment
+from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, isolated_graph
 from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, STAMP
 
@@ -45,10 +45,8 @@ MARK = '.foc_ros_demo'
 RECEIVED = {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()} | {'/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}
 """Types of the outputs of the node."""
 PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
-WINDOW_S = 1.0
-"""Seconds over which rates are counted."""
-ONSET_SPEED = 0.05
-"""Speed [m/s] above which the hand counts as moving."""
+RATES = {'hand samples': 'hand_pose', 'predictions': 'prediction'}
+"""Rates that are shown, and their names in the diagnostics."""
 
 
 class Recorder:
@@ -60,13 +58,12 @@ class Recorder:
 
     def __init__(self, config: Config) -> None:
         self.samples: list[HandSample] = []
-        self.snapshots: list[Snapshot] = []
+        self.snapshots: list[Prediction] = []
         self.delays: list[float] = []
         self.health: dict[str, str] = {}
         # This pipeline never predicts. It decodes the inputs and holds the scene at each of them.
         self._intake = Intake(Pipeline(config))
         self._sent: dict[int, tuple[float, Scene]] = {}
-        self._times: tuple[list[float], list[float]] = ([], [])
         self._halves: dict[str, Any] = {}
 
     def add_sent(self, item: Item, now: float) -> None:
@@ -75,7 +72,6 @@ class Recorder:
         if item.role == topics.HAND and self._intake.sample is not None:
             self.samples.append(self._intake.sample)
             self._sent[self._intake.sample.stamp_ns] = (now, self._intake.pipeline.scene)
-            self._times[0].append(now)
 
     def add_received(self, name: str, message: Any, now: float) -> None:
         """Record an output of the node by its name; the two messages of a prediction may come in any order, or be lost."""
@@ -84,7 +80,6 @@ class Recorder:
         if name not in PAIR:
             return
         if name == PAIR[0]:
-            self._times[1].append(now)
             self.delays.append(now - self._sent.get(decode_stamp(message.header), (now, None))[0])
         key = f'{STAMP}{decode_stamp(message.header)}' if name == PAIR[0] else message.layout.dim[2].label
         other = self._halves.pop(key, None)
@@ -103,15 +98,10 @@ class Recorder:
         """Whether the node's diagnostics count goals and obstacles, where zero obstacles are a count, too."""
         return self.health.get('goals', 'none yet') != 'none yet' and any(name.startswith('obstacles of') for name in self.health)
 
-    def rates(self, now: float) -> tuple[int, int]:
-        """Return how many hand samples were sent and how many predictions were received within the last second."""
-        sent, received = (len(times) - bisect_right(times, now - WINDOW_S) for times in self._times)
-        return sent, received
-
-    def describe(self, now: float, items: Sequence[Item]) -> str:
-        """Return how far the recording has been played, with rates and delay."""
+    def describe(self, items: Sequence[Item]) -> str:
+        """Return how far the recording has been played, with the rates of the node's diagnostics and the delay."""
         progress = f'{(self.snapshots[-1].stamp_ns - items[0].log_ns) / NANOSECONDS:4.1f} of {_measure_duration_s(items):.1f} s'
-        rates = 'hand samples {}/s, predictions {}/s'.format(*self.rates(now))
+        rates = ', '.join(f'{name} {self.health.get(f"{key} rate [Hz]", "-")}/s' for name, key in RATES.items())
         return f'{progress}   {rates}, delay {1e3 * float(np.median(self.delays[-50:])):.0f} ms'
 
 
@@ -146,9 +136,9 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
     counters = {'counters of the node': ', '.join(counts)}
     write_report(output / 'report', 'Reaching among obstacles, live', hand, recorder.snapshots, {**facts, **counters})
     show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
+    show_text(describe_lead(hand, recorder.snapshots))
     print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
     show_address(output / 'report' / 'index.html')
-    show_text(describe_lead(hand, recorder.snapshots))
     if words := describe_late(recorder.snapshots):
         show_text(words)
     return 0
@@ -181,26 +171,24 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: thread
         if name in (*PAIR, DIAGNOSTICS):
             recorder.add_received(name, TYPESTORE.deserialize_cdr(raw, RECEIVED[topic]), now)
 
-    with tempfile.TemporaryDirectory(prefix='foc_ros_demo_') as logs, reserve_domain() as domain:
-        environment = private_environment(domain, Path(logs))
-        with set_environment(environment), NodeProcess(environment, Path(logs) / 'node.txt') as node, show_live() as show:
-            from foc_ros.ros.player import Player  # rclpy reads the environment when it is imported
+    with isolated_graph() as (domain, logs), NodeProcess(os.environ, logs / 'node.txt') as node, show_live() as show:
+        from foc_ros.ros.player import Player  # rclpy reads the environment when it is imported
 
-            def tick() -> bool:
-                node.check()
+        def tick() -> bool:
+            node.check()
+            now = time.monotonic()
+            if recorder.snapshots:
+                show(now, recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
+            return not stopped.is_set()
+
+        with Player(items, RECEIVED, receive, tick, domain) as player:
+            if not player.connect(lambda: recorder.is_scene_known):
+                return
+            began = time.monotonic()
+            for item in player.play():
                 now = time.monotonic()
-                if recorder.snapshots:
-                    show(now, recorder.snapshots[-1], recorder.describe(now, items), recorder.samples[-1].position)
-                return not stopped.is_set()
-
-            with Player(items, RECEIVED, receive, tick, domain) as player:
-                if not player.connect(lambda: recorder.is_scene_known):
-                    return
-                began = time.monotonic()
-                for item in player.play():
-                    now = time.monotonic()
-                    recorder.add_sent(item, now)
-                    note(f'/{item.role}', topics.TYPES[item.role], item.raw, now)
+                recorder.add_sent(item, now)
+                note(f'/{item.role}', topics.TYPES[item.role], item.raw, now)
 
 
 @contextmanager
@@ -215,16 +203,16 @@ def _catch_interrupts() -> Iterator[threading.Event]:
             signal.signal(number, handler)
 
 
-def describe_lead(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> str:
+def describe_lead(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> str:
     """Return how long before the end of the movements the goals that were reached had become the most likely ones."""
     leads = []
-    for start_ns, end_ns in hand.find_movements(ONSET_SPEED):
+    for start_ns, end_ns in hand.find_movements():
         inside = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.most_likely is not None]
         if not inside:
             continue
-        goal, distance = find_goal_at_end(hand.positions[hand.between(start_ns, end_ns)], inside[-1].goals)
+        goal, distance = find_goal_at_end(hand.positions[hand.between(start_ns, end_ns)], inside[-1].goal_positions)
         if distance <= AT_GOAL_M:
-            others = [each.stamp_ns for each in inside if parse_label(str(each.most_likely), ())[0] != f'goal{goal}']
+            others = [each.stamp_ns for each in inside if each.candidates[0].candidate.goal != goal]
             first = next((each.stamp_ns for each in inside if not others or each.stamp_ns > others[-1]), end_ns)
             leads.append(((end_ns - first) / NANOSECONDS, (end_ns - start_ns) / NANOSECONDS))
     if not leads:

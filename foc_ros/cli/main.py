@@ -19,9 +19,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from cyclopts import CycloptsError, MissingArgumentError, RepeatArgumentError, UnknownOptionError, UnusedCliTokensError
+from cyclopts import CycloptsError
 
-from foc_ros.core.errors import FocError, list_messages, print_warnings, suggest
+from foc_ros.core.errors import FocError, list_messages, print_warnings
 
 from . import commands, studies  # noqa: F401  they declare the commands of the program
 from .options import app
@@ -32,7 +32,7 @@ INTERRUPTED, PIPE_CLOSED = 130, 141
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return the exit code; arguments: those of the process by default, without its name."""
+    """Run one command, without one the help, and return the exit code; arguments: those of the process by default."""
     if sys.stdout is None:  # the process was started with its standard output closed
         sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
     if arguments is None and sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ['MPLBACKEND'] = 'agg'
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors='backslashreplace')  # a name of a file or topic may have characters that it cannot show
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    given = list(sys.argv[1:] if arguments is None else arguments) or ['--help']
     program = ' '.join(['foc_ros', *given[:1]])
     try:
         with handle_interrupts(), print_warnings(program):
@@ -58,11 +58,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(given: list[str], program: str) -> int:
-    words = f'{", ".join(list_commands())} are the commands (foc_ros --help explains them)'
-    if not given:
-        return _reject('foc_ros', [f'no command is given; {words}'])
-    if not given[0].startswith('-') and given[0] not in {*list_commands(), *MOVED}:
-        return _reject('foc_ros', [f'there is no command {given[0]}{suggest(given[0], list_commands())}; {words}'])
     try:
         if given[0] in MOVED:
             raise FocError(MOVED[given[0]])
@@ -71,7 +66,8 @@ def _run(given: list[str], program: str) -> int:
         command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
         return int(command(*bound.args, **bound.kwargs) or 0)
     except CycloptsError as error:
-        return _reject(program, [_describe(error, given[0])])
+        error.verbose = False
+        return _reject(program, [str(error)])
     except FocError as error:
         return _reject(program, list_messages(error))
 
@@ -79,21 +75,6 @@ def _run(given: list[str], program: str) -> int:
 def list_commands() -> list[str]:
     """Return the names of all commands."""
     return [name for name in app if not name.startswith('-')]
-
-
-def _describe(error: CycloptsError, command: str) -> str:
-    """Return in words why arguments cannot be used."""
-    error.verbose = False
-    if isinstance(error, MissingArgumentError) and error.argument is not None:
-        return f'{error.keyword or error.argument.name}: expected a value, got none'
-    if isinstance(error, RepeatArgumentError):
-        return f'argument {error.token.keyword}: given twice'
-    if isinstance(error, UnknownOptionError | UnusedCliTokensError):
-        token = error.token if isinstance(error, UnknownOptionError) else None
-        unknown = (error.unused_tokens or []) if token is None else [token.keyword or token.value]
-        options = [each.name for each in app[command].assemble_argument_collection()]
-        return f'unrecognized arguments: {" ".join(f"{each}{suggest(each, options)}" for each in unknown)}'
-    return str(error)
 
 
 def _reject(program: str, messages: Sequence[str]) -> int:

@@ -19,11 +19,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Group, Parameter, Token
+from cyclopts.types import ExistingPath
+from cyclopts.validators import Number
 
 import foc_ros
 from foc_ros.analysis.simulation import ASSISTANCE, OPERATORS
 from foc_ros.core.config import ONLINE, Config
-from foc_ros.core.errors import InputError, RecordingError, collect_all, suggest
+from foc_ros.core.errors import InputError, collect_all, suggest
 from foc_ros.io.outputs import check_file, check_page
 from foc_ros.io.topics import TYPES
 from foc_ros.ros.parameters import load_parameter_file
@@ -57,20 +59,12 @@ def _read(read: Callable[[str], Any], **options: Any) -> Parameter:
     return Parameter(converter=lambda _, tokens: read(tokens[0].value), n_tokens=1, accepts_keys=False, **options)
 
 
-def _whole(low: int, high: int, **options: Any) -> Parameter:
+def _whole(low: int, high: int) -> Parameter:
     """Return the parameter of a whole number in [low, high]."""
-
-    def read(_: object, tokens: Sequence[Token]) -> int:
-        text = tokens[0].value
-        value = int(text) if text.removeprefix('-').isdecimal() and len(text) < 20 else None
-        if value is None or not low <= value <= high:
-            raise InputError(str(tokens[0].keyword), f'a whole number in [{low}, {high}]', text)
-        return value
-
-    return Parameter(converter=read, n_tokens=1, allow_leading_hyphen=True, **options)
+    return Parameter(validator=Number(gte=low, lte=high))
 
 
-def _names(known: tuple[str, ...]) -> Parameter:
+def names(known: tuple[str, ...]) -> Parameter:
     """Return the parameter of names with commas between them, each of which is taken once."""
 
     def read(_: object, tokens: Sequence[Token]) -> tuple[str, ...]:
@@ -83,12 +77,6 @@ def _names(known: tuple[str, ...]) -> Parameter:
         return tuple(collect_all(check, [(name,) for name in dict.fromkeys(tokens[0].value.split(','))]))
 
     return Parameter(converter=read, n_tokens=1, metavar='A,B')
-
-
-def _read_existing_path(text: str) -> Path:
-    if not Path(text).exists():
-        raise RecordingError(f'{text}: no such file or directory')
-    return Path(text)
 
 
 def _read_address(text: str) -> str:
@@ -116,7 +104,7 @@ def _read_remaps(_: object, tokens: Sequence[Token]) -> tuple[tuple[str, str], .
 
 
 DEFAULTS = Config()
-Existing = Annotated[Path, _read(_read_existing_path)]
+Existing = ExistingPath
 Params = Annotated[Config, _read(load_parameter_file, name='--params', metavar='YAML', show_default=False)]
 Remaps = Annotated[
     tuple[tuple[str, str], ...],
@@ -126,9 +114,9 @@ Samples = Annotated[int, _whole(1, MOST_SAMPLES)]
 Port = Annotated[int, _whole(0, LARGEST_PORT)]
 Trials = Annotated[int, _whole(1, MOST_TRIALS)]
 Seed = Annotated[int, _whole(0, MOST_TRIALS)]
-Operators = Annotated[tuple[str, ...], _names(OPERATORS)]
-Assistance = Annotated[tuple[str, ...], _names(ASSISTANCE)]
-Allowed = Annotated[tuple[str, ...], _names(ALLOWED)]
+Operators = Annotated[tuple[str, ...], names(OPERATORS)]
+Assistance = Annotated[tuple[str, ...], names(ASSISTANCE)]
+Allowed = Annotated[tuple[str, ...], names(ALLOWED)]
 
 
 @Parameter(name='*')

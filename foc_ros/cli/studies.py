@@ -6,7 +6,10 @@ from __future__ import annotations
 
 import json as json_format
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from foc_ros.analysis.simulation import ASSISTANCE, HUMAN_PATHS, OPERATORS
 from foc_ros.core.errors import InputError, RecordingError
@@ -172,6 +175,19 @@ def simulate(
     recordings
         Recordings of people, as for evaluate, for the operator human_paths.
     """
+    return run_simulation(operators, assistance, trials, seed, recordings, study)
+
+
+def run_simulation(
+    operators: tuple[str, ...] | None,
+    assistance: tuple[str, ...],
+    trials: int,
+    seed: int,
+    recordings: Path | None,
+    study: Study,
+    rivals: Mapping[str, Any] = MappingProxyType({}),
+) -> int:
+    """Run the study of `simulate`, with further assistance rules by name; return the exit code."""
     from foc_ros.analysis.recordings import find_recordings
 
     study.check(SIMULATION_PAGE)
@@ -181,11 +197,11 @@ def simulate(
     found = find_recordings(recordings) if recordings is not None and HUMAN_PATHS in operators else {}
     write_report = study.load_report('simulation_report')
     from foc_ros.analysis.simulation.operators import read_tasks
-    from foc_ros.analysis.simulation.study import make_pairs, make_tables, simulate, summarise
+    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, simulate, summarise
 
     tasks = read_tasks(found.values(), study.params) if found else []
     with study.open_workers():
-        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params)
+        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params, {**RULES, **rivals})
     cells = summarise(results, seed)
     write_report(cells, results, study.params)
     study.show({'cells': cells, 'seed': seed}, make_tables(cells), (), SIMULATION_PAGE)

@@ -35,8 +35,7 @@ except ImportError as error:
 
 from . import topics
 from .channels import TYPESTORE as TYPESTORE
-from .checksums import add_checksums
-from .mcap_files import McapFile
+from .mcap_files import McapFile, add_checksums
 from .sqlite_files import SqliteFile
 
 FILE_TYPES: dict[str, type[McapFile | SqliteFile]] = {'.mcap': McapFile, '.db3': SqliteFile}

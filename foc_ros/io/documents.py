@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Hashable, Iterable
 from pathlib import Path
@@ -19,8 +18,6 @@ MAX_BYTES = 5_000_000
 """Size beyond that of any scene or parameter file; the YAML parser takes half a minute for it."""
 MAX_DEPTH = 20
 """Mappings and lists within each other; the deepest file, a parameter file with quality of service, needs six."""
-MAX_DIGITS = 400
-"""Digits of a whole number. One with more remains a text, because Python refuses to convert it; no field accepts either."""
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -48,12 +45,11 @@ class _StrictLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> Any:
-        """Return the number; see :data:`MAX_DIGITS`."""
-        is_number = len(node.value) <= MAX_DIGITS and not set(':_') & set(node.value)
-        return super().construct_yaml_int(node) if is_number else node.value
+        """Return the number; `1:30` and `1_0` remain texts, as they are for ROS and YAML 1.2."""
+        return super().construct_yaml_int(node) if not set(':_') & set(node.value) else node.value
 
     def construct_yaml_float(self, node: yaml.ScalarNode) -> Any:
-        """Return the number; `1:30.0` and `1_0.0` remain texts, as they are for ROS and YAML 1.2."""
+        """Return the number; `1:30.0` and `1_0.0` remain texts, too."""
         return super().construct_yaml_float(node) if not set(':_') & set(node.value) else node.value
 
 
@@ -73,7 +69,7 @@ def read_document(file: Path) -> Any:
         if len(held) > MAX_BYTES:
             raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got more')
         text = held.decode('utf-8-sig')
-        document = _parse_json(text) if is_json else parse_yaml(text)
+        document = json.loads(text, object_pairs_hook=_build_mapping) if is_json else parse_yaml(text)
         _check_depth(document)
         return document
     except OSError as error:
@@ -87,20 +83,6 @@ def read_document(file: Path) -> Any:
 def parse_yaml(text: str) -> Any:
     """Return the content of a YAML text; raises ValueError or YAMLError."""
     return yaml.load(text, _StrictLoader)  # noqa: S506
-
-
-def _parse_json(text: str) -> Any:
-    return json.loads(text, object_pairs_hook=_build_mapping, parse_int=_parse_integer, parse_float=_parse_float)
-
-
-def _parse_integer(text: str) -> int | str:
-    return int(text) if len(text) <= MAX_DIGITS else text
-
-
-def _parse_float(text: str) -> float | str:
-    """Return the number; one beyond all floats, such as 1e400, remains a text, so that a message shows what was given."""
-    value = float(text)
-    return value if math.isfinite(value) else text
 
 
 def _build_mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

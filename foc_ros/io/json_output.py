@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.guidance.guide import GuidanceOutput
-from foc_ros.core.prediction import HeightTrajectory, PredictedCandidate, Prediction
+from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import LEFT, Solution
-from foc_ros.core.types import Array
 
 
 def encode_prediction(prediction: Prediction) -> dict[str, Any]:
@@ -40,31 +39,27 @@ def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
     [m] at steps 0..N. Where the height over the plane is predicted, also height, height_velocity and height_stddev (N + 1,) [m,
     m/s]. Numbers that are not finite become null.
     """
-    solution = candidate.solution
+    solution, height = candidate.solution, candidate.height
     variances = np.diagonal(solution.covariance[:, :2, :2], axis1=1, axis2=2)
-    return {
+    values = {
         'label': candidate.label,
         'description': candidate.description,
         'goal': candidate.candidate.goal,
         'sides': {name: 'left' if side == LEFT else 'right' for name, side in candidate.sides.items()},
         'status': solution.status.value,
-        'effort': encode_number(solution.effort),
-        'cost': encode_number(candidate.cost),
-        'eta': encode_number(solution.eta),
-        'tau': encode_number(solution.tau),
-        'lambda': encode_number(solution.lam),
-        'likelihood': encode_number(candidate.likelihood),
+        'effort': solution.effort,
+        'cost': candidate.cost,
+        'eta': solution.eta,
+        'tau': solution.tau,
+        'lambda': solution.lam,
+        'likelihood': candidate.likelihood,
         'qp_solves': solution.qp_solves,
-        'mean': encode_table(solution.path),
-        'stddev': encode_table(np.sqrt(np.maximum(variances, 0.0))),
-        **({} if candidate.height is None else _encode_height(candidate.height)),
+        'mean': solution.path,
+        'stddev': np.sqrt(np.maximum(variances, 0.0)),
     }
-
-
-def _encode_height(height: HeightTrajectory) -> dict[str, Any]:
-    columns = height.mean[:, 0], height.mean[:, 1], height.stddev
-    names = 'height', 'height_velocity', 'height_stddev'
-    return {name: [encode_number(value) for value in column.tolist()] for name, column in zip(names, columns, strict=True)}
+    if height is not None:
+        values |= {'height': height.mean[:, 0], 'height_velocity': height.mean[:, 1], 'height_stddev': height.stddev}
+    return {name: _make_plain(value) for name, value in values.items()}
 
 
 def encode_solution(solution: Solution) -> dict[str, Any]:
@@ -74,45 +69,34 @@ def encode_solution(solution: Solution) -> dict[str, Any]:
     only position and velocity; covariance (N + 1, n, n) of the state; control (N, 2).
     """
     contacts = zip(solution.multipliers, solution.equivalent_weights, strict=True)
-    has_acceleration = solution.mean.shape[1] >= 6
-    return {
+    places = {name: getattr(solution, name) for name in ('eta_at', 'violation_at')}
+    values = {
         'solve_ms': 1e3 * solution.solve_s,
-        'velocity': encode_table(solution.mean[:, 2:4]),
+        'velocity': solution.mean[:, 2:4],
         'message': solution.message,
-        'costs': {name: encode_number(value) for name, value in solution.costs.items()},
-        'eta_at': _encode_place(solution.eta_at),
+        'costs': solution.costs,
         'eta_reachable': solution.eta_reachable,
-        'violation': encode_number(solution.violation),
-        'violation_at': _encode_place(solution.violation_at),
+        'violation': solution.violation,
+        **{name: place and {'obstacle': place[0], 'step': place[1]} for name, place in places.items()},
         'rows': [
-            {
-                'obstacle': name,
-                'step': step,
-                'multiplier': encode_number(multiplier),
-                'tau': encode_number(tau),
-                'lambda': encode_number(lam),
-            }
+            {'obstacle': name, 'step': step, 'multiplier': multiplier, 'tau': tau, 'lambda': lam}
             for (name, step, multiplier), (tau, lam) in contacts
         ],
         'iterations': solution.iterations,
-        'acceleration': encode_table(solution.mean[:, 4:6]) if has_acceleration else None,
-        'control': encode_table(solution.control),
-        'covariance': [encode_table(each) for each in solution.covariance],
+        'acceleration': solution.mean[:, 4:6] if solution.mean.shape[1] >= 6 else None,
+        'control': solution.control,
+        'covariance': solution.covariance,
     }
+    return {name: _make_plain(value) for name, value in values.items()}
 
 
-def encode_number(value: float) -> float | None:
-    """Return a number, None if it is not finite: JSON has no such numbers."""
-    return float(value) if math.isfinite(value) else None
-
-
-def encode_table(rows: Array) -> list[list[float | None]]:
-    """Return an array (m, k) as lists of numbers."""
-    return [[encode_number(value) for value in row] for row in rows.tolist()]
-
-
-def _encode_place(place: tuple[str, float] | None) -> dict[str, Any] | None:
-    return None if place is None else {'obstacle': place[0], 'step': place[1]}
+def _make_plain(value: Any) -> Any:
+    """Return mappings, lists and arrays of numbers for JSON, which has none that are not finite: they become null."""
+    if isinstance(value, dict):
+        return {name: _make_plain(each) for name, each in value.items()}
+    if isinstance(value, (list, np.ndarray)):
+        return [_make_plain(each) for each in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def encode_guidance(stamp_ns: int, output: GuidanceOutput) -> dict[str, Any]:

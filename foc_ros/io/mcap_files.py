@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One MCAP file: its channels, and the messages of those that are needed.
+"""One MCAP file: its channels, the messages of those that are needed, and the checksums of a new one.
 
 The file is read from begin to end once before its messages are, by the library mcap, which compares the checksums of the chunks
 and of the data section. So no optional record is needed: neither the summary nor any index. A file without its footer, whose
@@ -19,11 +19,15 @@ from mcap.exceptions import EndOfFile
 from mcap.records import Channel as ChannelRecord
 from mcap.records import Message, Schema, Statistics
 from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
 
 from foc_ros.core.errors import RecordingError
 
 from .channels import Channel
-from .checksums import FOOTER, MAGIC, check_summary
+
+MAGIC = b'\x89MCAP0\r\n'
+FOOTER_BYTES = 37
+"""Size of the end of a file: the footer, and MAGIC."""
 
 
 class McapFile:
@@ -39,10 +43,8 @@ class McapFile:
     def __init__(self, path: Path) -> None:
         self._stream = path.open('rb')
         try:
-            is_cut = not _has_footer(self._stream)
-            self.loss = 'the recorder was killed; read up to the last whole chunk' if is_cut else ''
-            if not is_cut:
-                check_summary(self._stream)
+            has_footer = _has_footer(self._stream)
+            self.loss = '' if has_footer else 'the recorder was killed; read up to the last whole chunk'
             self._scan()
         except BaseException:
             self.close()
@@ -96,12 +98,31 @@ class McapFile:
 def _has_footer(stream: BinaryIO) -> bool:
     """Return whether the file ends as a whole one does."""
     size = stream.seek(0, 2)
-    stream.seek(max(size - FOOTER.size, 0))
+    stream.seek(max(size - FOOTER_BYTES, 0))
     end = stream.read()
-    return size > FOOTER.size + len(MAGIC) and end.startswith(b'\x02') and end.endswith(MAGIC)
+    return size > FOOTER_BYTES + len(MAGIC) and end.startswith(b'\x02') and end.endswith(MAGIC)
 
 
 def _describe(channel: ChannelRecord, schema: Schema | None, count: int) -> Channel:
     name, form, text = ('', '', b'') if schema is None else (schema.name, schema.encoding, schema.data)
     qos = channel.metadata.get('offered_qos_profiles', '')
     return Channel(channel.id, channel.topic, name, channel.message_encoding, form, text.decode(errors='replace'), qos, count)
+
+
+def add_checksums(file: Path) -> None:
+    """Write a whole file anew, with all checksums: rosbags writes none. Raises OSError if it cannot be written."""
+    copy, schemas, channels = file.with_name(f'{file.name}.unfinished'), {0: 0}, dict[int, int]()
+    with file.open('rb') as source, copy.open('wb') as target:
+        writer = Writer(target, compression=CompressionType.NONE, enable_data_crcs=True)
+        writer.start('ros2', 'foc_ros')
+        for record in StreamReader(source).records:
+            if isinstance(record, Schema) and record.id not in schemas:
+                schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+            elif isinstance(record, ChannelRecord) and record.id not in channels:
+                head = record.topic, record.message_encoding, schemas[record.schema_id]
+                channels[record.id] = writer.register_channel(*head, record.metadata)
+            elif isinstance(record, Message):
+                content = record.log_time, record.data, record.publish_time, record.sequence
+                writer.add_message(channels[record.channel_id], *content)
+        writer.finish()
+    copy.replace(file)

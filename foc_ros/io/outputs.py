@@ -12,7 +12,7 @@ from foc_ros.core.errors import InputError
 MARK = 'made by foc_ros'
 """Text that every picture and page contains that a command writes."""
 EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE = 'evaluation.html', 'fit.html', 'simulation.html'
-REPORT_FILES, OVERVIEW = ('index.html', 'predictions.json'), 'overview.png'
+REPORT_FILES = ('index.html', 'predictions.json', 'overview.png')
 """Files of the report of a recording."""
 PICTURE_SUFFIXES = ('.png', '.pdf', '.svg')
 
@@ -42,16 +42,10 @@ def check_picture(option: str, file: Path) -> None:
     check_replaceable(option, file)
 
 
-def check_page(option: str, directory: Path, page: str) -> None:
-    """Raise InputError, which names the option, if a page cannot be written into a directory without harm to another file."""
+def check_page(option: str, directory: Path, *names: str) -> None:
+    """Raise InputError, which names the option, if files cannot be written into a directory without harm to others."""
     check_folder(option, directory)
-    check_replaceable(option, directory / page)
-
-
-def check_report(option: str, directory: Path) -> None:
-    """Raise InputError, which names the option, if a report would overwrite a file that is no part of an earlier report."""
-    check_folder(option, directory)
-    check_replaceable(option, *(directory / name for name in (*REPORT_FILES, OVERVIEW)))
+    check_replaceable(option, *(directory / name for name in names))
 
 
 def check_replaceable(option: str, *files: Path) -> None:

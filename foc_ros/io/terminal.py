@@ -60,36 +60,27 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str
     """
     cells = [[*each] for each in rows]
     first, *widths = [max(map(_measure, column)) for column in zip(columns, *cells, strict=True)]
-    if first + sum(each + 2 for each in widths) <= COLUMNS:
-        _show_part(range(len(columns)), columns, cells, title)
-        return
-    widths[-1:] = [min(each, LEAST_LAST) for each in widths[-1:]]
-    longest_word = max((len(word) for row in (columns, *cells) for word in row[0].split()), default=0)
-    if min(longest_word, LONGEST_FIRST) + sum(each + 1 for each in widths) <= COLUMNS:
-        _show_part(range(len(columns)), columns, cells, title, gap=0)
-        return
-    parts: list[list[int]] = []
-    left = 0
+    gap = int(first + sum(each + 2 for each in widths) <= COLUMNS)  # between two columns, beside 1
+    if not gap:
+        longest_word = max((len(word) for row in (columns, *cells) for word in row[0].split()), default=0)
+        widths[-1:] = [min(each, LEAST_LAST) for each in widths[-1:]]
+        is_enough = longest_word + sum(each + 1 for each in widths) <= COLUMNS
+        first = min(longest_word if is_enough else first, LONGEST_FIRST)
+    parts, left = [[0]], COLUMNS - first
     for number, width in enumerate(widths, 1):
-        if width >= left:
+        if width + gap >= left and len(parts[-1]) > 1:
             parts.append([0])
-            left = COLUMNS - min(first, LONGEST_FIRST)
+            left = COLUMNS - first
         parts[-1].append(number)
-        left -= width + 1
+        left -= width + 1 + gap
     for part in parts:
-        _show_part(part, columns, cells, title if part is parts[0] else '', gap=0)
-
-
-def _show_part(
-    part: Sequence[int], columns: Sequence[str], rows: Sequence[Sequence[str]], title: str | None, gap: int = 1
-) -> None:
-    """Print some columns of a table, of which the first one and the last one of all may be folded; gap: between two, beside 1."""
-    table = Table(title=title, title_justify='left', box=SIMPLE_HEAD, show_edge=False, padding=(0, gap, 0, 0))
-    for number in part:
-        table.add_column(columns[number], no_wrap=0 < number < len(columns) - 1, overflow='fold')
-    for row in rows:
-        table.add_row(*(row[number] for number in part))
-    _Console(width=COLUMNS, markup=False, emoji=False).print(table)
+        heading = title if part is parts[0] else ''
+        table = Table(title=heading, title_justify='left', box=SIMPLE_HEAD, show_edge=False, padding=(0, gap, 0, 0))
+        for number in part:
+            table.add_column(columns[number], no_wrap=0 < number < len(columns) - 1, overflow='fold')
+        for row in cells:
+            table.add_row(*(row[number] for number in part))
+        _Console(width=COLUMNS, markup=False, emoji=False).print(table)
 
 
 def _measure(text: str) -> int:

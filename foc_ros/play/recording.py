@@ -26,8 +26,9 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, HandSample, as_readonly
 from foc_ros.io.bags import TYPESTORE, BagWriter
 from foc_ros.io.topics import TYPES
-from foc_ros.reporting.report import Table, write_report
-from foc_ros.reporting.views import Snapshot, build_hand_trajectory
+from foc_ros.reporting.page import Table
+from foc_ros.reporting.report import write_report
+from foc_ros.reporting.views import build_hand_trajectory
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, Place
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import MessageTypes
@@ -70,7 +71,7 @@ class Recording:
         self._trial: list[tuple[str, bytes, int]] | None = None
         self._trials = {UNGUIDED: 0, GUIDED: 0}
         self._samples: list[HandSample] = []
-        self._snapshots: list[Snapshot] = []
+        self._snapshots: list[Prediction] = []
         write_parameter_file('--data', self.folder / PARAMETERS, config)
         self._bag = BagWriter(self.folder / SESSION).__enter__()
         for role, message in scene.items():
@@ -89,11 +90,11 @@ class Recording:
         if self._trial is not None:
             self._trial.append((role, raw, now_ns))
 
-    def add_prediction(self, prediction: Prediction, snapshot: Snapshot) -> None:
+    def add_prediction(self, prediction: Prediction, snapshot: Prediction) -> None:
         """Record a prediction, and keep its snapshot for the report."""
         if not self._snapshots or snapshot.stamp_ns - self._snapshots[-1].stamp_ns >= PERIOD_NS:
             self._snapshots.append(snapshot)
-        self._add_outputs(encode_outputs(prediction, prediction.obstacles, 'xy', self._types, SENT))
+        self._add_outputs(encode_outputs(prediction, 'xy', self._types, SENT))
 
     def add_guidance(self, output: GuidanceOutput, place: Place) -> None:
         """Record guidance."""

@@ -14,11 +14,12 @@ from pydantic import Field
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.fields import Fields
-from foc_ros.reporting.encode import encode_candidate, encode_unsolved
+from foc_ros.reporting.encode import encode_candidates, encode_unsolved
 from foc_ros.reporting.tracks import Slots
-from foc_ros.reporting.views import Snapshot, parse_label
+from foc_ros.reporting.views import list_unsolved
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
 from foc_ros.ros.messages.types import MessageTypes
 
@@ -150,16 +151,16 @@ def make_random_scene(random: np.random.Generator, goals: Sequence[Place]) -> Pl
     return PlayScene(obstacles=obstacles, goals=list(goals))
 
 
-def view_candidates(snapshot: Snapshot, slots: Slots) -> list[dict[str, Any]]:
+def view_candidates(snapshot: Prediction, slots: Slots) -> list[dict[str, Any]]:
     """Return the candidates of a prediction as the page draws them, the most likely one first, those without a likelihood last.
 
     Each has, besides what `reporting.encode` says, its slot, class number (way), goal and likelihood, None where it is not known.
     """
-    given = slots.assign([each.way for each in snapshot.candidates])
+    shown, lost = snapshot.candidates_with_likelihood, list_unsolved(snapshot)
+    given = zip(shown, slots.assign([each.way for each in shown]), encode_candidates(snapshot), strict=True)
     views: list[dict[str, Any]] = [
-        {'slot': slot, 'way': each.way, 'likelihood': round(each.likelihood, 4), **encode_candidate(snapshot, each, rank == 0)}
-        for rank, (each, slot) in enumerate(zip(snapshot.candidates, given, strict=True))
+        {'slot': slot, 'way': each.way, 'likelihood': round(each.likelihood, 4), **encoded} for each, slot, encoded in given
     ]
     nothing: dict[str, Any] = {'slot': None, 'way': None, 'likelihood': None, 'motor': [], 'total': []}
-    views += [nothing | encode_unsolved(snapshot, each) for each in snapshot.unsolved]
-    return [each | {'goal': int(parse_label(each['label'], ())[0].removeprefix('goal'))} for each in views]
+    views += [nothing | encode_unsolved(snapshot, each) for each in lost]
+    return [view | {'goal': each.candidate.goal} for view, each in zip(views, (*shown, *lost), strict=True)]

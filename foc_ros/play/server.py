@@ -9,8 +9,8 @@ page of this server: other pages in the same browser can neither steer the hand 
 from __future__ import annotations
 
 import asyncio
-import ipaddress
 import json
+import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -39,23 +39,20 @@ FILES = {
     **{f'/{name}': FOLDER / name for name in ('style.css', 'play.js', 'hand.js', 'arranging.js')},
     **{f'/{name}': report_page.FOLDER / name for name in ('frame.css', 'frame.js', 'scene.js')},
 }
+REPORT = '/report'
 POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:"
 HEADERS = {'X-Content-Type-Options': 'nosniff', 'Referrer-Policy': 'no-referrer', 'Cache-Control': 'no-store'}
+OWN_HOSTS = r'localhost|[\d.]+|\[[\da-f:.]+\]'
+"""Names of this computer besides the host that it is started with: localhost, and addresses. A page of an attacker can let its
+own name lead here; it has its own origin then, but also its own host."""
 TICK_MS = 500
 SWITCH_S = 0.001
 """Longest time for which a thread keeps Python's global lock while another one waits for it [s]."""
 
 
 class _Handler(RequestHandler):
-    """A handler that answers requests to this computer only."""
-
-    def initialize(self, session: Session, host: str) -> None:
+    def initialize(self, session: Session) -> None:
         self.session = session
-        self.host = host
-
-    def prepare(self) -> None:
-        if not is_own_host(self.request.host_name, self.host):
-            raise HTTPError(403, 'the host %r is not this server', self.request.host_name)
 
     def set_default_headers(self) -> None:
         for name, value in HEADERS.items():
@@ -63,20 +60,16 @@ class _Handler(RequestHandler):
 
 
 class _PageHandler(_Handler):
-    def get(self) -> None:
-        file = FILES[self.request.path]
-        self.set_header('Content-Type', f'{TYPES[file.suffix]}; charset=utf-8')
-        self.set_header('Content-Security-Policy', POLICY)
-        self.finish(file.read_bytes())
+    """Answers with a file of the page, or with the last report."""
 
-
-class _ReportHandler(_Handler):
     def get(self) -> None:
-        if self.session.report is None:
+        is_report = self.request.path == REPORT
+        file = self.session.report if is_report else FILES[self.request.path]
+        if file is None:
             raise HTTPError(404, 'there is no report yet')
-        self.set_header('Content-Type', 'text/html; charset=utf-8')
-        self.set_header('Content-Security-Policy', report_page.POLICY)
-        self.finish(self.session.report.read_bytes())
+        self.set_header('Content-Type', f'{TYPES[file.suffix]}; charset=utf-8')
+        self.set_header('Content-Security-Policy', report_page.POLICY if is_report else POLICY)
+        self.finish(file.read_bytes())
 
 
 class _SocketHandler(_Handler, WebSocketHandler):
@@ -103,26 +96,13 @@ class _SocketHandler(_Handler, WebSocketHandler):
         self.session.close_page(self.send)
 
 
-def is_own_host(name: str, host: str) -> bool:
-    """Return whether the host of a request is this server: an address, localhost, or the name that it was started with.
-
-    A page of an attacker can let its own name lead here. It has its own origin then, but also its own host.
-    """
-    if name in ('localhost', host):
-        return True
-    try:
-        ipaddress.ip_address(name.strip('[]'))
-    except ValueError:
-        return False
-    return True
-
-
 def listen(session: Session, host: str, sockets: Sequence[socket]) -> HTTPServer:
     """Start to serve a session on the sockets of a host (`open_sockets`); return the server."""
-    given = {'session': session, 'host': host}
-    routes: list[Any] = [(path, _PageHandler, given) for path in FILES]
-    routes += [('/report', _ReportHandler, given), ('/socket', _SocketHandler, given)]
-    server = HTTPServer(Application(routes, websocket_max_message_size=LONGEST_MESSAGE, log_function=lambda _: None))
+    given = {'session': session}
+    routes: list[Any] = [*((path, _PageHandler, given) for path in (*FILES, REPORT)), ('/socket', _SocketHandler, given)]
+    application = Application(websocket_max_message_size=LONGEST_MESSAGE, log_function=lambda _: None)
+    application.add_handlers(rf'({re.escape(host.lower())}|{OWN_HOSTS})', routes)  # a request to another host finds nothing
+    server = HTTPServer(application)
     server.add_sockets(sockets)
     return server
 

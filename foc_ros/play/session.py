@@ -324,11 +324,11 @@ class Session:
         stamp_ns, snapshot = prediction.stamp_ns, build_snapshot(prediction)
         hand = next((hand for stamp, hand in reversed(self._hands) if stamp == stamp_ns), None)
         self._record(lambda recording: recording.add_prediction(prediction, snapshot))
-        if self._tasks is not None and snapshot.candidates:
+        if self._tasks is not None and snapshot.most_likely is not None:
             self._tasks.note_most_likely(stamp_ns * 1e-9, snapshot.candidates[0].way)
         if hand is not None and not self._is_blind:
             candidates = scene.view_candidates(snapshot, self._slots)
-            shares = {'unknown': round(snapshot.unknown_share, 4), 'other': round(snapshot.other_share, 4)}
+            shares = {'unknown': round(snapshot.unknown, 4), 'other': round(snapshot.other, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)
 
     # what the page is told

@@ -21,11 +21,13 @@ import numpy as np
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obstacle
+from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
+from foc_ros.ros.messages.ranking import find_drawn_curve
 
 from .legend import describe_in_legend
-from .views import COLOURS, LIKELY, SLOTS, CandidateView, HandTrajectory, Snapshot, UnsolvedView
+from .views import COLOURS, LIKELY, SLOTS, HandTrajectory, describe_ghost, list_unsolved
 
 try:
     import matplotlib as mpl
@@ -40,8 +42,6 @@ CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9
 """Colours of Okabe and Ito, without yellow (invisible on white) and black (used for the measured hand)."""
 GHOST_COLOUR = '#777777'
 """Colour of a ghost, and of a candidate without a letter."""
-STDDEVS = 1.0
-"""Size of ellipses and rings in standard deviations."""
 ELLIPSES_PER_CANDIDATE = 8
 NAMED_OBSTACLES = 30
 """The obstacles of larger scenes are drawn without their ids."""
@@ -105,9 +105,9 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
     return {'color': colour, 'linestyle': ':' if is_compromised else '-', 'linewidth': 1.2 + 3.0 * likelihood}
 
 
-def number_labels(candidates: Sequence[CandidateView]) -> dict[str, int]:
+def number_labels(snapshot: Prediction) -> dict[str, int]:
     """Return slots of the candidates of a single prediction, by label; candidates beyond the number of slots have none."""
-    return {each.label: number for number, each in enumerate(candidates[:SLOTS])}
+    return {each.label: number for number, each in enumerate(snapshot.candidates_with_likelihood[:SLOTS])}
 
 
 def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
@@ -117,10 +117,10 @@ def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
     return stddevs[..., 1], stddevs[..., 0], np.degrees(np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1]))
 
 
-def make_stddev_ellipse(centre: Array, covariance: Array, stddevs: float = STDDEVS) -> Ellipse:
-    """Return the ellipse of the given number of standard deviations; centre (2,) [m], covariance (2, 2) [m^2]."""
+def make_stddev_ellipse(centre: Array, covariance: Array) -> Ellipse:
+    """Return the ellipse of one standard deviation; centre (2,) [m], covariance (2, 2) [m^2]."""
     greater, smaller, angle = compute_ellipse_axes(covariance)
-    return Ellipse(tuple(centre), 2.0 * stddevs * float(greater), 2.0 * stddevs * float(smaller), angle=float(angle))
+    return Ellipse(tuple(centre), 2.0 * float(greater), 2.0 * float(smaller), angle=float(angle))
 
 
 def make_obstacle_patch(obstacles: Obstacles, row: int, growth: float, **look: Any) -> Patch:
@@ -131,14 +131,14 @@ def make_obstacle_patch(obstacles: Obstacles, row: int, growth: float, **look: A
 
 
 def compute_bounds(
-    obstacles: Obstacles, goals: Array, candidates: Sequence[CandidateView | UnsolvedView], *points: Array, margin: float = 0.04
+    obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array, margin: float = 0.04
 ) -> Bounds:
     """Return limits of x and y [m] around obstacles, goals, paths and further points (m, 2); ellipses do not widen them.
 
     margin: as a share of the greater side.
     """
-    shapes = find_limits(obstacles, STDDEVS * obstacles.radius_stddev)
-    enclosed = np.concatenate([*shapes, *(each.path for each in candidates), np.reshape(goals, (-1, 2)), *points])
+    shapes = find_limits(obstacles, obstacles.radius_stddev)
+    enclosed = np.concatenate([*shapes, *map(find_drawn_curve, candidates), np.reshape(goals, (-1, 2)), *points])
     low, high = (enclosed.min(axis=0), enclosed.max(axis=0)) if len(enclosed) else (np.zeros(2), np.ones(2))
     added = margin * max(*(high - low), 0.05)
     return float(low[0] - added), float(high[0] + added), float(low[1] - added), float(high[1] + added)
@@ -150,17 +150,18 @@ def draw_scene(
     """Draw obstacles and goals.
 
     An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the
-    goals (g, 2) have their names, by default the numbers in the labels of candidates.
+    goals (g, 2) have their names, by default the numbers in the labels of candidates. An obstacle that is a goal of its own name
+    has it once.
     """
     holds_goal = np.any(find_holders(goals, obstacles), axis=0).tolist()
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
-        ring = STDDEVS * float(obstacles.radius_stddev[row])
+        ring = float(obstacles.radius_stddev[row])
         look = {'facecolor': '0.65', 'edgecolor': '0.35', 'linewidth': 0.8, 'zorder': 1.0, 'label': 'obstacle'}
         axes.add_patch(make_obstacle_patch(obstacles, row, 0.0, **look))
         if ring:
             look = {'facecolor': '0.88', 'edgecolor': '0.7', 'linewidth': 0.6, 'zorder': 0.9, 'label': RADIUS_STDDEV}
             axes.add_patch(make_obstacle_patch(obstacles, row, ring, **look))
-        if len(obstacles) <= NAMED_OBSTACLES:
+        if len(obstacles) <= NAMED_OBSTACLES and not (holds_goal[row] and named and name in names):
             below = 12 if holds_goal[row] else 0  # where the sign of the goal does not cover it
             look = {'xytext': (0, -below), 'textcoords': 'offset points', 'ha': 'center', 'va': 'center'}
             axes.annotate(name, centre, fontsize=8, annotation_clip=True, **look)
@@ -174,24 +175,26 @@ def draw_scene(
     axes.set_aspect('equal')
 
 
-def draw_candidates(axes: Any, snapshot: Snapshot, slots: Mapping[str, int]) -> None:
+def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -> None:
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
     Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
     has its total uncertainty, too. Ghosts have their reasons beside them.
     """
-    ghosts = [(lost.path, describe_in_legend(lost), *snapshot.describe_ghost(lost)) for lost in snapshot.unsolved]
-    for rank, each in reversed(list(enumerate(snapshot.candidates))):
-        letter = get_letter(slots.get(each.label))
-        reason, place = snapshot.describe_ghost(each)
+    goals, lost = len(snapshot.goal_positions), list_unsolved(snapshot)
+    ghosts = [(find_drawn_curve(each), describe_in_legend(each, goals), *describe_ghost(snapshot, each)) for each in lost]
+    for rank, each in reversed(list(enumerate(snapshot.candidates_with_likelihood))):
+        letter, curve = get_letter(slots.get(each.label)), find_drawn_curve(each)
+        reason, place = describe_ghost(snapshot, each)
         if reason:
-            ghosts.append((each.curve, describe_in_legend(each, letter, reason), reason, place))
+            ghosts.append((curve, describe_in_legend(each, goals, letter, reason), reason, place))
         else:
-            style = get_candidate_style(slots.get(each.label), each.likelihood, each.is_compromised)
+            style = get_candidate_style(slots.get(each.label), each.likelihood, not each.is_solved)
             if rank == 0 or each.likelihood >= LIKELY:
                 _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
-            axes.plot(*each.curve.T, zorder=3, label=describe_in_legend(each, letter), **style)
-            draw_tag(axes, each.path[int((0.45 + 0.12 * (rank % 3)) * (len(each.path) - 1))], letter, style['color'])
+            axes.plot(*curve.T, zorder=3, label=describe_in_legend(each, goals, letter), **style)
+            path = each.solution.path
+            draw_tag(axes, path[int((0.45 + 0.12 * (rank % 3)) * (len(path) - 1))], letter, style['color'])
     entered: set[str] = set()
     for number, (curve, label, reason, place) in enumerate(ghosts):
         words = '' if reason in entered else reason  # those of one obstacle would cover each other
@@ -210,16 +213,17 @@ def _draw_ghost(axes: Any, curve: Array, label: str, words: str, place: float) -
     axes.annotate(words, curve[round(place * (len(curve) - 1))], annotation_clip=True, **look)
 
 
-def _draw_ellipses(axes: Any, candidate: CandidateView, colour: str, is_total: bool) -> None:
+def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, is_total: bool) -> None:
     """Draw the ellipses along one path: filled for motor noise, dashed for the total uncertainty where it is asked for."""
     filled = {'facecolor': to_rgba(colour, 0.3), 'edgecolor': to_rgba(colour, 0.8), 'label': MOTOR_NOISE}
     dashed = {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': TOTAL}
     looks: list[tuple[Array, dict[str, Any]]] = [(candidate.motor_covariance, filled)]
-    if is_total and candidate.is_widened:
+    if is_total and candidate.solution.motor_covariance is not None:
         looks.append((candidate.covariance, dashed))
-    for row in np.unique(np.linspace(0, len(candidate.path) - 1, ELLIPSES_PER_CANDIDATE + 1).astype(int))[1:]:
+    path = candidate.solution.path
+    for row in np.unique(np.linspace(0, len(path) - 1, ELLIPSES_PER_CANDIDATE + 1).astype(int))[1:]:
         for covariance, look in looks:
-            ellipse = make_stddev_ellipse(candidate.path[row], covariance[row])
+            ellipse = make_stddev_ellipse(path[row], covariance[row, :2, :2])
             ellipse.set(linewidth=0.8, zorder=2, **look)
             axes.add_patch(ellipse)
 

@@ -16,11 +16,13 @@ import numpy as np
 
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.geometry import find_limits
+from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve
 
-from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, STDDEVS, Bounds, Span, compute_bounds, compute_ellipse_axes
+from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Bounds, Span, compute_bounds, compute_ellipse_axes
 from .tracks import CandidateTracks
-from .views import LIKELY, CandidateView, HandTrajectory, Snapshot, UnsolvedView
+from .views import LIKELY, HandTrajectory, choose_moment, count_likely_paths, describe_ghost, list_unsolved
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
 """Units [m], [m/s], [s]."""
@@ -38,7 +40,8 @@ def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence
 
     count: of the predictions; times [s] after the first hand sample, solve_ms, and unknown, the share that no candidate has, of
     those that are drawn; tracks: for each its slot, the row of its first prediction and its likelihoods from there on; frames:
-    the predictions at which the slider stops. Obstacles, goals and labels are stored once and referred to by their row.
+    the predictions at which the slider stops; openings: the frame at which each movement opens, and opened: the movement that the
+    page shows first. Obstacles, goals and labels are stored once and referred to by their row.
     """
     count, most = len(tracks.snapshots), MOST_FRAMES
     kept = select_evenly(count, MOST_TIMES).tolist() if count else []
@@ -64,20 +67,25 @@ class _ReportData:
     def build(self, spans: Sequence[Span], bounds: Bounds, most: int) -> dict[str, Any]:
         """Return the data with at most so many frames."""
         snapshots, hand = self._tracks.snapshots, self._hand
-        frames = [self._encode_frame(row) for row in (select_evenly(len(snapshots), most).tolist() if snapshots else [])]
+        rows = select_evenly(len(snapshots), most).tolist() if snapshots else []
+        stops, frames = [snapshots[row] for row in rows], [self._encode_frame(row) for row in rows]
+        openings = [choose_moment(stops, *span) for span in spans]
+        counts = [0.0 if row is None else count_likely_paths(stops[row]) for row in openings]
         samples = select_evenly(len(hand.stamps_ns), MOST_HAND_SAMPLES)
         return {
             'unit': {'speed': SPEED, 'time': TIME},
             'named_obstacles': NAMED_OBSTACLES,
             'bounds': [round(each, 4) for each in bounds],
             'times': [self._seconds(each.stamp_ns) for each in snapshots],
-            'solve_ms': [None if each.solve_s is None else round(1e3 * each.solve_s, 2) for each in snapshots],
+            'solve_ms': [round(1e3 * each.solve_s, 2) if each.solve_s else None for each in snapshots],
             'tracks': [
                 {'slot': self._tracks.slots.get(track), 'first': first, 'share': [round_number(value) for value in values]}
                 for track, (first, values) in self._tracks.likelihoods().items()
             ],
-            'unknown': [round(each.unknown_share + each.other_share, 3) for each in snapshots],
+            'unknown': [round(each.unknown + each.other, 3) for each in snapshots],
             'movements': [[self._seconds(stamp) for stamp in span] for span in spans],
+            'openings': openings,
+            'opened': int(np.argmax(counts)),
             'hand': {
                 't': _quantise_differences(hand.seconds_after(self._origin_ns)[samples], TIME),
                 'v': _quantise_differences(hand.speed[samples], SPEED),
@@ -92,17 +100,15 @@ class _ReportData:
     def _encode_frame(self, row: int) -> dict[str, Any]:
         snapshot, tracks = self._tracks.snapshots[row], self._tracks.tracks[row]
         scene = json.dumps(_encode_obstacles(snapshot.obstacles))
-        goals = json.dumps([_quantise(goal, LENGTH) for goal in snapshot.goals])
-        candidates = [
-            self._store_texts({'track': tracks[each.label], **encode_candidate(snapshot, each, rank == 0)})
-            for rank, each in enumerate(snapshot.candidates)
-        ]
+        goals = json.dumps([_quantise(goal, LENGTH) for goal in snapshot.goal_positions])
+        found = zip(snapshot.candidates_with_likelihood, encode_candidates(snapshot), strict=True)
+        candidates = [self._store_texts({'track': tracks[each.label], **encoded}) for each, encoded in found]
         return {
             'at': row,
             'scene': self._scenes.setdefault(scene, len(self._scenes)),
             'goals': self._goals.setdefault(goals, len(self._goals)),
             'candidates': candidates,
-            'unsolved': [self._store_texts(encode_unsolved(snapshot, each)) for each in snapshot.unsolved],
+            'unsolved': [self._store_texts(encode_unsolved(snapshot, each)) for each in list_unsolved(snapshot)],
         }
 
     def _store_texts(self, encoded: dict[str, Any]) -> dict[str, Any]:
@@ -115,47 +121,57 @@ class _ReportData:
         return round((stamp_ns - self._origin_ns) / NANOSECONDS, 4)
 
 
-def encode_candidate(snapshot: Snapshot, candidate: CandidateView, is_most_likely: bool) -> dict[str, Any]:
-    """Return one candidate of a snapshot.
+def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
+    """Return the candidates with a likelihood, the most likely first.
 
     ghost: why it is no proper prediction, or ''; ghost_at: share of the path at which that is, or None; t and v: at some of
     the steps; motor: ellipses of the motor noise, none of a candidate that is less than LIKELY; total: of the uncertainty of the
     most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard deviation, and the angle of
     the greater one [degrees].
     """
-    ghost, ghost_at = snapshot.describe_ghost(candidate)
-    points = select_evenly(len(candidate.path), PATH_POINTS)
-    marks = select_evenly(len(candidate.path), ELLIPSES_PER_CANDIDATE + 1)[1:]
-    is_drawn, is_likely = is_most_likely and candidate.is_widened, is_most_likely or candidate.likelihood >= LIKELY
+    shown = snapshot.candidates_with_likelihood
+    ranked = enumerate(zip(shown, compute_cost_ratios(shown), strict=True))
+    return [_encode_candidate(snapshot, each, ratio, rank == 0) for rank, (each, ratio) in ranked]
+
+
+def _encode_candidate(snapshot: Prediction, candidate: PredictedCandidate, ratio: float, is_first: bool) -> dict[str, Any]:
+    path, (ghost, ghost_at) = candidate.solution.path, describe_ghost(snapshot, candidate)
+    points = select_evenly(len(path), PATH_POINTS)
+    marks = select_evenly(len(path), ELLIPSES_PER_CANDIDATE + 1)[1:]
+    is_widened, is_likely = candidate.solution.motor_covariance is not None, is_first or candidate.likelihood >= LIKELY
     return {
         'label': candidate.label,
-        'description': candidate.description,
+        'description': describe_candidate(candidate, len(snapshot.goal_positions)),
         'ghost': ghost,
         'ghost_at': None if ghost_at is None else round(ghost_at, 2),
-        'ratio': round_number(candidate.cost_ratio),
+        'ratio': round_number(ratio),
         'eta': round_number(candidate.eta),
-        'compromised': candidate.is_compromised,
-        **_encode_points(candidate.curve, PATH_POINTS),
+        'compromised': not candidate.is_solved,
+        **_encode_points(find_drawn_curve(candidate), PATH_POINTS),
         't': _quantise_differences(candidate.times[points], TIME),
-        'v': _quantise_differences(candidate.speed[points], SPEED),
-        'motor': _encode_ellipses(candidate.path[marks], candidate.motor_covariance[marks]) if is_likely else [],
-        'total': _encode_ellipses(candidate.path[marks], candidate.covariance[marks]) if is_drawn else [],
+        'v': _quantise_differences(np.linalg.norm(candidate.mean[points, 2:4], axis=1), SPEED),
+        'motor': _encode_ellipses(path[marks], candidate.motor_covariance[marks]) if is_likely else [],
+        'total': _encode_ellipses(path[marks], candidate.covariance[marks]) if is_first and is_widened else [],
     }
 
 
-def encode_unsolved(snapshot: Snapshot, view: UnsolvedView) -> dict[str, Any]:
+def encode_unsolved(snapshot: Prediction, candidate: PredictedCandidate) -> dict[str, Any]:
     """Return one candidate without a likelihood."""
-    texts = {name: getattr(view, name) for name in ('label', 'description', 'reason')}
-    return {**texts, 'ghost': snapshot.describe_ghost(view)[0], **_encode_points(view.path, UNSOLVED_POINTS)}
+    texts = {
+        'label': candidate.label,
+        'description': describe_candidate(candidate, len(snapshot.goal_positions)),
+        'reason': candidate.reason,
+        'ghost': describe_ghost(snapshot, candidate)[0],
+    }
+    return texts | _encode_points(find_drawn_curve(candidate), UNSOLVED_POINTS)
 
 
-def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Snapshot]) -> Bounds:
+def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> Bounds:
     """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying paths."""
     points = [hand.positions]
     for each in snapshots:
-        points += [each.goals, *find_limits(each.obstacles, STDDEVS * each.obstacles.radius_stddev)]
-    paths = [candidate.path for each in snapshots for candidate in each.candidates]
-    paths += [lost.path for each in snapshots for lost in each.unsolved]
+        points += [each.goal_positions, *find_limits(each.obstacles, each.obstacles.radius_stddev)]
+    paths = [find_drawn_curve(candidate) for each in snapshots for candidate in each]
     points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
     return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
 
@@ -172,7 +188,7 @@ def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.i
 
 def _encode_obstacles(obstacles: Obstacles) -> list[list[str | int]]:
     """Return obstacles: name, centre, radius and its standard deviation, then two vertices or more, relative to the centre."""
-    rows = np.column_stack([obstacles.centre, obstacles.radius, STDDEVS * obstacles.radius_stddev])
+    rows = np.column_stack([obstacles.centre, obstacles.radius, obstacles.radius_stddev])
     polygons = [obstacles.vertices[row, : corners if corners > 1 else 0] for row, corners in enumerate(obstacles.corners)]
     return [
         [name, *_quantise(row, LENGTH), *_quantise(polygon.ravel(), LENGTH)]
@@ -182,7 +198,7 @@ def _encode_obstacles(obstacles: Obstacles) -> list[list[str | int]]:
 
 def _encode_ellipses(centres: Array, covariance: Array) -> list[list[int]]:
     greater, smaller, angle = compute_ellipse_axes(covariance)
-    lengths = np.column_stack([centres, STDDEVS * greater, STDDEVS * smaller])
+    lengths = np.column_stack([centres, greater, smaller])
     return [[*_quantise(each, LENGTH), round(degrees)] for each, degrees in zip(lengths, angle.tolist(), strict=True)]
 
 

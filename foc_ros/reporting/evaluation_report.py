@@ -18,19 +18,10 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config
 from foc_ros.io.outputs import EVALUATION_PAGE
 
-from .draw import open_figure
-from .example import render_example, warn_of_few
-from .page import (
-    place_legend,
-    render_figure,
-    render_list,
-    render_page,
-    render_pictures,
-    render_tables,
-    write_page,
-)
+from .example import draw_example, warn_of_few
+from .page import Picture, Section, explain_tables, make_chart, write_page
 
-WIDTH_IN, HEIGHT_IN = 6.4, 4.6
+SIZE_IN = 6.4, 4.6
 WEIGHTED, AHEAD_S, LEVEL = 'likelihood-weighted', '0.5', '0.9'
 """The predicted position, the time ahead [s] and the probability of a region that the summary is about."""
 COUNTS = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
@@ -39,8 +30,6 @@ CAPTIONS = {
     GOAL: 'Goal: mean log-likelihood of the true goal above a uniform guess.',
     GAP: 'Gap in the next row: how often the likeliest gap is the true one.',
 }
-
-
 ASKED = {PATH_CLASS: 'path past the obstacles', GOAL: 'goal', GAP: 'gap in the next row of obstacles'}
 EXPLANATIONS = {
     'nat': 'the unit of a natural logarithm of a probability. 0.69 nat more mean twice the probability for what really happened.',
@@ -69,13 +58,16 @@ def write_report(
     config: Config | None = None,
 ) -> None:
     """Write the page; answer: as of `evaluate --json`, of recordings. Raises InputError where that cannot be done."""
-    body = render_list(summarise(answer), 'In short')
-    body += render_example(recordings, config) if recordings and config else ''
-    body += render_pictures(_draw_questions(answer['questions']))
-    body += render_list(answer['verdict'], 'Compared with simpler predictors') + render_tables(make_tables(answer), EXPLANATIONS)
+    sections = [
+        Section('In short', summarise(answer)),
+        *draw_example(recordings, config),
+        Section(pictures=list(_draw_questions(answer['questions']))),
+        Section('Compared with simpler predictors', answer['verdict']),
+        *explain_tables(make_tables(answer), EXPLANATIONS),
+    ]
     failed = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     warnings = [*warn_of_few(answer['recordings'], 'recordings'), *failed]
-    write_page(directory, EVALUATION_PAGE, render_page(f'Evaluation: {title}', body, warnings, config))
+    write_page(directory, EVALUATION_PAGE, f'Evaluation: {title}', sections, warnings, config)
 
 
 def summarise(answer: Mapping[str, Any]) -> list[str]:
@@ -99,16 +91,13 @@ def summarise(answer: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def _draw_questions(questions: Mapping[str, Any]) -> Iterator[str]:
+def _draw_questions(questions: Mapping[str, Any]) -> Iterator[Picture]:
     """Yield two pictures for each question."""
     for name, caption in CAPTIONS.items():
         if name in questions:
             reliability = f'{name}: how often the likeliest answer is true, over its probability, {COUNTS}.'
             for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
-                with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
-                    draw(figure.subplots(), name, questions[name])
-                    place_legend(figure)
-                yield render_figure(figure, words)
+                yield make_chart(SIZE_IN, words, draw, name, questions[name])
 
 
 def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:

@@ -14,14 +14,12 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.types import NANOSECONDS
 
 from .figures import make_moment_figure
-from .page import render_figure, render_pictures
-from .report import ONSET_SPEED, ReportCollector
-from .views import HandTrajectory, Snapshot, build_hand_trajectory
+from .page import Section, make_picture
+from .report import ReportCollector
+from .views import build_hand_trajectory, choose_moment
 
 MOST_ITEMS = 3_000
 """Messages of a recording that are read at most."""
-ON_THE_WAY = 0.15, 0.6
-"""Parts of a movement between which a moment is chosen."""
 FEW = 20
 """Number of recordings below which the page warns."""
 
@@ -32,31 +30,21 @@ def warn_of_few(count: int, what: str) -> list[str]:
     return [words] if count < FEW else []
 
 
-def render_example(recordings: Mapping[str, Recording], config: Config) -> str:
-    """Return HTML with a picture of a moment of the first recording that can be replayed, '' if there is none."""
-    for name, recording in recordings.items():
+def draw_example(recordings: Mapping[str, Recording] | None, config: Config | None) -> list[Section]:
+    """Return a section with a moment of the first recording that can be replayed, nothing if there is none."""
+    for name, recording in (recordings or {}).items():
         collected = ReportCollector()
         try:
-            for step in Replay(config).steps(islice(recording.items(), MOST_ITEMS)):
+            for step in Replay(config or Config()).steps(islice(recording.items(), MOST_ITEMS)):
                 collected.add(step)
         except FocError:
             continue  # the page lists what cannot be read
         hand = build_hand_trajectory(collected.samples)
-        if moment := _choose_moment(hand, [each for each in collected.snapshots if each.candidates]):
-            return '<h2>One recording with its prediction</h2>' + _render_moment(name, hand, *moment)
-    return ''
-
-
-def _choose_moment(hand: HandTrajectory, snapshots: list[Snapshot]) -> tuple[Snapshot, tuple[int, int]] | None:
-    """Return the snapshot of the first movement with the most likely paths, and the start and end of this movement [ns]."""
-    for start_ns, end_ns in hand.find_movements(ONSET_SPEED):
-        begin, end = (start_ns + share * (end_ns - start_ns) for share in ON_THE_WAY)
-        if inside := [each for each in snapshots if begin <= each.stamp_ns <= end]:
-            return max(inside, key=lambda each: each.likely_paths), (start_ns, end_ns)
-    return None
-
-
-def _render_moment(name: str, hand: HandTrajectory, snapshot: Snapshot, span: tuple[int, int]) -> str:
-    seconds = (snapshot.stamp_ns - span[0]) / NANOSECONDS
-    caption = f'{name}, {seconds:.2f} s after the hand began to move.'
-    return render_pictures([render_figure(make_moment_figure(hand, snapshot, span), caption)])
+        for span in hand.find_movements():
+            row = choose_moment(collected.snapshots, *span)
+            if row is not None:
+                snapshot = collected.snapshots[row]
+                words = f'{name}, {(snapshot.stamp_ns - span[0]) / NANOSECONDS:.2f} s after the hand began to move.'
+                picture = make_picture(make_moment_figure(hand, snapshot, span), words)
+                return [Section('One recording with its prediction', pictures=[picture])]
+    return []

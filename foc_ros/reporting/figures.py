@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +29,7 @@ from .draw import (
     save_figure,
 )
 from .legend import draw_legend, measure_legend
-from .views import HandTrajectory, Snapshot, build_snapshot
+from .views import HandTrajectory, build_snapshot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,13 +37,16 @@ if TYPE_CHECKING:
 WIDTH_IN = 6.4
 
 
-def draw_snapshot(axes: Any, snapshot: Snapshot, bounds: Bounds) -> None:
-    """Draw a scene with the candidates in it, lettered in order of likelihood, the hand and a legend of all that is drawn."""
-    draw_scene(axes, snapshot.obstacles, snapshot.goals, bounds, names=snapshot.goal_names)
-    draw_candidates(axes, snapshot, number_labels(snapshot.candidates))
-    if snapshot.hand is not None:
-        draw_hand_now(axes, snapshot.hand[None])
-    draw_legend(axes, None if snapshot.candidates else 'no candidate could be solved')
+def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array | None = None) -> None:
+    """Draw a scene with the candidates in it, lettered in order of likelihood, the hand and a legend of all that is drawn.
+
+    hand (s, 2): where it is now [m], if it is not drawn yet.
+    """
+    draw_scene(axes, snapshot.obstacles, snapshot.goal_positions, bounds, names=snapshot.goal_names)
+    draw_candidates(axes, snapshot, number_labels(snapshot))
+    if hand is not None and len(hand):
+        draw_hand_now(axes, hand)
+    draw_legend(axes, None if snapshot.candidates_with_likelihood else 'no candidate could be solved')
 
 
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
@@ -67,11 +69,11 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     import matplotlib.pyplot as plt
 
     snapshot = build_snapshot(prediction)
-    bounds = _compute_scene_bounds(snapshot)
+    hand, bounds = _frame_scene(snapshot)
     with plt.rc_context(STYLE):
         if axes is None:
             axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, snapshot)), layout='constrained').subplots()
-        draw_snapshot(axes, snapshot, bounds)
+        draw_snapshot(axes, snapshot, bounds, hand)
     return axes
 
 
@@ -83,11 +85,11 @@ def write_picture(file: Path | str, prediction: Prediction) -> None:
     save_figure(make_scene_figure(build_snapshot(prediction)), file)
 
 
-def make_scene_figure(snapshot: Snapshot) -> Figure:
+def make_scene_figure(snapshot: Prediction) -> Figure:
     """Return a figure of one snapshot: scene, candidates and legend."""
-    bounds = _compute_scene_bounds(snapshot)
+    hand, bounds = _frame_scene(snapshot)
     with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
-        draw_snapshot(figure.subplots(), snapshot, bounds)
+        draw_snapshot(figure.subplots(), snapshot, bounds, hand)
     return figure
 
 
@@ -104,24 +106,27 @@ def make_recording_figure(
     return figure
 
 
-def make_moment_figure(hand: HandTrajectory, snapshot: Snapshot, span: Span) -> Figure:
+def make_moment_figure(hand: HandTrajectory, snapshot: Prediction, span: Span) -> Figure:
     """Return a figure of one snapshot with the hand during a movement, whose start and end [ns] are span."""
-    bounds = compute_bounds(snapshot.obstacles, snapshot.goals, snapshot.candidates, hand.positions[hand.between(*span)])
+    paths, during = snapshot.candidates_with_likelihood, hand.positions[hand.between(*span)]
+    bounds = compute_bounds(snapshot.obstacles, snapshot.goal_positions, paths, during)
     with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
         axes = figure.subplots()
         draw_hand(axes, hand, snapshot.stamp_ns, span)
-        draw_snapshot(axes, replace(snapshot, hand=None), bounds)
+        draw_snapshot(axes, snapshot, bounds)
     return figure
 
 
-def _compute_scene_bounds(snapshot: Snapshot) -> Bounds:
-    hand = [] if snapshot.hand is None else [snapshot.hand[None]]
-    return compute_bounds(snapshot.obstacles, snapshot.goals, (*snapshot.candidates, *snapshot.unsolved), *hand)
+def _frame_scene(snapshot: Prediction) -> tuple[Array, Bounds]:
+    """Return the hand, where the newest path begins, (s, 2) [m], and the limits of a scene."""
+    newest = sorted(snapshot.candidates, key=lambda each: each.age_s)[:1]
+    hand = np.array([each.candidate.guess[0] for each in newest]).reshape(-1, 2)
+    return hand, compute_bounds(snapshot.obstacles, snapshot.goal_positions, snapshot.candidates, hand)
 
 
-def _get_height(bounds: Bounds, snapshot: Snapshot | None = None) -> float:
+def _get_height(bounds: Bounds, snapshot: Prediction | None = None) -> float:
     """Return the height [in] of a scene with equal axes, its axis labels and a legend of candidates."""
     height = float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.6
     if snapshot is None:
         return height
-    return height + measure_legend((*snapshot.candidates, *snapshot.unsolved))
+    return height + measure_legend(snapshot)

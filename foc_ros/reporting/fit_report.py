@@ -13,16 +13,14 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config
 from foc_ros.io.outputs import FIT_PAGE
 
-from .draw import get_class_style, open_figure
-from .example import render_example, warn_of_few
-from .page import render_figure, render_list, render_page, render_pictures, render_table, render_tables, write_page
+from .draw import get_class_style
+from .example import draw_example, warn_of_few
+from .page import Picture, Section, explain_tables, make_chart, write_page
 
 WIDTH_IN, LINE_IN = 6.4, 0.34
 CAPTION = (
     'Fitted values as multiples of the given ones, with 95 % intervals by bootstrap over recordings; the line is the given value.'
 )
-
-
 EXPLANATIONS = {
     'nat': 'the unit of a natural logarithm of a probability. 0.69 nat more mean twice the probability for what really happened.',
     'above uniform': 'compared with a guess that finds all answers equally likely. 0 is no better than this guess.',
@@ -50,29 +48,34 @@ def write_report(
     count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
     fitted = f'{len(answer["parameters"])} parameters were fitted to {count} recordings.'
-    body = render_list([fitted, *make_verdict(answer)], 'In short')
-    body += render_example(recordings, config) if recordings and config else ''
-    body += _draw_parameters(answer['parameters']) + render_tables(make_tables(answer), EXPLANATIONS)
-    body += render_table((), commands, 'Run the node with these parameters')
+    sections = [
+        Section('In short', [fitted, *make_verdict(answer)]),
+        *draw_example(recordings, config),
+        Section(pictures=_draw_parameters(answer['parameters'])),
+        *explain_tables(make_tables(answer), EXPLANATIONS),
+        Section('Run the node with these parameters', rows=commands),
+    ]
     warnings = [*warn_of_few(count, 'recordings'), *answer['warnings'], *failed]
-    write_page(directory, FIT_PAGE, render_page(f'Fit: {title}', body, warnings, config))
+    write_page(directory, FIT_PAGE, f'Fit: {title}', sections, warnings, config)
 
 
-def _draw_parameters(parameters: Mapping[str, Any]) -> str:
+def _draw_parameters(parameters: Mapping[str, Any]) -> list[Picture]:
     """Return the picture of the parameters that can be drawn as a multiple of the given value."""
     drawn = {name: each for name, each in parameters.items() if each['given'] > 0.0 and each['value'] > 0.0}
     if not drawn:
-        return ''
-    with open_figure(WIDTH_IN, 0.9 + LINE_IN * len(drawn)) as figure:
-        axes, (colour, _) = figure.subplots(), get_class_style(0)
-        for row, each in enumerate(drawn.values()):
-            ends = [end / each['given'] for end in each['interval'] if end is not None and end > 0.0]
-            axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
-            axes.plot(each['value'] / each['given'], row, marker='o', color=colour)
-        axes.axvline(1.0, color='0.4', linewidth=1.0)
-        axes.set_yticks(range(len(drawn)), list(drawn))
-        axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
-        for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
-            set_format('{x:g}')
-        axes.tick_params(axis='x', which='minor', labelsize=7)
-    return render_pictures([render_figure(figure, CAPTION)])
+        return []
+    return [make_chart((WIDTH_IN, 0.9 + LINE_IN * len(drawn)), CAPTION, _draw_multiples, drawn)]
+
+
+def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
+    colour, _ = get_class_style(0)
+    for row, each in enumerate(drawn.values()):
+        ends = [end / each['given'] for end in each['interval'] if end is not None and end > 0.0]
+        axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
+        axes.plot(each['value'] / each['given'], row, marker='o', color=colour)
+    axes.axvline(1.0, color='0.4', linewidth=1.0)
+    axes.set_yticks(range(len(drawn)), list(drawn))
+    axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
+    for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+        set_format('{x:g}')
+    axes.tick_params(axis='x', which='minor', labelsize=7)

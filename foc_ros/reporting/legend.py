@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from textwrap import fill
 from typing import Any
 from weakref import WeakKeyDictionary
 
-from .views import CandidateView, UnsolvedView
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.ros.messages.ranking import describe_candidate
 
 LONGEST_WORDS = 60
 """Number of characters in the words of a class beyond which the legend has its label only."""
@@ -29,20 +29,23 @@ _PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
 """Subplot and place of axes before a legend took a part of it."""
 
 
-def describe_in_legend(view: CandidateView | UnsolvedView, letter: str = ' ', reason: str = '') -> str:
-    """Return the line of a candidate; reason: why it is a ghost."""
-    # the words of a class with many obstacles would leave no room for the plot
-    name = view.description if 0 < len(view.description) <= LONGEST_WORDS else view.label
-    if isinstance(view, UnsolvedView):
-        return f'{letter}    - %  {name}; {view.reason}'
-    words = f'; {"estimated" if view.is_estimated else "compromised"}: eta {view.eta:.3f}' if view.is_compromised else ''
-    return f'{letter}  {100 * view.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
+def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
+    """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
+    name = describe_candidate(candidate, goals)
+    if len(name) > LONGEST_WORDS:  # the words of a class with many obstacles would leave no room for the plot
+        name = candidate.label
+    if not candidate.has_likelihood:
+        return f'{letter}    - %  {name}; {candidate.reason}'
+    found = 'estimated' if candidate.is_estimated else 'compromised'
+    words = '' if candidate.is_solved else f'; {found}: eta {candidate.eta:.3f}'
+    return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
 
 
-def measure_legend(candidates: Sequence[CandidateView | UnsolvedView]) -> float:
+def measure_legend(snapshot: Prediction) -> float:
     """Return the height of the legend of a scene that is as wide as a page [in]."""
-    signs = SIGNS + any(isinstance(each, CandidateView) and each.is_compromised for each in candidates)
-    lines = sum(1 + fill(describe_in_legend(each), COLUMNS).count('\n') for each in candidates) + -(-signs // 2)
+    signs = SIGNS + any(not each.is_solved for each in snapshot.candidates_with_likelihood)
+    texts = [fill(describe_in_legend(each, len(snapshot.goal_positions)), COLUMNS) for each in snapshot]
+    lines = sum(1 + text.count('\n') for text in texts) + -(-signs // 2)
     return lines * LINE * SIZE_PT / 72.0 + 0.05
 
 

@@ -17,10 +17,11 @@ from rich.table import Table
 from rich.text import Text
 
 from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
+from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve
 
 from .draw import Bounds, compute_bounds
-from .views import Snapshot
 
 WIDTH, HEIGHT = 72, 13
 """Size of the drawing [characters]; with the table it fits into 24 lines."""
@@ -34,7 +35,7 @@ LISTED = 2
 """Number of candidates in a line of text."""
 COLUMNS = {'candidate': 46, 'likelihood': 10, '': 5, 'cost': 6, 'eta': 5}
 """Columns of the table and their widths [characters]."""
-Show = Callable[[float, Snapshot, str, Array], None]
+Show = Callable[[float, Prediction, str, Array], None]
 """Function that shows a snapshot at a time [s], with a heading and the position of the hand (2,) [m]; it may be called often."""
 
 
@@ -46,7 +47,7 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
     live = Live(waiting, console=console, auto_refresh=False) if console.is_terminal else None
     next_update, bounds = -np.inf, None
 
-    def show(now: float, snapshot: Snapshot, heading: str, hand: Array) -> None:
+    def show(now: float, snapshot: Prediction, heading: str, hand: Array) -> None:
         nonlocal next_update, bounds
         if now < next_update:
             return
@@ -56,7 +57,8 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
             drawing = Text(draw_scene(snapshot, hand, bounds))
             live.update(Group(drawing, Text(LEGEND), _make_table(snapshot, heading)), refresh=True)
             return
-        listed = [f'{100 * each.likelihood:.0f} % {each.description or each.label}' for each in snapshot.candidates[:LISTED]]
+        goals, shown = len(snapshot.goal_positions), snapshot.candidates_with_likelihood
+        listed = [f'{100 * each.likelihood:.0f} % {describe_candidate(each, goals)}' for each in shown[:LISTED]]
         line = f'{heading}   {"   ".join(listed) or "no solved candidate"}'
         console.print(line, highlight=False, soft_wrap=True, markup=False)
 
@@ -64,30 +66,30 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
         yield show
 
 
-def _make_table(snapshot: Snapshot, title: str) -> Table:
+def _make_table(snapshot: Prediction, title: str) -> Table:
     table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
     table.caption = '* not known to keep the wanted eta: compromised, or estimated'
     for name, width in COLUMNS.items():
         table.add_column(name, width=width, no_wrap=True, justify='right' if width < 10 else 'left')
-    for each in snapshot.candidates[:ROWS]:
+    shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
+    for each, ratio in list(zip(shown, compute_cost_ratios(shown), strict=True))[:ROWS]:
         bar = Bar(1.0, 0.0, each.likelihood, color='bright_blue')
-        share, ratio = f'{100 * each.likelihood:.0f} %', f'x {each.cost_ratio:.3g}'
-        eta = f'{each.eta:.2f}' + '*' * each.is_compromised
-        table.add_row(escape(each.description or each.label), bar, share, ratio, eta)
-    for row in range(len(snapshot.candidates), ROWS):
+        eta = f'{each.eta:.2f}' + '*' * (not each.is_solved)
+        table.add_row(escape(describe_candidate(each, goals)), bar, f'{100 * each.likelihood:.0f} %', f'x {ratio:.3g}', eta)
+    for row in range(len(shown), ROWS):
         table.add_row('' if row else 'no solved candidate')
     return table
 
 
-def extend_bounds(snapshot: Snapshot, hand: Array, before: Bounds | None) -> Bounds:
+def extend_bounds(snapshot: Prediction, hand: Array, before: Bounds | None) -> Bounds:
     """Return limits [m] around obstacles, goals and hand (2,) [m], and around those before, so that the drawing rarely moves."""
-    left, right, bottom, top = compute_bounds(snapshot.obstacles, snapshot.goals, (), hand[None], margin=0.02)
+    left, right, bottom, top = compute_bounds(snapshot.obstacles, snapshot.goal_positions, (), hand[None], margin=0.02)
     if before is None:
         return left, right, bottom, top
     return min(left, before[0]), max(right, before[1]), min(bottom, before[2]), max(top, before[3])
 
 
-def draw_scene(snapshot: Snapshot, hand: Array, bounds: Bounds) -> str:
+def draw_scene(snapshot: Prediction, hand: Array, bounds: Bounds) -> str:
     """Return the drawing; hand (2,) [m]; bounds: left, right, bottom and top [m]."""
     left, right, bottom, top = bounds
     x, y = np.linspace(left, right, WIDTH), np.linspace(top, bottom, HEIGHT)
@@ -96,8 +98,8 @@ def draw_scene(snapshot: Snapshot, hand: Array, bounds: Bounds) -> str:
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         is_inside = (measure_offsets(points, snapshot.obstacles)[1] <= snapshot.obstacles.radius).any(axis=1)
         cells[is_inside.reshape(cells.shape)] = OBSTACLE
-    marks = [(_fill(each.curve), str(row + 1)) for row, each in reversed([*enumerate(snapshot.candidates[:9])])]
-    for points, mark in [*marks, (snapshot.goals, GOAL), (hand[None], HAND)]:
+    paths = [(_fill(find_drawn_curve(each)), f'{row}') for row, each in enumerate(snapshot.candidates_with_likelihood[:9], 1)]
+    for points, mark in [*reversed(paths), (snapshot.goal_positions, GOAL), (hand[None], HAND)]:
         column = np.rint((points[:, 0] - left) / (right - left) * (WIDTH - 1)).astype(int)
         row = np.rint((top - points[:, 1]) / (top - bottom) * (HEIGHT - 1)).astype(int)
         is_visible = (column >= 0) & (column < WIDTH) & (row >= 0) & (row < HEIGHT)

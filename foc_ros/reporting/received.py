@@ -9,81 +9,61 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.solution import describe_class
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.solution import Candidate, Solution
 from foc_ros.core.types import Array
-from foc_ros.ros.messages.decode_poses import decode_stamp
-from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STAMP, STATUSES, UNKNOWN
-from foc_ros.ros.messages.plane import project
+from foc_ros.ros.messages.decode_poses import decode_frame, decode_stamp
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STATUSES, UNKNOWN
 
-from .views import CandidateView, Snapshot, parse_label
-
-
-def is_same_prediction(cloud: Any, likelihoods: Any) -> bool:
-    """Whether messages of `~/prediction` and `~/likelihoods` hold the same prediction."""
-    return bool(likelihoods.layout.dim[2].label == f'{STAMP}{decode_stamp(cloud.header)}')
+from .views import parse_label
 
 
-def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Snapshot:
+def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Prediction:
     """Return the snapshot in a pair of messages of `~/prediction` and `~/likelihoods`: inverse of `messages.encode_prediction`.
 
-    obstacles and goals (g, 2) [m] are those at the stamp of the messages. Raises MessageError if the two messages hold different
-    predictions.
+    obstacles and goals (g, 2) [m] are those at the stamp of the messages. Costs are relative to the least one.
     """
-    if not is_same_prediction(cloud, likelihoods):
-        raise MessageError('likelihoods', 'those of the prediction', 'those of another prediction')
-    rows, columns = _read_cloud(cloud), np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
+    rows = np.frombuffer(cloud.data, dtype=CLOUD_ROW) if len(cloud.data) else np.zeros(0, dtype=CLOUD_ROW)
+    columns = np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
     labels = likelihoods.layout.dim[0].label.split(';') if len(columns) else []
     shares = {UNKNOWN: 0.0 if labels else 1.0, OTHER: 0.0}
     while labels and labels[-1] in shares:
         shares[labels[-1]], labels, columns = float(columns[-1, 0]), labels[:-1], columns[:-1]
-    candidates = []
-    for number, (label, values) in enumerate(zip(labels, columns, strict=True)):
-        name = label, _describe_label(label, obstacles.ids, len(goals))
-        candidates.append(_read_candidate(name, values, rows[rows['candidate'] == number], plane))
-    cleared = []
-    if len(rows) and len(obstacles):
-        height = project(np.stack([rows[axis].astype(float) for axis in 'xyz'], axis=-1), plane)[1]
-        is_cleared = (height.min() > obstacles.heights[:, 1]) | (height.max() < obstacles.heights[:, 0])
-        cleared = [name for name, is_out in zip(obstacles.ids, is_cleared, strict=True) if is_out]
-    most_likely = candidates[0].label if candidates else None
-    return Snapshot(
+    parts = (rows[rows['candidate'] == number] for number in range(len(labels)))
+    read = zip(labels, columns, parts, strict=True)
+    candidates = tuple(_read_candidate(label, obstacles.ids, values, part, plane) for label, values, part in read)
+    cleared = np.zeros(len(obstacles), dtype=bool)
+    if len(rows):
+        height = rows[next(axis for axis in 'xyz' if axis not in plane)]
+        cleared = (height.min() > obstacles.heights[:, 1]) | (height.max() < obstacles.heights[:, 0])
+    return Prediction(
         decode_stamp(cloud.header),
-        obstacles,
-        goals,
-        tuple(candidates),
-        most_likely,
-        cleared=cleared,
-        unknown_share=shares[UNKNOWN],
-        other_share=shares[OTHER],
+        decode_frame(cloud.header),
+        0.0,
+        candidates,
+        candidates[0].label if candidates else None,
+        obstacles=obstacles,
+        goal_positions=goals,
+        cleared=tuple(cleared.tolist()),
+        unknown=shares[UNKNOWN],
+        other=shares[OTHER],
     )
 
 
-def _read_candidate(name: tuple[str, str], values: Array, rows: Any, plane: str) -> CandidateView:
-    def stack(names: Sequence[str]) -> Array:
-        return np.stack([rows[name].astype(float) for name in names], axis=-1)
-
-    path, _ = project(stack('xyz'), plane)
-    velocity, _ = project(stack(('vx', 'vy', 'vz')), plane)
-    covariances = []
-    for prefix in ('', 'motor_'):
-        pairs = [prefix + pair for pair in ('xx', 'xy', 'xz', 'xy', 'yy', 'yz', 'xz', 'yz', 'zz')]
-        half, _ = project(stack(pairs).reshape(-1, 3, 3), plane)
-        covariances.append(project(half.swapaxes(1, 2), plane)[0])
+def _read_candidate(label: str, ids: Collection[str], values: Array, rows: Any, plane: str) -> PredictedCandidate:
+    x, y = plane[0], plane[1]
+    mean = _stack(rows, (x, y, f'v{x}', f'v{y}'))
+    pairs = x + x, plane, plane, y + y
+    total, motor = (_stack(rows, [prefix + pair for pair in pairs]).reshape(-1, 2, 2) for prefix in ('', 'motor_'))
     likelihood, effort, cost_ratio, eta = values.tolist()
-    head = *name, STATUSES[int(rows['status'][0])], likelihood, effort, cost_ratio, eta
-    return CandidateView(*head, rows['t'].astype(float), path, velocity, covariances[0], covariances[1], int(rows['way'][0]))
+    status, dt = STATUSES[int(rows['status'][0])], float(rows['t'][-1]) / max(len(rows) - 1, 1)
+    only_motor = None if np.array_equal(total, motor) else motor
+    solution = Solution(status, '', dt, mean, total, np.zeros((0, 2)), effort, {}, 0.0, 0.0, eta, motor_covariance=only_motor)
+    sides = parse_label(label, ids)[1]
+    candidate = Candidate(label, int(rows['goal'][0]), tuple(sides.items()), mean[:, :2], 0.0)
+    return PredictedCandidate(candidate, solution, sides, cost_ratio, likelihood, way=int(rows['way'][0]))
 
 
-def _read_cloud(cloud: Any) -> Any:
-    if cloud.point_step != CLOUD_ROW.itemsize:
-        raise MessageError('point_step', str(CLOUD_ROW.itemsize), cloud.point_step)
-    return np.frombuffer(cloud.data, dtype=CLOUD_ROW) if len(cloud.data) else np.zeros(0, dtype=CLOUD_ROW)
-
-
-def _describe_label(label: str, ids: Collection[str], goals: int) -> str:
-    """Return the class of a label in words, with its goal if there are several goals; empty if it names an unknown obstacle."""
-    goal, sides = parse_label(label, ids)
-    is_read = len(label) == len(goal) + 1 + sum(1 + len(name) for name in sides)
-    return describe_class(sides.items(), goal if goals > 1 else '') if is_read else ''
+def _stack(rows: Any, names: Sequence[str]) -> Array:
+    return np.stack([rows[name].astype(float) for name in names], axis=-1)

@@ -14,25 +14,23 @@ import numpy as np
 
 from foc_ros.analysis.replay import Step
 from foc_ros.core.errors import InputError
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import NANOSECONDS, HandSample
-from foc_ros.io.outputs import MARK, OVERVIEW, REPORT_FILES, check_report
+from foc_ros.io.outputs import MARK, REPORT_FILES, check_page
+from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
 from .draw import Span, save_figure
 from .encode import compute_recording_bounds, encode_report, round_number
 from .figures import make_recording_figure
-from .page import render
+from .page import Table, render
 from .tracks import build_candidate_tracks
-from .views import NOTED, HandTrajectory, Snapshot, build_hand_trajectory, build_snapshot
+from .views import NOTED, HandTrajectory, build_hand_trajectory, build_snapshot, is_late, list_unsolved
 
-ONSET_SPEED = 0.05
-"""Speed [m/s] above which the hand counts as moving."""
 LATE_SHARE = 0.05
 """Share of the predictions that were not finished from which the page warns of a busy computer."""
 COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candidates not solved', 'counters of the node')
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
-Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
-"""Heading, columns and rows of a table of the page."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class ReportCollector:
 
     def __init__(self) -> None:
         self.samples: list[HandSample] = []
-        self.snapshots: list[Snapshot] = []
+        self.snapshots: list[Prediction] = []
 
     def add(self, step: Step) -> None:
         """Keep the hand sample and the prediction of a step."""
@@ -66,7 +64,7 @@ def write_report(
     directory: Path,
     title: str,
     hand: HandTrajectory,
-    snapshots: Sequence[Snapshot],
+    snapshots: Sequence[Prediction],
     summary: Mapping[str, str],
     tables: Sequence[Table] = (),
 ) -> list[Path]:
@@ -76,10 +74,10 @@ def write_report(
     tables: further ones. Raises InputError if the directory cannot be written or contains other files of those names, or if the
     hand has no sample.
     """
-    check_report('--report', directory)
+    check_page('--report', directory, *REPORT_FILES)
     if not len(hand.stamps_ns):
         raise InputError('report', 'a recording with a hand pose', 'none')
-    spans = hand.find_movements(ONSET_SPEED) or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
+    spans = hand.find_movements() or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
     tracks = build_candidate_tracks(snapshots)
     facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots, int(hand.stamps_ns[0]))
     data = encode_report(hand, tracks, spans, compute_recording_bounds(hand, snapshots))
@@ -94,10 +92,10 @@ def write_report(
         'hand_samples': len(hand.stamps_ns),
         'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
     }
-    page_file, numbers_file = (directory / name for name in REPORT_FILES)
+    page_file, numbers_file, overview_file = (directory / name for name in REPORT_FILES)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        pictures = _write_overview(directory / OVERVIEW, hand, snapshots, spans)
+        pictures = _write_overview(overview_file, hand, snapshots, spans)
         page_file.write_text(html, encoding='utf-8', errors='replace')
         numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
     except OSError as error:
@@ -105,20 +103,20 @@ def write_report(
     return [page_file, numbers_file, *pictures]
 
 
-def _write_overview(file: Path, hand: HandTrajectory, snapshots: Sequence[Snapshot], spans: Sequence[Span]) -> list[Path]:
+def _write_overview(file: Path, hand: HandTrajectory, snapshots: Sequence[Prediction], spans: Sequence[Span]) -> list[Path]:
     """Write the picture of all movements; return the file, nothing where no candidate was solved."""
-    solved = [each for each in snapshots if each.candidates]
+    solved = [each for each in snapshots if each.candidates_with_likelihood]
     if not solved:
         return []
-    goals = np.unique(np.concatenate([each.goals for each in solved]), axis=0)
+    goals = np.unique(np.concatenate([each.goal_positions for each in solved]), axis=0)
     figure = make_recording_figure(hand, solved[0].obstacles, goals, spans, compute_recording_bounds(hand, solved))
     save_figure(figure, file)
     return [file]
 
 
-def describe_late(snapshots: Sequence[Snapshot]) -> str:
+def describe_late(snapshots: Sequence[Prediction]) -> str:
     """Return for how many predictions the computer was too busy and what to change, '' where they were too few to matter."""
-    late = sum(each.is_late for each in snapshots)
+    late = sum(map(is_late, snapshots))
     if late <= LATE_SHARE * len(snapshots):
         return ''
     return (
@@ -127,9 +125,9 @@ def describe_late(snapshots: Sequence[Snapshot]) -> str:
     )
 
 
-def _collect_facts(snapshots: Sequence[Snapshot]) -> dict[str, str]:
-    solve_ms = [1e3 * each.solve_s for each in snapshots if each.solve_s is not None]
-    views = [view for each in snapshots for view in each.candidates if view.likelihood >= NOTED]
+def _collect_facts(snapshots: Sequence[Prediction]) -> dict[str, str]:
+    solve_ms = [1e3 * each.solve_s for each in snapshots if each.solve_s]
+    views = [view for each in snapshots for view in each if view.likelihood >= NOTED]
     counts = [sum(view.status is status for view in views) for status in (Status.SOLVED, Status.COMPROMISED)]
     facts = {
         'predictions': str(len(snapshots)),
@@ -142,35 +140,36 @@ def _collect_facts(snapshots: Sequence[Snapshot]) -> dict[str, str]:
     return facts
 
 
-def _collect_warnings(snapshots: Sequence[Snapshot], origin_ns: int) -> list[PageWarning]:
-    def find(is_found: Callable[[Snapshot], bool]) -> list[float]:
+def _collect_warnings(snapshots: Sequence[Prediction], origin_ns: int) -> list[PageWarning]:
+    def find(is_found: Callable[[Prediction], bool]) -> list[float]:
         return [_measure_seconds(each, origin_ns) for each in snapshots if is_found(each)]
 
     if not snapshots:
         return [PageWarning('There is no prediction.')]
     warnings, count = [], len(snapshots)
-    if at := find(lambda each: not each.candidates):
+    if at := find(lambda each: not each.candidates_with_likelihood):
         warnings.append(PageWarning(f'In {len(at)} of {count} predictions no candidate could be solved.', at[0]))
     if words := describe_late(snapshots):
-        warnings.append(PageWarning(words, find(lambda each: each.is_late)[0]))
-    if at := find(lambda each: bool(each.candidates) and each.candidates[0].status is Status.COMPROMISED):
+        warnings.append(PageWarning(words, find(is_late)[0]))
+    if at := find(lambda each: any(one.status is Status.COMPROMISED for one in each.candidates[:1])):
         words = f'In {len(at)} of {count} predictions the most likely path avoids the obstacles less surely than wanted'
         warnings.append(PageWarning(f'{words}. Remedy: {Status.COMPROMISED.remedy}.', at[0]))
     lost: dict[str, list[float]] = {}
     for each in snapshots:
-        for view in each.unsolved:
-            lost.setdefault(view.status, []).append(_measure_seconds(each, origin_ns))
+        for view in list_unsolved(each):
+            lost.setdefault(view.status.value, []).append(_measure_seconds(each, origin_ns))
     for status, at in sorted(lost.items()):
         words = f'{len(at)} candidate{"s" if len(at) > 1 else ""} ended with status {status}. Remedy: {Status(status).remedy}.'
         warnings.append(PageWarning(words, at[0]))
     return warnings
 
 
-def _measure_seconds(snapshot: Snapshot, origin_ns: int) -> float:
+def _measure_seconds(snapshot: Prediction, origin_ns: int) -> float:
     return round((snapshot.stamp_ns - origin_ns) / NANOSECONDS, 4)
 
 
-def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:
+def _encode_snapshot(snapshot: Prediction, origin_ns: int) -> dict[str, Any]:
+    shown = snapshot.candidates_with_likelihood
     return {
         'stamp_ns': snapshot.stamp_ns,
         't_s': round((snapshot.stamp_ns - origin_ns) / NANOSECONDS, 6),
@@ -178,13 +177,14 @@ def _encode_snapshot(snapshot: Snapshot, origin_ns: int) -> dict[str, Any]:
         'candidates': [
             {
                 'label': each.label,
-                'description': each.description,
+                'description': describe_candidate(each, len(snapshot.goal_positions)),
                 'status': each.status.value,
-                'compromised': each.is_compromised,
-                **{name: round_number(getattr(each, name)) for name in ('likelihood', 'effort', 'cost_ratio', 'eta')},
-                'end': [round_number(value) for value in each.path[-1]],
+                'compromised': not each.is_solved,
+                **{name: round_number(getattr(each, name)) for name in ('likelihood', 'effort', 'eta')},
+                'cost_ratio': round_number(ratio),
+                'end': [round_number(value) for value in each.solution.path[-1]],
             }
-            for each in snapshot.candidates
+            for each, ratio in zip(shown, compute_cost_ratios(shown), strict=True)
         ],
-        'unsolved': {each.label: each.status for each in snapshot.unsolved},
+        'unsolved': {each.label: each.status.value for each in list_unsolved(snapshot)},
     }

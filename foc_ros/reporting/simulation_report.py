@@ -16,20 +16,18 @@ from foc_ros.analysis.simulation.study import COLUMNS, PairResult, Trial, make_t
 from foc_ros.core.config import Config
 from foc_ros.io.outputs import SIMULATION_PAGE
 
-from .draw import draw_scene, get_class_style, open_figure
+from .draw import draw_scene, get_class_style
 from .example import warn_of_few
-from .page import place_legend, render_figure, render_list, render_page, render_pictures, render_tables, write_page
+from .page import Picture, Section, explain_tables, make_chart, write_page
 
 DRAWN = ('collision_rate', 'completion_s', 'opposing_impulse')
 """Measures with a figure."""
-WIDTH_IN, HEIGHT_IN = 6.4, 4.2
+SIZE_IN = 6.4, 4.2
 ARROWS = 24
 """Number of arrows along a path."""
 NEWTONS_PER_M = 60.0
 """Force that is drawn with the length of one metre [N/m]."""
 BORDER_M = 0.04
-
-
 EXPLANATIONS = {
     'collisions': 'trials in which the hand entered an obstacle.',
     'time': 'from the beginning of the movement to the arrival.',
@@ -48,11 +46,13 @@ def write_report(
     directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[PairResult], config: Config | None = None
 ) -> None:
     """Write the page; cells: of `simulate --json`. Raises InputError where that cannot be done."""
-    body = render_list(summarise(cells), 'In short') + render_pictures(_render_measures(cells))
-    body += render_tables(make_tables(cells), EXPLANATIONS)
-    body += f'<h2>Single trials</h2>{render_pictures(_render_trials(results))}'
+    sections = [
+        Section('In short', summarise(cells), list(_draw_measures(cells))),
+        *explain_tables(make_tables(cells), EXPLANATIONS),
+        Section('Single trials', pictures=list(_draw_trials(results))),
+    ]
     warnings = warn_of_few(min(cell['trials'] for cell in cells), 'trials of each operator') if cells else []
-    write_page(directory, SIMULATION_PAGE, render_page('Closed-loop study of guidance', body, warnings, config))
+    write_page(directory, SIMULATION_PAGE, 'Closed-loop study of guidance', sections, warnings, config)
 
 
 def summarise(cells: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -74,12 +74,10 @@ def summarise(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     return sentences
 
 
-def _render_measures(cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _draw_measures(cells: Sequence[Mapping[str, Any]]) -> Iterator[Picture]:
     for name in DRAWN:
-        with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
-            _draw_measure(figure.subplots(), cells, name)
-            place_legend(figure)
-        yield render_figure(figure, f'{COLUMNS[name][0]}: mean over the paired trials, with its bootstrap interval of 95 %.')
+        words = f'{COLUMNS[name][0]}: mean over the paired trials, with its bootstrap interval of 95 %.'
+        yield make_chart(SIZE_IN, words, _draw_measure, cells, name)
 
 
 def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
@@ -98,16 +96,12 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
     axes.set_ylim(bottom=0.0)
 
 
-def _render_trials(results: Sequence[PairResult]) -> Iterator[str]:
+def _draw_trials(results: Sequence[PairResult]) -> Iterator[Picture]:
     """Yield a picture of every trial that was kept."""
     for result in results:
-        if result.task is None:
-            continue
-        with open_figure(WIDTH_IN, HEIGHT_IN) as figure:
-            _draw_trial(figure.subplots(), result.task, result.trials)
-            place_legend(figure)
-        words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
-        yield render_figure(figure, f'Operator {result.operator}. {words}')
+        if result.task is not None:
+            words = f'Operator {result.operator}. Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
+            yield make_chart(SIZE_IN, words, _draw_trial, result.task, result.trials)
 
 
 def _draw_trial(axes: Any, task: Task, trials: Mapping[str, Trial]) -> None:

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
-from .views import COLOURS, SLOTS, Snapshot
+from .views import COLOURS, SLOTS
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class CandidateTracks:
     letter and colour. Tracks without a slot are missing there.
     """
 
-    snapshots: Sequence[Snapshot]
+    snapshots: Sequence[Prediction]
     tracks: Sequence[Mapping[str, int]]
     slots: Mapping[int, int]
 
@@ -39,7 +40,7 @@ class CandidateTracks:
         """Return, for each track, its first row and its likelihoods from there on, NaN where it has no candidate."""
         known: dict[int, dict[int, float]] = {}
         for row, (snapshot, tracks) in enumerate(zip(self.snapshots, self.tracks, strict=True)):
-            for each in snapshot.candidates:
+            for each in snapshot.candidates_with_likelihood:
                 known.setdefault(tracks[each.label], {})[row] = each.likelihood
         return {
             track: (min(rows), np.array([rows.get(row, np.nan) for row in range(min(rows), max(rows) + 1)]))
@@ -73,7 +74,7 @@ class Slots:
         return [slots.get(way) for way in ways]
 
 
-def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
+def build_candidate_tracks(snapshots: Sequence[Prediction]) -> CandidateTracks:
     """Return the candidates of successive snapshots by track, and the letters and colours of the tracks.
 
     A track has the candidates of one class, as long as it has one letter. Tracks are numbered from 0 in order of their
@@ -81,8 +82,9 @@ def build_candidate_tracks(snapshots: Sequence[Snapshot]) -> CandidateTracks:
     """
     given, numbers, tracks = Slots(), dict[tuple[int, int | None], int](), list[dict[str, int]]()
     for snapshot in snapshots:
-        ways = [each.way for each in snapshot.candidates]
+        shown = snapshot.candidates_with_likelihood
+        ways = [each.way for each in shown]
         keys = zip(ways, given.assign(ways), strict=True)
         found = [numbers.setdefault(key, len(numbers)) for key in keys]
-        tracks.append({each.label: track for each, track in zip(snapshot.candidates, found, strict=True)})
+        tracks.append({each.label: track for each, track in zip(shown, found, strict=True)})
     return CandidateTracks(snapshots, tracks, {track: slot for (_, slot), track in numbers.items() if slot is not None})

@@ -10,6 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
@@ -76,15 +77,18 @@ def reserve_domain() -> Iterator[int]:
 
 
 @contextmanager
-def set_environment(values: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables within a context."""
+def isolated_graph() -> Iterator[tuple[int, Path]]:
+    """Join a ROS graph of its own within the context, also with new processes; yield its domain and the folder for its logs."""
     before = dict(os.environ)
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
+    with tempfile.TemporaryDirectory(prefix='foc_ros_graph_') as logs, reserve_domain() as domain:
+        environment = private_environment(domain, Path(logs))
+        try:
+            os.environ.clear()
+            os.environ.update(environment)
+            yield domain, Path(logs)
+        finally:
+            os.environ.clear()
+            os.environ.update(before)
 
 
 class NodeProcess:
@@ -92,18 +96,18 @@ class NodeProcess:
 
     It also ends with the thread that started it.
 
-    environment: variables of the process; log: file for its output.
+    environment: variables of the process; log: file for its output; arguments: those of ROS. Attributes: pid; is_clean, whether
+    it has ended, without an error.
     """
 
-    def __init__(self, environment: dict[str, str], log: Path) -> None:
-        self._environment = environment
-        self._log = log
+    def __init__(self, environment: Mapping[str, str], log: Path, *arguments: str) -> None:
+        self._environment, self._log, self._arguments = environment, log, arguments
 
     def __enter__(self) -> NodeProcess:
         import_module('foc_ros.core.pipeline')  # reads the files that the node is about to read, so that it starts sooner
         with self._log.open('wb') as log:
-            self._process = subprocess.Popen(
-                [sys.executable, '-m', 'foc_ros', 'node'],
+            self._process = subprocess.Popen(  # noqa: S603  the arguments are those of the program
+                [sys.executable, '-m', 'foc_ros', 'node', *self._arguments],
                 env=self._environment,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
@@ -111,6 +115,7 @@ class NodeProcess:
                 start_new_session=True,  # Ctrl-C does not reach the node: __exit__ ends it
                 preexec_fn=_end_with_parent,  # noqa: PLW1509 (one system call, without a lock)
             )
+        self.pid, self.is_clean = self._process.pid, False
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -120,11 +125,7 @@ class NodeProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-
-    @property
-    def pid(self) -> int:
-        """The process id."""
-        return self._process.pid
+        self.is_clean = self._process.returncode == 0 and 'Traceback' not in self._log.read_text(errors='replace')
 
     def check(self) -> None:
         """Raise NodeDiedError with the last lines of output if the node has ended."""

@@ -296,7 +296,7 @@ class FocNode(LifecycleNode):
             return
         self._guidance.loop.note_prediction(prediction, ended.received_s)
         for name in wanted:  # one after the other: the markers of 8 candidates take longer than all else, and come last
-            (message,) = encode_outputs(prediction, ended.task.obstacles, config.plane, self._types, [name]).values()
+            (message,) = encode_outputs(prediction, config.plane, self._types, [name]).values()
             if name == 'markers':
                 message.markers.extend(self._guidance.encode_markers(self._types))
             self._publish(self._outputs[name], message)

@@ -249,10 +249,7 @@ function showWays() {
   shownWays = key;
   byId('ways').tBodies[0].replaceChildren(...rows.map(({ slot, likelihood, words, ghost }) => {
     const line = document.createElement('tr');
-    const [letter, bar, filling] = ['span', 'span', 'i'].map((tag) => document.createElement(tag));
-    [letter.className, letter.textContent, letter.style.borderColor] = ['letter', letterOf(slot), colourOf(slot)];
-    [bar.className, filling.style.width, filling.style.background] = ['bar', `${100 * likelihood}%`, colourOf(slot)];
-    bar.append(filling);
+    const [letter, bar] = makeSigns(slot, likelihood);
     for (const content of [letter, bar, percent(likelihood), `${words}${ghost ? `; ${ghost}` : ''}`]) line.insertCell().append(content);
     return line;
   }));

@@ -15,11 +15,6 @@ const slotOf = (track) => data.tracks[track].slot;
 const shareOf = (track, row) => { const value = data.tracks[track].share[row - data.tracks[track].first]; return value === undefined ? null : value; };
 // Above this number of points, the likelihoods are drawn without marks.
 const MOST_MARKS = 3000;
-// Size of an ellipse, in parts of the median, up to which the filter counts as settled.
-const MOST_USUAL = 1.5;
-// Likelihood from which a path counts as likely, and the part of a movement in which the page opens it.
-const LIKELY = 0.05;
-const ON_THE_WAY = [0.15, 0.6];
 const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
 
 // The row of the first value that is not below a bound.
@@ -128,16 +123,9 @@ function fillTable(frame) {
     [row.dataset.track, row.dataset.share] = [each.track, view.share];
     row.classList.toggle('faded', faded(each.track));
     row.addEventListener('click', () => { state.focus = state.focus === each.track ? null : each.track; drawLikelihoods(); show(state.frame); });
-    const letter = document.createElement('span');
-    [letter.className, letter.textContent] = ['letter', letterOf(view.slot)];
-    letter.style.borderColor = colourOf(view.slot);
+    const [letter, bar] = makeSigns(view.slot, view.share);
     cell(row, '').append(letter);
     cell(row, percent(view.share), 'number');
-    const bar = document.createElement('span');
-    bar.className = 'bar';
-    const filling = document.createElement('i');
-    filling.style.cssText = `width: ${100 * view.share}%; background: ${colourOf(view.slot)}`;
-    bar.append(filling);
     cell(row, '').append(bar);
     cell(row, data.labels[each.label], 'label');
     cell(row, view.ghost ? `${view.words}; ${view.ghost}` : view.words);
@@ -163,24 +151,6 @@ function show(number) {
   for (const name of ['likelihoods', 'times']) { charts[name].move(time); }
 }
 
-// Returns how many likely paths a frame has: exp of the entropy of their likelihoods; unlikely ones and ghosts do not count.
-function countLikely(frame) {
-  const shares = frame.candidates.filter((each) => !data.labels[each.ghost]).map(({ track }) => shareOf(track, frame.at)).filter((share) => share >= LIKELY);
-  const sum = shares.reduce((before, share) => before + share, 0);
-  return Math.exp(shares.reduce((before, share) => before - (share / sum) * Math.log(share / sum), 0)) * (shares.length > 0);
-}
-
-// Returns the frame of a span that is the most worth seeing: on the way, where the filter of the hand has settled, so that the largest
-// ellipse has the usual size, and with several likely paths.
-function openingFrame(from, to) {
-  const sizes = data.frames.slice(from, to + 1).map((frame) => Math.max(0, ...frame.candidates.flatMap((each) => (each.total.length ? each.total : each.motor).map((ellipse) => ellipse[2]))));
-  const usual = [...sizes].sort((a, b) => a - b)[Math.floor(sizes.length / 2)];
-  const settled = sizes.map((size, row) => [size, from + row]).filter(([size]) => size > 0 && size <= MOST_USUAL * usual).map(([, row]) => row);
-  const [begin, end] = ON_THE_WAY.map((share) => frameTimes[from] + share * (frameTimes[to] - frameTimes[from]));
-  const onTheWay = settled.filter((row) => frameTimes[row] >= begin && frameTimes[row] <= end);
-  return (onTheWay.length ? onTheWay : settled.length ? settled : [from]).reduce((best, row) => (countLikely(data.frames[row]) > countLikely(data.frames[best]) ? row : best));
-}
-
 // Returns the rows of the first and the last frame of a movement, of the whole recording for -1.
 function framesOf(movement) {
   const [from, to] = movement < 0 ? [-Infinity, Infinity] : data.movements[movement];
@@ -192,7 +162,7 @@ function choose(movement) {
   [state.from, state.to] = framesOf(movement);
   state.focus = null;
   [byId('time').min, byId('time').max] = [state.from, state.to];
-  state.frame = openingFrame(state.from, state.to);
+  state.frame = data.openings[movement < 0 ? data.opened : movement] ?? state.from;
   drawAll();
 }
 
@@ -253,8 +223,7 @@ scene.canvas.addEventListener('wheel', (event) => {
 scene.canvas.addEventListener('dblclick', () => { zoom(); drawScene(data.frames[state.frame]); });
 writeLegend(byId('signs'), ['hand', 'past', 'later', 'path', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal']);
 zoom();
-const opened = data.movements.map((_, row) => countLikely(data.frames[openingFrame(...framesOf(row))]));
-choice.value = data.movements.length > 1 ? opened.indexOf(Math.max(...opened)) : -1;
+choice.value = data.movements.length > 1 ? data.opened : -1;
 choose(Number(choice.value));
 // A warning leads to its first moment.
 for (const button of document.querySelectorAll('.moment')) {

@@ -207,6 +207,15 @@ class Scene {
   }
 }
 
+// Returns the letter of a slot and a bar as long as a share, both in its colour, for a row of a table.
+function makeSigns(slot, share) {
+  const [letter, bar, filling] = ['span', 'span', 'i'].map((tag) => document.createElement(tag));
+  [letter.className, letter.textContent, letter.style.borderColor] = ['letter', letterOf(slot), colourOf(slot)];
+  [bar.className, filling.style.width, filling.style.background] = ['bar', `${100 * share}%`, colourOf(slot)];
+  bar.append(filling);
+  return [letter, bar];
+}
+
 // Writes what the signs of a scene mean; names: the signs that are used.
 const SIGNS = {
   hand: ['<circle cx="14" cy="7" r="4" fill="var(--ink)"/>', 'hand'],

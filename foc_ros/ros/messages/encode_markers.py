@@ -58,15 +58,15 @@ DEVIATION: Colour = (0.85, 0.35, 0.2, 0.25)
 UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.95, 0.6, 0.05])
 
 
-def encode_markers(prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes) -> Any:
-    """Encode the MarkerArray; unsolved candidates are grey and labelled with the reason; obstacles: those at the stamp."""
+def encode_markers(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
+    """Encode the MarkerArray; unsolved candidates are grey and labelled with the reason."""
     encoder = _MarkerEncoder(prediction, plane, types)
     unsolved = [outcome for outcome in prediction.candidates if not outcome.has_likelihood]
     markers = [encoder.encode('', 0, 0, action=DELETE_ALL)]
     for index, outcome in enumerate([*order_candidates(prediction), *unsolved]):
         markers.extend(encoder.encode_candidate(index, outcome))
     markers.extend(encoder.encode_legend())
-    markers.extend(encoder.encode_obstacles(obstacles))
+    markers.extend(encoder.encode_obstacles())
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
 
 
@@ -129,8 +129,8 @@ class _MarkerEncoder:
             text = '\n'.join([LEGEND, *(f'{100 * share:.0f} % {name}' for share, name in shares if share > 0.0)])
             yield self.encode('legend', 0, TEXT, (*GREY[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
 
-    def encode_obstacles(self, obstacles: Obstacles) -> Iterator[Any]:
-        near = self._find_nearest(obstacles)
+    def encode_obstacles(self) -> Iterator[Any]:
+        near = self._find_nearest(self.prediction.obstacles)
         for name, growths, colour in (
             ('obstacle', np.zeros(len(near)), OBSTACLE),
             ('obstacle_deviation', near.radius_stddev, DEVIATION),

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import NANOSECONDS
@@ -157,25 +156,20 @@ def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     return types.fill('nav_msgs/msg/Path', (make_header(types, stamp_ns, frame_id), poses))
 
 
-Encoder = Callable[[Prediction, Obstacles, str, MessageTypes], Any]
+Encoder = Callable[[Prediction, str, MessageTypes], Any]
 OUTPUTS: dict[str, tuple[str, Encoder]] = {
-    'prediction': (
-        'sensor_msgs/msg/PointCloud2',
-        lambda prediction, _, plane, types: encode_prediction_cloud(prediction, plane, types),
-    ),
-    'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda prediction, _, __, types: encode_likelihoods(prediction, types)),
+    'prediction': ('sensor_msgs/msg/PointCloud2', encode_prediction_cloud),
+    'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda prediction, _, types: encode_likelihoods(prediction, types)),
     'likelihoods_by_name': (
         'diagnostic_msgs/msg/DiagnosticArray',
-        lambda prediction, _, __, types: encode_likelihoods_by_name(prediction, types),
+        lambda prediction, _, types: encode_likelihoods_by_name(prediction, types),
     ),
-    'path': ('nav_msgs/msg/Path', lambda prediction, _, plane, types: encode_path(prediction, plane, types)),
+    'path': ('nav_msgs/msg/Path', encode_path),
     'markers': ('visualization_msgs/msg/MarkerArray', encode_markers),
 }
 """Message type and encoder of every output, by the name of its topic below the node's name."""
 
 
-def encode_outputs(
-    prediction: Prediction, obstacles: Obstacles, plane: str, types: MessageTypes, wanted: Iterable[str] = OUTPUTS
-) -> dict[str, Any]:
-    """Encode the wanted outputs, by name; obstacles: those at the stamp, for the markers. Raises FocError as `ranked` does."""
-    return {name: OUTPUTS[name][1](prediction, obstacles, plane, types) for name in wanted}
+def encode_outputs(prediction: Prediction, plane: str, types: MessageTypes, wanted: Iterable[str] = OUTPUTS) -> dict[str, Any]:
+    """Encode the wanted outputs, by name. Raises FocError as `order_candidates` does."""
+    return {name: OUTPUTS[name][1](prediction, plane, types) for name in wanted}

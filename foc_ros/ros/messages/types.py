@@ -19,16 +19,13 @@ import numpy as np
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-CHECKS = '_check_fields'
-"""Slot of rclpy's messages that turns on the checks of their properties."""
-
 
 class _Layout(NamedTuple):
-    """A message class, whether it checks fields (None for rosbags), and each field's attribute, converter and default."""
+    """A message class, the converter of each of its fields, and the values of those that its constructor does not fill in."""
 
-    message_class: type
-    is_checked: bool | None
-    fields: dict[str, tuple[str, Callable[[Any], Any], Any]]
+    message_class: Any
+    converters: dict[str, Callable[[Any], Any]]
+    defaults: dict[str, Any]
 
 
 class MessageTypes(ABC):
@@ -40,28 +37,19 @@ class MessageTypes(ABC):
     def make(self, name: str, /, **values: Any) -> Any:
         """Create a message of type `name`, such as 'std_msgs/msg/Header'; fields that are not given have their defaults.
 
-        Messages share the values of their fields, defaults above all, so they must not be changed. rosbags knows no defaults but
-        zero: give a Quaternion its w. Raises TypeError for a field that the type does not have.
+        Messages may share the values of their fields, so they must not be changed. rosbags knows no defaults but zero: give a
+        Quaternion its w. Raises TypeError for a field that the type does not have.
         """
-        message_class, is_checked, fields = self._layouts.get(name) or self._keep_layout(name)
-        message: Any = object.__new__(message_class)  # the constructor is slower: it creates the default of every field
-        given = 0
-        if is_checked is not None:
-            setattr(message, CHECKS, is_checked)
-        for field, (attribute, convert, default) in fields.items():
-            if field in values:
-                setattr(message, attribute, convert(values[field]))
-                given += 1
-            else:
-                setattr(message, attribute, default)
-        if given < len(values):
-            raise TypeError(f'{name} has no field {", ".join(sorted(set(values) - set(fields)))}')
-        return message
+        layout = self._layouts.get(name) or self._keep_layout(name)
+        if unknown := values.keys() - layout.converters.keys():
+            raise TypeError(f'{name} has no field {", ".join(sorted(unknown))}')
+        given = {field: layout.converters[field](value) for field, value in values.items()}
+        return layout.message_class(**(layout.defaults | given))
 
     def fill(self, name: str, values: Iterable[Any]) -> Any:
         """Create a message from the values of all its fields in their order, such as a Point from x, y and z."""
-        fields = (self._layouts.get(name) or self._keep_layout(name)).fields
-        return self.make(name, **dict(zip(fields, values, strict=True)))
+        layout = self._layouts.get(name) or self._keep_layout(name)
+        return self.make(name, **dict(zip(layout.converters, values, strict=True)))
 
     def _keep_layout(self, name: str) -> _Layout:
         layout = self._layouts[name] = self._find_layout(name)
@@ -76,15 +64,10 @@ class RclpyTypes(MessageTypes):
     """The message classes of rclpy, each imported when it is first used."""
 
     def _find_layout(self, name: str) -> _Layout:
-        # values are stored where the fields' properties store them; the properties are used only if they check
         message_class = find_message_class(name)
         blank = message_class()
-        is_checked, names = getattr(blank, CHECKS), message_class.get_fields_and_field_types()
-        defaults = {field: getattr(blank, field) for field in names}
-        fields = {
-            field: (field if is_checked else f'_{field}', _find_converter(value), value) for field, value in defaults.items()
-        }
-        return _Layout(message_class, is_checked, fields)
+        names = message_class.get_fields_and_field_types()
+        return _Layout(message_class, {field: _find_converter(getattr(blank, field)) for field in names}, {})
 
 
 class RosbagsTypes(MessageTypes):
@@ -96,8 +79,8 @@ class RosbagsTypes(MessageTypes):
 
     def _find_layout(self, name: str) -> _Layout:
         defaults = {field: self._find_default(kind) for field, kind in self.typestore.fielddefs[name][1]}
-        fields = {field: (field, _find_converter(value), value) for field, value in defaults.items()}
-        return _Layout(self.typestore.types[name], None, fields)
+        converters = {field: _find_converter(value) for field, value in defaults.items()}
+        return _Layout(self.typestore.types[name], converters, defaults)
 
     def _find_default(self, kind: tuple[Any, Any]) -> Any:
         """Return the default of a field definition of the typestore."""
