@@ -15,7 +15,7 @@ from .classes.rows import find_decisions, tabulate_sides
 from .classes.sides import compute_branch_times
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
-from .likelihood import BETWEEN_OPERATORS, compute_likelihoods, compute_lookahead_share
+from .likelihood import BETWEEN_OPERATORS, compute_likelihoods, compute_lookahead_share, share_among_goals
 from .obstacle_table import Obstacles
 from .obstacles.clearance import measure_clearance
 from .ocp.problem import Problem
@@ -230,10 +230,12 @@ def rank_candidates(
     hand: HandState,
     goals: Array,
     planning_spread: float = BETWEEN_OPERATORS,
+    weights: Array | None = None,
 ) -> list[PredictedCandidate]:
     """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
 
-    obstacles: grown by the radius of the hand; goals (g, 2) [m]; planning_spread: as in `compute_likelihoods`.
+    obstacles: grown by the radius of the hand; goals (g, 2) [m]; planning_spread: as in `compute_likelihoods`; weights (g,): of
+    the goals, as in `share_among_goals`.
     """
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
@@ -241,11 +243,12 @@ def rank_candidates(
     looks_ahead = compute_lookahead_share(time_s, config, planning_spread) > 0.0
     branch_times = compute_branch_times(taken, obstacles) if looks_ahead and config.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    decisions = None
+    decisions, goal = None, np.array([each.candidate.goal for each in taken], dtype=np.intp)
     if len(taken) > 1 and (looks_ahead or config.weaving > 0.0):
-        goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
     shares = compute_likelihoods(costs, config, branch_times, shortfalls, decisions, time_s, planning_spread)
+    if len(goals) > 1:
+        shares = share_among_goals(shares, costs, goal, config, weights)
     ranked = [replace(each, likelihood=share) for each, share in zip(taken, shares.tolist(), strict=True)]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))
     return ranked + [each for each in candidates if not each.has_likelihood]
