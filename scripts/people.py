@@ -32,13 +32,13 @@ from foc_ros.ros.parameters import load_parameter_file
 
 PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'
 D3IL, HLP, PICKS = 'd3il_avoiding', 'hlp_reaching', 'hlp_picks'
-ROOM = Config().with_values({'homotopy.max_candidates': 24, 'rate_hz': 4.0})
+RARE = Config().with_values({'rate_hz': 4.0})
 HAND = Config().with_values({'scene.hand_radius': 0.0125, 'rate_hz': 4.0})
 UNLEARNT = {f'{each}.adaptation': 'none' for each in ('duration', 'covariance')}
 SETTINGS = {
-    (D3IL, 'defaults, nothing learnt'): ROOM.with_values(UNLEARNT),
-    (D3IL, 'defaults, pace learnt'): ROOM.with_values({'covariance.adaptation': 'none'}),
-    (D3IL, 'defaults'): ROOM,
+    (D3IL, 'defaults, nothing learnt'): RARE.with_values(UNLEARNT),
+    (D3IL, 'defaults, pace learnt'): RARE.with_values({'covariance.adaptation': 'none'}),
+    (D3IL, 'defaults'): RARE,
     (D3IL, 'thumb_stick.yaml'): load_parameter_file(EXAMPLES / 'thumb_stick.yaml').with_values({'rate_hz': 4.0}),
     (HLP, 'defaults, nothing learnt'): HAND.with_values(UNLEARNT),
     (HLP, 'defaults'): HAND,

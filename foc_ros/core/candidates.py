@@ -88,14 +88,13 @@ def _classify(candidate: Candidate, solution: Solution, problem: Problem) -> Pre
 def estimate_unsolved(candidates: Sequence[PredictedCandidate], in_the_way: Sequence[Obstacles]) -> list[PredictedCandidate]:
     """Return the candidates with an estimate for those that the solver could not solve although the search has a path for them.
 
-    The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from the class
-    to the same goal, or else to any, that is solved and of most similar length (`compute_detour_effort`). A class without a path,
-    such as one that an obstacle closes on the way, stays as it is. in_the_way: the obstacles on the way to each goal, grown by
-    the radius of the hand.
+    The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from a similar
+    class that is solved (`find_similar`). A class without a path, such as one that an obstacle closes on the way, stays as it is.
+    in_the_way: the obstacles on the way to each goal, grown by the radius of the hand.
     """
     solved = [each for each in candidates if each.has_likelihood]
     return [
-        _estimate(each, find_similar(each.candidate.goal, _measure(each.candidate), solved))
+        _estimate(each, find_similar(each.candidate, solved))
         if solved and each.status in FAILED and _has_path(each, in_the_way[each.candidate.goal])
         else each
         for each in candidates
@@ -112,17 +111,19 @@ def compute_detour_effort(length: float, distance: float) -> float:
     return straight + DETOUR * max(length**2 - straight, 0.0)
 
 
-def find_similar(goal: int, way: tuple[float, float], solved: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, float]:
-    """Return the solved candidate of most similar effort, to the same goal if there is one, and the ratio of both efforts.
+def find_similar(candidate: Candidate, solved: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, float]:
+    """Return the solved candidate that tells most of the effort of another class, and the ratio of both efforts.
 
-    way: length and straight distance [m] of the class that is not solved.
+    It is one that passes all obstacles on the same sides, if there is one, though it may lead to another goal; otherwise one to
+    the same goal, if there is one; of several, that of most similar effort.
     """
 
-    def measure(other: PredictedCandidate) -> tuple[bool, float]:
-        return other.candidate.goal != goal, abs(math.log(find_ratio(other)))
+    def measure(other: PredictedCandidate) -> tuple[bool, bool, float]:
+        differs = other.candidate.sides != candidate.sides, other.candidate.goal != candidate.goal
+        return *differs, abs(math.log(find_ratio(other)))
 
     def find_ratio(other: PredictedCandidate) -> float:
-        return compute_detour_effort(*way) / compute_detour_effort(*_measure(other.candidate))
+        return compute_detour_effort(*_measure(candidate)) / compute_detour_effort(*_measure(other.candidate))
 
     similar = min(solved, key=measure)
     return similar, find_ratio(similar)
@@ -195,7 +196,7 @@ def estimate_unfollowed(
         return []
     estimated = []
     for candidate in [each for each in unfollowed if each.label not in names]:
-        similar, ratio = find_similar(candidate.goal, _measure(candidate), known)
+        similar, ratio = find_similar(candidate, known)
         dt, cost = durations_s[candidate.goal] / (len(candidate.guess) - 1), ratio * similar.cost
         solution = replace(
             similar.solution,
