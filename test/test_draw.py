@@ -32,7 +32,6 @@ from foc_ros.reporting.figures import make_moment_figure, make_scene_figure, plo
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot, list_unsolved
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
-ROOT = Path(__file__).resolve().parents[1]
 PNG = b'\x89PNG\r\n\x1a\n'
 NOWHERE = np.zeros(2)
 
