@@ -1,26 +1,28 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Measure predictions of people: ways and positions; `make people` runs it.
+"""Measure predictions of people: ways, goals and positions; `make people` runs it.
 
-It uses D3IL and HLP, which have to be beside the checkout (`shared/data`), and writes the tables of doc/people.md. Each setting
-is scored on those recordings of D3IL and persons of HLP that no setting was chosen on.
+It uses D3IL and two parts of HLP, which have to be beside the checkout (`shared/data`), and writes the tables of doc/people.md.
+Each setting is scored on those recordings of D3IL and persons of HLP that no setting was chosen on.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from page import ROOT, SHARED, format_table, write_blocks
 
 from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, published_shares
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe_in_order
+from foc_ros.analysis.evaluation.other_goal import leave_goals_out, score_other_goal
 from foc_ros.analysis.evaluation.positions import compute_position_scores
-from foc_ros.analysis.evaluation.questions import PATH_CLASS, ask_all
-from foc_ros.analysis.evaluation.scores import score_forecasts, summarise
+from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask_all
+from foc_ros.analysis.evaluation.scores import Scores, score_forecasts, summarise
 from foc_ros.analysis.evaluation.truth import HORIZONS_S
 from foc_ros.analysis.parallel import collect_all, open_workers
 from foc_ros.analysis.recordings import Recording, find_recordings, group_by_operator
@@ -29,7 +31,7 @@ from foc_ros.core.errors import RecordingError
 from foc_ros.ros.parameters import load_parameter_file
 
 PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'
-D3IL, HLP = 'd3il_avoiding', 'hlp_reaching'
+D3IL, HLP, PICKS = 'd3il_avoiding', 'hlp_reaching', 'hlp_picks'
 ROOM = Config().with_values({'homotopy.max_candidates': 24, 'rate_hz': 4.0})
 HAND = Config().with_values({'scene.hand_radius': 0.0125, 'rate_hz': 4.0})
 UNLEARNT = {f'{each}.adaptation': 'none' for each in ('duration', 'covariance')}
@@ -42,6 +44,12 @@ SETTINGS = {
     (HLP, 'defaults'): HAND,
     (HLP, 'free_hand.yaml'): load_parameter_file(EXAMPLES / 'free_hand.yaml').with_values({'rate_hz': 4.0}),
 }
+PICK = Config().with_values({'rate_hz': 4.0})
+GOAL_SETTINGS = {'defaults, past goals not counted': PICK.with_values({'likelihood.past_goals': 0.0}), 'defaults': PICK}
+OTHER_SCORES = {'area_under_curve_half_way': 2, 'calibration_error': 3, 'loss': 3}
+"""Scores of the share of another goal, with their digits."""
+POINTS = np.arange(1, 10)
+"""Tenths of the way at which goals are asked for."""
 PUBLISHED = Baseline('published', partial(forecast_shares, published_shares), (None,))
 
 
@@ -53,23 +61,52 @@ def is_held_out(name: str) -> bool:
 def find_persons(data: Path) -> dict[str, list[Recording]]:
     """Return the recordings of each person that no setting was chosen on; D3IL does not tell its persons apart.
 
-    Settings were chosen on the recordings of D3IL with odd numbers, and on every other person of HLP from the first.
+    Settings were chosen on the recordings of D3IL with odd numbers, and on every other person of HLP from the first, or on those
+    whose numbers are no multiples of four.
     """
     found = group_by_operator(find_recordings(data))
+    if data.name == PICKS:
+        return {person: recordings for person, recordings in found.items() if int(person.rpartition('_')[2]) % 4 == 0}
     if len(found) == 1:
         return {person: [each for each in recordings if is_held_out(each.name)] for person, recordings in found.items()}
     return {person: found[person] for person in sorted(found)[1::2]}
 
 
+def score(recordings: Sequence[ObservedRecording], name: str) -> Scores:
+    """Return the scores of the published forecasts that answer a question."""
+    asked = [(n, each, question) for n, seen in enumerate(recordings) for each, question in ask_all(seen, name)]
+    return score_forecasts((n, each, question, PUBLISHED.forecast(each, question, None)) for n, each, question in asked)
+
+
 def format_ways(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
     """Return gain, share correct, calibration error and the worst tenth of the forecasts of the ways."""
-    asked = [(n, each, question) for n, seen in enumerate(recordings) for each, question in ask_all(seen, PATH_CLASS)]
-    found = summarise(
-        score_forecasts((n, each, question, PUBLISHED.forecast(each, question, None)) for n, each, question in asked)
-    )
+    found = summarise(score(recordings, PATH_CLASS))
     worst = min(each['gain'] for each in found['by_tenth'] if each['gain'] is not None)
     values = found['gain'], 100 * found['right'], found['expected_calibration_error'], worst
     return tuple(f'{value:.{digits}f}' for value, digits in zip(values, (3, 1, 3, 2), strict=True))
+
+
+def format_goals(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
+    """Return scores of the goals at the nearest of `POINTS`, each of which counts the same.
+
+    These are gain, the least gain, shares correct of all and half way, and calibration error.
+    """
+    scores = score(recordings, GOAL)
+    point = np.round(scores.progress * 10.0)
+    found = summarise(Scores(*(each[np.isin(point, POINTS)] for each in scores)))
+    gain, right = (
+        np.array([values[point == each].mean() for each in POINTS])
+        for values in (scores.log_likelihood + np.log(scores.possible), scores.correct)
+    )
+    values = gain.mean(), gain.min(), 100 * right.mean(), 100 * right[4], found['expected_calibration_error']
+    return tuple(f'{value:.{digits}f}' for value, digits in zip(values, (3, 2, 1, 1, 3), strict=True))
+
+
+def format_other(recordings: Sequence[ObservedRecording], left_out: Sequence[ObservedRecording], prior: float) -> tuple[str, ...]:
+    """Return area under the curve half way, calibration error and loss; arguments as in `score_other_goal`."""
+    found = score_other_goal(recordings, left_out, prior)
+    assert found is not None
+    return tuple(f'{found[name]:.{digits}f}' for name, digits in OTHER_SCORES.items())
 
 
 def format_positions(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
@@ -82,26 +119,44 @@ def format_positions(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]
     return tuple(' '.join(f'{value:.{digits}f}' for value in row) for row, digits in rows)
 
 
+def observe_persons(persons: Mapping[str, Sequence[Recording]], config: Config, title: str) -> list[ObservedRecording]:
+    """Observe the recordings of each person in their order; raise RecordingError where one cannot be used."""
+    observed = collect_all(partial(observe_in_order, config=config), list(persons.items()), title)
+    for name, reason in [failure for _, failed in observed for failure in failed.items()]:
+        raise RecordingError(f'{name}: {reason}')
+    return [recording for each, _ in observed for recording in each]
+
+
 def main() -> None:
     """Measure and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--every', type=int, default=1, help='use every n-th recording of a person only')
     parser.add_argument('--workers', type=int, default=len(os.sched_getaffinity(0)), metavar='N', help='worker processes')
     arguments = parser.parse_args()
-    ways, positions = [], []
+    ways, goals, positions = [], [], []
     with open_workers(arguments.workers):
         for (data, setting), config in SETTINGS.items():
-            items = [(person, found[:: arguments.every]) for person, found in find_persons(SHARED / data).items()]
-            observed = collect_all(partial(observe_in_order, config=config), items, f'{data}: {setting}')
-            recordings = [recording for each, _ in observed for recording in each]
-            for name, reason in [failure for _, failed in observed for failure in failed.items()]:
-                raise RecordingError(f'{name}: {reason}')
+            items = {person: found[:: arguments.every] for person, found in find_persons(SHARED / data).items()}
+            recordings = observe_persons(items, config, f'{data}: {setting}')
             ways.append((data, setting, *format_ways(recordings)))
             positions.append((data, setting, *format_positions(recordings)))
+        items = {person: found[:: arguments.every] for person, found in find_persons(SHARED / PICKS).items()}
+        for setting, config in GOAL_SETTINGS.items():
+            recordings = observe_persons(items, config, f'{PICKS}: {setting}')
+            goals.append((setting, *format_goals(recordings)))
+        without = {person: [*leave_goals_out({each.name: each for each in found}).values()] for person, found in items.items()}
+        left_out = observe_persons(without, config, f'{PICKS}: without the goals that were reached')
+        others = format_other(recordings, left_out, config.likelihood.other_goal)
     heads = 'gain [nat]', 'right [%]', 'ECE', 'worst tenth [nat]'
     measures = 'error [mm]', 'NLPD', 'NLPD, Singer', 'in 50 % region [%]', 'in 90 % region [%]'
-    tables = {'ways': (heads, ways), 'positions': (measures, positions)}
-    write_blocks({name: format_table(('data', 'parameters', *head), rows) for name, (head, rows) in tables.items()}, PAGE)
+    asked = 'gain [nat]', 'worst point [nat]', 'right [%]', 'right half way [%]', 'ECE'
+    tables = {
+        'ways': (('data', 'parameters', *heads), ways),
+        'goals': (('parameters', *asked), goals),
+        'other': (('area half way', 'calibration error', 'loss [nat]'), [others]),
+        'positions': (('data', 'parameters', *measures), positions),
+    }
+    write_blocks({name: format_table(*table) for name, table in tables.items()}, PAGE)
 
 
 if __name__ == '__main__':

@@ -129,11 +129,12 @@ def test_predictions_are_compared_at_the_exact_time(dt: float) -> None:
     assert interpolate_steps(np.zeros((8, 2, 2)), dt).shape == (len(TIMES_S), 2, 2)
 
 
-def test_in_order_a_recording_has_its_own_obstacles_only(tmp_path: Path) -> None:
+@pytest.mark.parametrize('duration_s', [0.4, 1.0])
+def test_in_order_a_recording_has_its_own_hand_and_obstacles_only(tmp_path: Path, duration_s: float) -> None:
     """Markers stay until they are deleted; those of another recording are not in the scene of this one."""
-    rows, scenes = [], []
+    rows, scenes, times_s = [], [], np.arange(0.0, duration_s, 0.02)
     for name in ('one_1', 'one_2'):
-        for t in np.arange(0.0, 1.0, 0.02):
+        for t in times_s:
             rows.append(f'{name},{t:.2f},0.0,{0.4 * min(t / 0.8, 1.0):.4f},0.7')
         scenes += [f'{name},Target,0,0.45,0.7,0.05,0.05,0.1', f'{name},Near,0.05,0.2,0.7,0.05,0.05,0.1']
     scenes.insert(2, 'one_1,Far,-0.1,0.2,0.7,0.05,0.05,0.1')
@@ -142,7 +143,7 @@ def test_in_order_a_recording_has_its_own_obstacles_only(tmp_path: Path) -> None
     found = find_recordings(tmp_path)
     config = Config().with_values({'rate_hz': 2.0, 'foc.steps': 20})
     observed, failed = observe_in_order([found['one_1'], found['one_2']], config)
-    assert not failed
+    assert not failed and [len(each.path.positions) for each in observed] == [len(times_s)] * 2
     before, after = ({name.partition('/')[0] for name in each.observations[0].ids} for each in observed)
     assert before == {'Near', 'Far'} and after == {'Near'}
 

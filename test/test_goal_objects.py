@@ -62,6 +62,15 @@ def test_an_obstacle_that_is_named_as_object_need_not_hold_the_goal() -> None:
     assert [each.label for each in named.candidates] == ['goal0:'] and measure(named.candidates[0], CUPS.take([0])) < 0.0
 
 
+def test_obstacles_decide_on_the_way_and_not_on_the_goal() -> None:
+    shares = []
+    for obstacles in (CUPS, make_obstacles(), make_obstacles([[0.1, 0.0], [0.1, 0.07]], 0.03)):
+        found = predict_in(obstacles, PLACES)
+        total = [sum(each.likelihood for each in found.candidates if each.candidate.goal == goal) for goal in (0, 1)]
+        shares.append(total[0] / sum(total))
+    assert shares == pytest.approx([shares[0]] * 3, abs=0.02)
+
+
 @pytest.mark.parametrize('field', ['name', 'object'])
 def test_a_goal_refuses_names_that_are_none(field: str) -> None:
     assert foc_ros.Goal((0.2, 0.0), object='front').object == 'front'

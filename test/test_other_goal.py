@@ -136,7 +136,7 @@ def test_ratios_between_candidates_to_one_goal_stay_as_they_are() -> None:
     pipeline.add_hand_sample(HandSample(0, np.zeros(2), 0.0, 'world'))
     prediction = pipeline.predict()
     assert prediction is not None
-    compared = compare_goals(prediction.candidates, hand, prediction.goal_positions, [0.9, 1.2], passing=False)
+    compared = compare_goals(prediction.candidates, hand, prediction.goal_positions, [0.9, 1.2])
     for goal in (0, 1):
         pairs = [pair for pair in zip(compared, prediction.candidates, strict=True) if pair[1].candidate.goal == goal]
         assert len(pairs) > 1

@@ -25,6 +25,9 @@ from foc_ros.ros.intake import DROPPED, Intake
 from foc_ros.ros.messages.encode_guidance import Place
 from foc_ros.ros.transforms import Transforms, TransformTree
 
+LATEST_NS = 2**63 - 1
+"""Stamp that is later than those of all messages [ns]."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -95,6 +98,9 @@ class Replay:
         for source in tuple(self.pipeline.scene.sources):
             self.intake.remove_source(source)
         self.pipeline.forget_scene()
+        hand = self.pipeline.hand_state
+        if hand is not None:  # the next sample restarts the filter, also if its stamp is only a little earlier than the last one
+            self.pipeline.hand_state = replace(hand, stamp_ns=LATEST_NS)
         self._begin_recording()
 
     def describe_losses(self) -> str:

@@ -15,7 +15,7 @@ from .classes.rows import find_decisions, tabulate_sides
 from .classes.sides import compute_branch_times
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
-from .likelihood import BETWEEN_OPERATORS, compute_likelihoods, compute_lookahead_share
+from .likelihood import BETWEEN_OPERATORS, compute_likelihoods, compute_lookahead_share, share_among_goals
 from .obstacle_table import Obstacles
 from .obstacles.clearance import measure_clearance
 from .ocp.problem import Problem
@@ -88,14 +88,13 @@ def _classify(candidate: Candidate, solution: Solution, problem: Problem) -> Pre
 def estimate_unsolved(candidates: Sequence[PredictedCandidate], in_the_way: Sequence[Obstacles]) -> list[PredictedCandidate]:
     """Return the candidates with an estimate for those that the solver could not solve although the search has a path for them.
 
-    The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from the class
-    to the same goal, or else to any, that is solved and of most similar length (`compute_detour_effort`). A class without a path,
-    such as one that an obstacle closes on the way, stays as it is. in_the_way: the obstacles on the way to each goal, grown by
-    the radius of the hand.
+    The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from a similar
+    class that is solved (`find_similar`). A class without a path, such as one that an obstacle closes on the way, stays as it is.
+    in_the_way: the obstacles on the way to each goal, grown by the radius of the hand.
     """
     solved = [each for each in candidates if each.has_likelihood]
     return [
-        _estimate(each, find_similar(each.candidate.goal, _measure(each.candidate), solved))
+        _estimate(each, find_similar(each.candidate, solved))
         if solved and each.status in FAILED and _has_path(each, in_the_way[each.candidate.goal])
         else each
         for each in candidates
@@ -112,17 +111,19 @@ def compute_detour_effort(length: float, distance: float) -> float:
     return straight + DETOUR * max(length**2 - straight, 0.0)
 
 
-def find_similar(goal: int, way: tuple[float, float], solved: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, float]:
-    """Return the solved candidate of most similar effort, to the same goal if there is one, and the ratio of both efforts.
+def find_similar(candidate: Candidate, solved: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, float]:
+    """Return the solved candidate that tells most of the effort of another class, and the ratio of both efforts.
 
-    way: length and straight distance [m] of the class that is not solved.
+    It is one that passes all obstacles on the same sides, if there is one, though it may lead to another goal; otherwise one to
+    the same goal, if there is one; of several, that of most similar effort.
     """
 
-    def measure(other: PredictedCandidate) -> tuple[bool, float]:
-        return other.candidate.goal != goal, abs(math.log(find_ratio(other)))
+    def measure(other: PredictedCandidate) -> tuple[bool, bool, float]:
+        differs = other.candidate.sides != candidate.sides, other.candidate.goal != candidate.goal
+        return *differs, abs(math.log(find_ratio(other)))
 
     def find_ratio(other: PredictedCandidate) -> float:
-        return compute_detour_effort(*way) / compute_detour_effort(*_measure(other.candidate))
+        return compute_detour_effort(*_measure(candidate)) / compute_detour_effort(*_measure(other.candidate))
 
     similar = min(solved, key=measure)
     return similar, find_ratio(similar)
@@ -195,7 +196,7 @@ def estimate_unfollowed(
         return []
     estimated = []
     for candidate in [each for each in unfollowed if each.label not in names]:
-        similar, ratio = find_similar(candidate.goal, _measure(candidate), known)
+        similar, ratio = find_similar(candidate, known)
         dt, cost = durations_s[candidate.goal] / (len(candidate.guess) - 1), ratio * similar.cost
         solution = replace(
             similar.solution,
@@ -229,10 +230,12 @@ def rank_candidates(
     hand: HandState,
     goals: Array,
     planning_spread: float = BETWEEN_OPERATORS,
+    weights: Array | None = None,
 ) -> list[PredictedCandidate]:
     """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
 
-    obstacles: grown by the radius of the hand; goals (g, 2) [m]; planning_spread: as in `compute_likelihoods`.
+    obstacles: grown by the radius of the hand; goals (g, 2) [m]; planning_spread: as in `compute_likelihoods`; weights (g,): of
+    the goals, as in `share_among_goals`.
     """
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
@@ -240,11 +243,12 @@ def rank_candidates(
     looks_ahead = compute_lookahead_share(time_s, config, planning_spread) > 0.0
     branch_times = compute_branch_times(taken, obstacles) if looks_ahead and config.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
-    decisions = None
+    decisions, goal = None, np.array([each.candidate.goal for each in taken], dtype=np.intp)
     if len(taken) > 1 and (looks_ahead or config.weaving > 0.0):
-        goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
     shares = compute_likelihoods(costs, config, branch_times, shortfalls, decisions, time_s, planning_spread)
+    if len(goals) > 1:
+        shares = share_among_goals(shares, costs, goal, config, weights)
     ranked = [replace(each, likelihood=share) for each, share in zip(taken, shares.tolist(), strict=True)]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))
     return ranked + [each for each in candidates if not each.has_likelihood]

@@ -198,6 +198,9 @@ class LikelihoodConfig(Group):
         0.0,
         0.99,
     )
+    past_goals: float = _p(
+        1.0, 'by how much each earlier reach counts for or against the goals that were announced; 0: not at all', '', 0.0, 100.0
+    )
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How candidates to different goals are compared: by what it takes to be there in the same time.
+"""How goals are compared: by what it takes to be there in the same time.
 
 The effort of a movement falls with the fifth power of its duration, and a farther goal is given more time. By the efforts alone,
 a hand that moves fast would seem to go to the farthest goal. With T_i the time to go to goal i and v the speed of the hand, the
@@ -9,13 +9,9 @@ goals are therefore compared for the common time
     T = max(`LEAST_COMMON_S`, min_i min(T_i, `HALF_WAY` D_i / v)),
 
 with the distance D_i of the goal: the second term is what a hand half way of a minimum-jerk movement has left. M_i(T) is the
-least integral of squared jerk that brings the hand to rest at goal i at T, obstacles disregarded, and F_i that of a movement with
-T_i that arrives as the candidates do. Obstacles cost what the best candidate to the goal, of cost J_i, has beyond F_i, and this
-extra falls with the fifth power of time likewise. All candidates to a goal get the factor
-
-    (M_i(T) + max(J_i - F_i, 0) (T_i / T)^5) / J_i,
-
-so that ratios between candidates to one goal stay as they are.
+least integral of squared jerk that brings the hand to rest at goal i at T. The costs of all candidates to a goal get the factor
+M_i(T) / J_i, with the cost J_i of the best one. Ratios between candidates to one goal stay as they are. Obstacles decide on the
+way, and not on the goal (`likelihood.share_among_goals`): people want an object that stands behind others no less.
 
 The hand may also go to a goal that nobody announced. Without obstacles, M_i(T) = 720 / T^5 (|g_i - e|^2 + (v T)^2 / 60), with e =
 x + v T / 2 the goal that takes least effort. As a density of the goal, M^-2 is a bivariate t distribution about e,
@@ -39,7 +35,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .hand.straight import compute_passing_effort, compute_straight_effort
+from .hand.straight import compute_straight_effort
 from .prediction import PredictedCandidate
 from .safety_preference import COST_FLOOR
 from .types import Array, HandState
@@ -55,27 +51,22 @@ BEYOND = 1.5
 
 
 def compare_goals(
-    candidates: Sequence[PredictedCandidate], hand: HandState, goals: Array, durations_s: Sequence[float], *, passing: bool
+    candidates: Sequence[PredictedCandidate], hand: HandState, goals: Array, durations_s: Sequence[float]
 ) -> list[PredictedCandidate]:
-    """Return candidates of a hand that is moved by jerk, with costs that are comparable between goals.
+    """Return candidates of a hand that is moved by jerk, with costs that are comparable between goals (g, 2) [m].
 
-    goals (g, 2) [m], with the times to go [s]; passing: whether the hand passes its goal at any velocity.
+    durations_s: times to go [s].
     """
-    best: dict[int, PredictedCandidate] = {}
+    best: dict[int, float] = {}
     for each in candidates:
-        goal = each.candidate.goal
-        if each.has_likelihood and (goal not in best or each.cost < best[goal].cost):
-            best[goal] = each
+        if each.has_likelihood:
+            goal = each.candidate.goal
+            best[goal] = min(max(each.cost, COST_FLOOR), best.get(goal, np.inf))
     if len(best) < 2:
         return list(candidates)
-    common_s, factors = find_common_time(hand, goals, durations_s), dict[int, float]()
-    state = hand.mean.reshape(3, 2)
-    for goal, each in best.items():
-        time_s, place = float(each.solution.times[-1]), goals[[goal]]
-        free = (compute_passing_effort if passing else compute_straight_effort)(state, place, np.array([time_s]))
-        least = compute_straight_effort(state, place, np.array([common_s]))
-        extra = max(each.cost - float(free[0]), 0.0) * (time_s / common_s) ** 5
-        factors[goal] = (float(least[0]) + extra + COST_FLOOR) / max(each.cost, COST_FLOOR)
+    common_s = np.full(len(goals), find_common_time(hand, goals, durations_s))
+    least = compute_straight_effort(hand.mean.reshape(3, 2), goals, common_s) + COST_FLOOR
+    factors = {goal: float(least[goal]) / cost for goal, cost in best.items()}
     return [
         replace(each, cost=factors[each.candidate.goal] * max(each.cost, COST_FLOOR)) if each.candidate.goal in factors else each
         for each in candidates

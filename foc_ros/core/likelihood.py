@@ -116,6 +116,33 @@ def compute_likelihoods(
     return mixed
 
 
+def share_among_goals(
+    shares: Array, costs: Array, goal: NDArray[np.intp], config: LikelihoodConfig, weights: Array | None = None
+) -> Array:
+    """Return likelihoods (k,) by which the classes of a goal share what it has by the least of their costs.
+
+    Parameters
+    ----------
+    shares
+        Likelihoods of the classes (k,), whose ratios within a goal stay as they are.
+    costs
+        Their costs (k,), comparable between goals [m^2/s^5].
+    goal
+        The row of their goal (k,).
+    config
+        The rule and its parameters.
+    weights
+        Factors on the likelihoods of the goals (g,); one if not given.
+    """
+    rows, group = np.unique(goal, return_inverse=True)
+    least = np.full(len(rows), np.inf)
+    np.minimum.at(least, group, costs)
+    of_goal = compute_likelihoods(least, config) if weights is None else compute_likelihoods(least, config) * weights[rows]
+    shared: Array = shares * (of_goal / np.maximum(np.bincount(group, shares, len(rows)), np.finfo(float).tiny))[group]
+    shared /= shared.sum()
+    return shared
+
+
 def compute_lookahead_share(time_s: float, config: LikelihoodConfig, planning_spread: float) -> float:
     """Return the probability Phi(log(T / H) / sigma) that an operator looks ahead whose time to go is time_s [s]."""
     if config.planning_horizon_s == 0.0:

@@ -202,7 +202,7 @@ class Pipeline:
         self._is_new, self._predicted_ns = False, stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
         scene = self.hand_state, obstacles, self.scene.goals
-        knowledge = Knowledge(self._library, self.learnt.planning_spread, self.scene.goal_objects)
+        knowledge = Knowledge(self._library, self.learnt.planning_spread, self.scene.goal_objects, self.learnt.habits)
         tracks, heights = self._tracks, self.scene.goal_heights
         self._task = PredictionTask(self.adapted_config, *scene, tracks, knowledge, deadline, heights)
         return self._task

@@ -68,7 +68,7 @@ def predict(
         What the previous prediction returned, or `NO_TRACKS`.
     knowledge
         Demonstrated paths, which become candidates where they fit the scene, recordings, which are evidence (`recordings`), the
-        planning of the operator (`likelihood`), and the obstacles that are goals by name.
+        planning of the operator (`likelihood`), the obstacles that are goals by name, and the goals of the past.
     deadline
         When the prediction has to be ready. All classes are solved together; what is not settled then is compared by an estimate.
     goal_heights
@@ -81,7 +81,7 @@ def predict(
         wall times apart.
     """
     began, stamp_ns, known = time.perf_counter(), hand.stamp_ns, tracks.keep_goals(goals)
-    library, planning_spread, objects = knowledge
+    library, planning_spread, objects, habits = knowledge
     scene = _prepare_scene(config, hand, obstacles, goals, objects, goal_heights, known)
     found, candidates = _find_candidates(scene, config, known, library, deadline)
     matched = known.match(candidates, stamp_ns)
@@ -93,16 +93,17 @@ def predict(
     held += [each for track in absent if (each := _hold_absent(track, scene.hand)) is not None]
     answered = estimate_unsolved(held, scene.in_the_way)
     others = estimate_unfollowed(found.unfollowed, answered, scene.durations_s)
-    compared = [*answered, *others]
+    compared, ends = [*answered, *others], habits.find_ends(goals)
     if isinstance(make_plant_model(config.foc), TripleIntegratorModel):
-        compared = compare_goals(compared, scene.hand, goals, scene.durations_s, passing=is_passing(config.duration))
-    all_ranked = rank_candidates(compared, config.likelihood, scene.near, scene.hand, goals, planning_spread)
+        compared = compare_goals(compared, scene.hand, ends, scene.durations_s)
+    weights = habits.weigh(goals, obstacles, objects, config.likelihood.past_goals)
+    all_ranked = rank_candidates(compared, config.likelihood, scene.near, scene.hand, goals, planning_spread, weights)
     ranked, unknown = split_unknown(all_ranked, {each.label for each in others})
     pooled = pool_recordings(ranked, library, hand, scene.blocking, goals)
     rest = Rest(unknown)
     if unknown < 1.0:
         spread_m, prior = config.foc.endpoint_stddev, config.likelihood.other_goal
-        other = find_other_share(scene.hand, goals, scene.durations_s, prior, spread_m)
+        other = find_other_share(scene.hand, ends, scene.durations_s, prior, spread_m)
         rest = Rest((1.0 - other) * unknown, other)
     known_share = 1.0 - sum(rest)
     smooth, rest = known.smooth([replace(each, likelihood=known_share * each.likelihood) for each in pooled], rest, stamp_ns)

@@ -8,8 +8,6 @@ miss the goal at T,
 
     (alpha, beta, gamma) = M (dp, dv, da),
     M = [[720, -360 T, 60 T^2], [-360 T, 168 T^2, -24 T^3], [60 T^2, -24 T^3, 3 T^4]] / T^5.
-
-A hand that passes the goal at any velocity needs 20 dp^2 / T^5.
 """
 
 from __future__ import annotations
@@ -36,10 +34,3 @@ def compute_straight_effort(state: Array, goals: Array, times_s: Array) -> Array
         gamma**2 * T + beta * gamma * T**2 + (beta**2 + alpha * gamma) * T**3 / 3 + alpha * beta * T**4 / 4 + alpha**2 * T**5 / 20
     )
     return np.asarray(effort.sum(axis=1))
-
-
-def compute_passing_effort(state: Array, goals: Array, times_s: Array) -> Array:
-    """Return the integral of squared jerk (g,) [m^2/s^5] that brings a state (3, 2) to goals (g, 2) [m] at any velocity."""
-    (x, v, a), T = state, times_s[:, None]
-    missing = goals - x - v * T - a * T**2 / 2
-    return np.asarray(20.0 * (missing**2).sum(axis=1) / times_s**5)

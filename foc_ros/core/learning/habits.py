@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which goals an operator prefers, and where reaches end: hands stop at the near side of objects, and tools have a length.
+
+By the rule of `core.goals`, a hand that begins to move at the distance d_i from goal i goes there with the probability q_i, which
+is proportional to d_i^(-2 beta) where no obstacle is in the way. With the number n_i of reaches that ended at the goal, and the
+sum e_i of its q_i over all reaches, the likelihoods of its candidates get the weight
+
+    w_i = (1 + c n_i) / (1 + c e_i),   c = `likelihood.past_goals`.
+
+This is the mean of a rate of Poisson events relative to the expected one, whose prior is a gamma distribution with the mean 1 and
+the variance c.
+
+A goal is the one of before if it is the only one in an obstacle with the same id, or, where it is in none, at the same place.
+
+Reaches are expected to end at the mean displacement from their goal of the n earlier ones, times n / (n + `PRIOR_REACHES`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from foc_ros.core.likelihood import normalise_logs
+from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.obstacles.geometry import find_holders
+from foc_ros.core.scene import Scene
+from foc_ros.core.types import Array, HandState, Record
+
+from .movements import find_goal_at_end
+
+SAME_GOAL_M = 0.02
+"""Distance within which a goal outside of obstacles is the one of before [m]."""
+MOST_LEFT = 0.5
+"""A reach ends at the nearest goal if it leaves no more than this share of its first distance: hands touch edges of objects."""
+LEAST_M = 1e-3
+"""Least distance of a goal with which its probability is computed [m]."""
+MOST_KNOWN = 64
+"""Number of goals that are remembered, the last ones."""
+PRIOR_REACHES = 3
+"""Number of reaches as many as which it counts that they should end at their goals."""
+
+
+class KnownGoal(NamedTuple):
+    """One goal: id of the obstacle that it is, or none; place (2,) [m]; how often it was reached, and was expected to be."""
+
+    name: str | None
+    place: Array
+    reached: float = 0.0
+    expected: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Reach(Record):
+    """The movement of the hand that has not ended yet.
+
+    onset_ns, onset (2,): when and where it began [m]; goals (g, 2) [m] with the names that they had then; position (2,): where
+    the hand is now [m].
+    """
+
+    onset_ns: int
+    onset: Array
+    goals: Array
+    names: tuple[str | None, ...]
+    position: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Habits(Record):
+    """What earlier reaches say.
+
+    known: the goals that were announced; present: the reach that has not ended, None at rest; reaches: number of those that ended
+    at a goal; missed (2,): sum of the displacements of their ends from it [m].
+    """
+
+    known: tuple[KnownGoal, ...] = ()
+    present: Reach | None = None
+    reaches: int = 0
+    missed: Array = field(default_factory=lambda: np.zeros(2))
+
+    def follow(self, hand: HandState, scene: Scene, beta: float) -> Habits:
+        """Return the habits after the next state of the hand; beta: `likelihood.beta`."""
+        habits, goals = self, scene.goals
+        if self.present is not None and self.present.onset_ns != hand.onset_ns:
+            habits = self._end(self.present, beta)
+        if hand.onset_ns is None or hand.onset_position is None or goals is None or len(goals) < 2:
+            return habits
+        reach = habits.present
+        if reach is None:
+            names = name_goals(goals, scene.obstacles(hand.stamp_ns), scene.goal_objects)
+            reach = Reach(hand.onset_ns, hand.onset_position, goals, names, hand.mean[:2])
+        return replace(habits, present=replace(reach, position=hand.mean[:2]))
+
+    def interrupt(self) -> Habits:
+        """Return the habits without the present reach."""
+        return replace(self, present=None)
+
+    def weigh(self, goals: Array, obstacles: Obstacles, objects: Sequence[str | None], past_goals: float) -> Array | None:
+        """Return the weights w_i (g,) of goals (g, 2) [m], None where nothing is known; past_goals: c."""
+        if not self.known or past_goals == 0.0:
+            return None
+        found = [self._find(*each) for each in zip(name_goals(goals, obstacles, objects), goals, strict=True)]
+        return np.array([(1.0 + past_goals * each.reached) / (1.0 + past_goals * each.expected) for each in found])
+
+    def find_ends(self, goals: Array) -> Array:
+        """Return where reaches to goals (g, 2) [m] are expected to end, (g, 2) [m]."""
+        return goals + self.missed / (self.reaches + PRIOR_REACHES)
+
+    def _end(self, reach: Reach, beta: float) -> Habits:
+        """Return the habits after a reach, which counts if it ended at a goal."""
+        goal, left = find_goal_at_end(reach.position[None], reach.goals)
+        if left > MOST_LEFT * math.dist(reach.onset, reach.goals[goal]):
+            return self.interrupt()
+        first = np.hypot(*(self.find_ends(reach.goals) - reach.onset).T)
+        expected = normalise_logs(-2.0 * beta * np.log(np.maximum(first, LEAST_M)))
+        before = [self._find(*each) for each in zip(reach.names, reach.goals, strict=True)]
+        now = [
+            KnownGoal(name, place, each.reached + (row == goal), each.expected + float(expected[row]))
+            for row, (name, place, each) in enumerate(zip(reach.names, reach.goals, before, strict=True))
+        ]
+        others = [each for each in self.known if all(each is not other for other in before)]
+        missed = self.missed + reach.position - reach.goals[goal]
+        return Habits(tuple([*others, *now][-MOST_KNOWN:]), None, self.reaches + 1, missed)
+
+    def _find(self, name: str | None, place: Array) -> KnownGoal:
+        """Return what is known of a goal, nothing where it is new."""
+        same = (each for each in self.known if each.name == name)
+        if name is None:
+            same = (each for each in same if math.dist(each.place, place) <= SAME_GOAL_M)
+        return min(same, key=lambda each: math.dist(each.place, place), default=KnownGoal(name, place))
+
+
+def name_goals(goals: Array, obstacles: Obstacles, objects: Sequence[str | None]) -> tuple[str | None, ...]:
+    """Return for each of the goals (g, 2) [m] the id of the obstacle that it is alone in, None where there is none."""
+    holds = find_holders(goals, obstacles, objects)
+    alone = holds & (holds.sum(axis=0) == 1)
+    return tuple(obstacles.ids[int(each.argmax())] if each.any() else None for each in alone)
