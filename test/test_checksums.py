@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import random
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -47,18 +46,16 @@ def mutants(data: bytes, count: int) -> Iterator[bytes]:
 
 
 def test_no_mutant_of_a_written_file_is_read_with_another_content(bag: Path, tmp_path: Path) -> None:
-    """The summary at its end repeats what stands before, and is not used: a reader refuses or ignores a change there."""
-    whole, data = read(bag), (bag / 'bag.mcap').read_bytes()
-    summary, refused, total = struct.unpack('<Q', data[-28:-20])[0], 0, 0
+    whole, data, refused, total = read(bag), (bag / 'bag.mcap').read_bytes(), 0, 0
     file = tmp_path / 'bad.mcap'
     for mutant in mutants(data, 200):
         file.write_bytes(mutant)
         try:
-            assert read(file) == whole and mutant[:summary] == data[:summary]
+            assert read(file) == whole
         except RecordingError:
-            refused += mutant[:summary] != data[:summary]
-        total += mutant[:summary] != data[:summary]
-    assert refused == total > 50
+            refused += 1
+        total += mutant != data
+    assert refused == total > 100
 
 
 def test_an_independent_reader_finds_every_checksum_right(bag: Path) -> None:

@@ -19,7 +19,7 @@ from foc_ros.analysis.evaluation.observations import (
     observe_in_order,
 )
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
-from foc_ros.analysis.evaluation.truth import RecordedPath, find_rows_ahead
+from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth, find_rows_ahead
 from foc_ros.analysis.recordings import BagRecording, convert_tables, find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core import tracks
@@ -168,3 +168,12 @@ def test_true_positions_are_interpolated_and_unknown_beyond_the_end() -> None:
     np.testing.assert_allclose(
         path.interpolate(250_000_000, np.array([0.25, 0.5, 1.0])), [[0.5, 0.0], [0.75, 0.0], [np.nan, np.nan]]
     )
+
+
+def test_a_hand_that_passes_a_row_and_comes_back_to_a_goal_before_it_has_a_truth() -> None:
+    x = np.concatenate([np.linspace(0.0, 0.3, 30), np.linspace(0.29, 0.15, 10)])
+    positions, goals = np.column_stack([x, np.zeros(40)]), np.array([[0.15, 0.0], [0.5, 0.0]])
+    path = RecordedPath(np.arange(40) * 10_000_000, positions, goals, 0)
+    obstacles = make_obstacles([[0.2, 0.1]], 0.02)
+    truth = find_ground_truth(0, path, obstacles, np.array([0]), DIRECTION, goals)
+    assert truth.is_ahead.tolist() == [True] and truth.approach == 0.0 and truth.goal == 0

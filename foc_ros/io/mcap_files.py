@@ -12,14 +12,15 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Iterator
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import BinaryIO
+from zlib import crc32
 
 from mcap.exceptions import EndOfFile
 from mcap.records import Channel as ChannelRecord
 from mcap.records import Message, Schema, Statistics
 from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, Writer
 
 from foc_ros.core.errors import RecordingError
 
@@ -28,6 +29,9 @@ from .channels import Channel
 MAGIC = b'\x89MCAP0\r\n'
 FOOTER_BYTES = 37
 """Size of the end of a file: the footer, and MAGIC."""
+_HEAD, _CRC = struct.Struct('<BQ'), struct.Struct('<I')
+"""Code and length of a record; a checksum."""
+_FOOTER, _CHUNK, _DATA_END = 0x02, 0x06, 0x0F
 
 
 class McapFile:
@@ -45,6 +49,8 @@ class McapFile:
         try:
             has_footer = _has_footer(self._stream)
             self.loss = '' if has_footer else 'the recorder was killed; read up to the last whole chunk'
+            if has_footer:
+                _check_summary(self._stream)
             self._scan()
         except BaseException:
             self.close()
@@ -103,6 +109,14 @@ def _has_footer(stream: BinaryIO) -> bool:
     return size > FOOTER_BYTES + len(MAGIC) and end.startswith(b'\x02') and end.endswith(MAGIC)
 
 
+def _check_summary(stream: BinaryIO) -> None:
+    """Raise RecordingError if the summary of a file differs from its checksum, which the library mcap does not compare."""
+    with mmap(stream.fileno(), 0, access=ACCESS_READ) as content, memoryview(content) as data:
+        start, _, stated = struct.unpack_from('<QQI', data, len(data) - FOOTER_BYTES + _HEAD.size)
+        if stated and stated != crc32(data[start or len(data) - FOOTER_BYTES : len(data) - len(MAGIC) - _CRC.size]):
+            raise RecordingError('damaged: the summary section differs from its checksum')
+
+
 def _describe(channel: ChannelRecord, schema: Schema | None, count: int) -> Channel:
     name, form, text = ('', '', b'') if schema is None else (schema.name, schema.encoding, schema.data)
     qos = channel.metadata.get('offered_qos_profiles', '')
@@ -110,19 +124,22 @@ def _describe(channel: ChannelRecord, schema: Schema | None, count: int) -> Chan
 
 
 def add_checksums(file: Path) -> None:
-    """Write a whole file anew, with all checksums: rosbags writes none. Raises OSError if it cannot be written."""
-    copy, schemas, channels = file.with_name(f'{file.name}.unfinished'), {0: 0}, dict[int, int]()
-    with file.open('rb') as source, copy.open('wb') as target:
-        writer = Writer(target, compression=CompressionType.NONE, enable_data_crcs=True)
-        writer.start('ros2', 'foc_ros')
-        for record in StreamReader(source).records:
-            if isinstance(record, Schema) and record.id not in schemas:
-                schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
-            elif isinstance(record, ChannelRecord) and record.id not in channels:
-                head = record.topic, record.message_encoding, schemas[record.schema_id]
-                channels[record.id] = writer.register_channel(*head, record.metadata)
-            elif isinstance(record, Message):
-                content = record.log_time, record.data, record.publish_time, record.sequence
-                writer.add_message(channels[record.channel_id], *content)
-        writer.finish()
-    copy.replace(file)
+    """Write the checksums (CRC-32) into a whole file without compression: rosbags writes none. Raises OSError if that fails.
+
+    MCAP (https://mcap.dev/spec) has one for each chunk, for the data section, and for the summary with the footer.
+    """
+    with file.open('r+b') as stream, mmap(stream.fileno(), 0) as content, memoryview(content) as data:
+        start, summary, code = len(MAGIC), 0, 0
+        while code != _FOOTER:
+            code, length = _HEAD.unpack_from(data, start)
+            inside, end = start + _HEAD.size, start + _HEAD.size + length
+            places = {  # where the checksum of a record is, and of what
+                _CHUNK: (inside + 24, inside + 40, end),
+                _DATA_END: (inside, 0, start),
+                _FOOTER: (end - _CRC.size, summary, end - _CRC.size),
+            }
+            if code in places:
+                place, begin, stop = places[code]
+                _CRC.pack_into(data, place, crc32(data[begin:stop]))
+            summary = end if code == _DATA_END else summary
+            start = end

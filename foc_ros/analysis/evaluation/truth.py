@@ -123,7 +123,8 @@ def find_sides(path: Array, centres: Array) -> Sides:
 def _compute_approach(row_position: Array, path: RecordedPath, position: Array, now: int) -> float:
     """Return the share of the distance from the last row, or the start, to the next one, that sample `now` has travelled."""
     is_passed = find_rows_ahead(row_position, position)
-    passed = [int(np.flatnonzero(position < each)[-1]) + 1 for each in row_position[is_passed]]
+    crosses = [(position[:-1] < each) & (position[1:] >= each) for each in row_position[is_passed]]
+    passed = [int(np.flatnonzero(each)[-1]) + 1 for each in crosses]
     following = min((each for each in passed if each > now), default=None)
     if following is None:
         return float('nan')
