@@ -27,7 +27,7 @@ from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 from foc_ros.io.class_library import load_library, save_library
 
-CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_candidates': 24, 'likelihood.other_goal': 0.0})
+CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_detour': 100.0, 'likelihood.other_goal': 0.0})
 
 
 def move(path, rest_s=0.5, moving_s=2.0):
