@@ -151,7 +151,7 @@ def test_errors_in_a_library_file_name_the_field(tmp_path, break_it, words):
         load_library(str(file))
 
 
-CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_candidates': 24, 'likelihood.other_goal': 0.0})
+CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_detour': 100.0, 'likelihood.other_goal': 0.0})
 
 
 def move(path, rest_s=0.5, moving_s=2.0):
