@@ -7,9 +7,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import prediction_samples
 import pytest
 from guidance_samples import PERIOD
-from prediction_samples import outcome, prediction
+from prediction_samples import outcome
 
 import foc_ros
 from foc_ros.core.config import Config, GuidanceConfig
@@ -27,11 +28,16 @@ from foc_ros.core.guidance.paths import (
     find_need,
 )
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.prediction import Prediction
+from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 
 ROUND = make_obstacles([(0.1, 0.0)], [0.03])
 SETTINGS = GuidanceConfig(k_max=100.0, clearance=0.0)
+
+
+def prediction(*outcomes: PredictedCandidate, **changes: object) -> Prediction:
+    """Return a prediction of these outcomes, without obstacles if none are given."""
+    return prediction_samples.prediction(*outcomes, **({'obstacles': make_obstacles()} | changes))
 
 
 def straight(label: str = 'goal0:', likelihood: float = 1.0, start: Array = (0.0, 0.0), end: Array = (0.3, 0.0), **rest: object):
