@@ -35,7 +35,8 @@ ROUNDS = 3
 VIOLATED, VIOLATED_APART = 1e-3, 0.25
 """Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
 CURVED = 1.0
-"""Gain of a step that failed below which margins are corrected to second order: farther away that tells nothing."""
+"""Gain of a step below which second derivatives of the margins count, and margins are corrected to second order after a step that
+failed: farther away both tell nothing."""
 ACCURACY = 3e-10
 """Margin relative to the scene that counts as none: accuracy of a QP."""
 
@@ -128,6 +129,8 @@ class Planner:
         at, control, k_now = np.searchsorted(rows, places.problem), now.control[rows], now.k[rows]
         is_free = (k_now > 0.0) & (k_now < self.wanted_k[rows] * (1.0 - FREE))
         gradients = linearise(margins, places, control[at], k_now[at], known > 0.0, is_free[at])
+        is_near = ~((now.gain >= CURVED) & np.isfinite(now.gain))[places.problem[known > 0.0]]
+        gradients = gradients._replace(weights=gradients.weights * is_near[:, None, None])
         if failed is not None:
             gradients = self._look_back(gradients, places, at, rows, now, failed)
         quadratic = objective.expand(rows, control, now.at.cost[rows])
