@@ -122,7 +122,8 @@ def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions_and_numb
         other = next(each for each in cold.solved_candidates if each.label == one.label)
         if one.way in numbers:
             assert one.solution.qp_solves < other.solution.qp_solves
-        np.testing.assert_allclose(one.solution.path, other.solution.path, atol=1e-4)
+        exact = 1e-4 if one.likelihood > 0.5 else 1e-3  # an unlikely class is settled less exactly
+        np.testing.assert_allclose(one.solution.path, other.solution.path, atol=exact)
 
 
 def test_unlikely_classes_are_solved_in_turns_unless_the_scene_changes() -> None:

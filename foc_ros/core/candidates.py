@@ -15,7 +15,7 @@ from .classes.rows import find_decisions, tabulate_sides
 from .classes.sides import compute_branch_times
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
-from .likelihood import BETWEEN_OPERATORS, compute_likelihoods, compute_lookahead_share, share_among_goals
+from .likelihood import BETWEEN_OPERATORS, ClassGoals, compute_likelihoods, compute_lookahead_share
 from .obstacle_table import Obstacles
 from .obstacles.clearance import measure_clearance
 from .ocp.problem import Problem
@@ -234,8 +234,8 @@ def rank_candidates(
 ) -> list[PredictedCandidate]:
     """Return the distinct candidates: solved and compromised ones, most likely first, then the others, with likelihood 0.
 
-    obstacles: grown by the radius of the hand; goals (g, 2) [m]; planning_spread: as in `compute_likelihoods`; weights (g,): of
-    the goals, as in `share_among_goals`.
+    obstacles: grown by the radius of the hand; goals (g, 2) [m]; planning_spread: as in `compute_likelihoods`; weights (g,):
+    factors on the likelihoods of the goals.
     """
     candidates = drop_duplicates(candidates)
     taken = [each for each in candidates if each.has_likelihood]
@@ -246,9 +246,8 @@ def rank_candidates(
     decisions, goal = None, np.array([each.candidate.goal for each in taken], dtype=np.intp)
     if len(taken) > 1 and (looks_ahead or config.weaving > 0.0):
         decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
-    shares = compute_likelihoods(costs, config, branch_times, shortfalls, decisions, time_s, planning_spread)
-    if len(goals) > 1:
-        shares = share_among_goals(shares, costs, goal, config, weights)
+    among = ClassGoals(goal, weights) if len(goals) > 1 else None
+    shares = compute_likelihoods(costs, config, branch_times, shortfalls, decisions, time_s, planning_spread, among)
     ranked = [replace(each, likelihood=share) for each, share in zip(taken, shares.tolist(), strict=True)]
     ranked.sort(key=lambda each: (-each.likelihood, each.label))
     return ranked + [each for each in candidates if not each.has_likelihood]

@@ -10,7 +10,7 @@ factor k is below the wanted one has a smaller weight, by the factor exp(-likeli
 
 J_i is the integral of the squared control of class i: its effort to go times the length of a step.
 
-This is for operators who plan the whole way. They do so where they need less time than their planning horizon. Otherwise they
+This is for operators who plan the whole way; among several goals they decide as `share_among_goals` says. They do so where they need less time than their planning horizon. Otherwise they
 look ahead: they weigh what is near and leave distant choices open, with p' from the rules below. The horizon has a log-normal
 distribution with the median H = `likelihood.planning_horizon_s` and the spread sigma, between operators or of one from choice to
 choice, so that with the shortest time to go T of the classes
@@ -40,6 +40,7 @@ The weight of a class that weaves through w_i rows (`classes.rows`) is smaller b
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,13 @@ BETWEEN_OPERATORS, OWN_SPREAD = 1.0, 0.3
 """Standard deviation of the logarithm of the planning horizon: between operators, and of one operator from choice to choice."""
 
 
+class ClassGoals(NamedTuple):
+    """The goals of k classes: row (k,) of each, and factors on the likelihoods of the goals (g,), None where they are one."""
+
+    row: NDArray[np.intp]
+    weights: Array | None = None
+
+
 def compute_likelihoods(
     costs: Array,
     config: LikelihoodConfig,
@@ -66,6 +74,7 @@ def compute_likelihoods(
     decisions: Decisions | None = None,
     time_s: float = 0.0,
     planning_spread: float = BETWEEN_OPERATORS,
+    goals: ClassGoals | None = None,
 ) -> Array:
     """Return the likelihoods (k,) of classes by the rule that `likelihood.rule` names; they sum to one.
 
@@ -85,6 +94,8 @@ def compute_likelihoods(
         Shortest time to go of the classes [s].
     planning_spread
         Standard deviation of the logarithm of the planning horizon.
+    goals
+        The goals of the classes, if there are several.
 
     Raises
     ------
@@ -103,6 +114,8 @@ def compute_likelihoods(
     logs = np.maximum(logs - best, LEAST_LOG) if np.isfinite(best) else np.zeros(len(values))
     woven = np.zeros(len(values)) if decisions is None else config.weaving * decisions.woven
     planned = normalise_logs(logs - woven)
+    if goals is not None and len(logs):
+        planned = share_among_goals(planned, values, goals, config)
     share = compute_lookahead_share(time_s, config, planning_spread)
     if share == 0.0 or not len(logs) or (branch_times is None and decisions is None):
         return planned
@@ -116,9 +129,7 @@ def compute_likelihoods(
     return mixed
 
 
-def share_among_goals(
-    shares: Array, costs: Array, goal: NDArray[np.intp], config: LikelihoodConfig, weights: Array | None = None
-) -> Array:
+def share_among_goals(shares: Array, costs: Array, goals: ClassGoals, config: LikelihoodConfig) -> Array:
     """Return likelihoods (k,) by which the classes of a goal share what it has by the least of their costs.
 
     Parameters
@@ -127,17 +138,15 @@ def share_among_goals(
         Likelihoods of the classes (k,), whose ratios within a goal stay as they are.
     costs
         Their costs (k,), comparable between goals [m^2/s^5].
-    goal
-        The row of their goal (k,).
+    goals
+        Their goals.
     config
         The rule and its parameters.
-    weights
-        Factors on the likelihoods of the goals (g,); one if not given.
     """
-    rows, group = np.unique(goal, return_inverse=True)
+    rows, group = np.unique(goals.row, return_inverse=True)
     least = np.full(len(rows), np.inf)
     np.minimum.at(least, group, costs)
-    of_goal = compute_likelihoods(least, config) if weights is None else compute_likelihoods(least, config) * weights[rows]
+    of_goal = compute_likelihoods(least, config) * (1.0 if goals.weights is None else goals.weights[rows])
     shared: Array = shares * (of_goal / np.maximum(np.bincount(group, shares, len(rows)), np.finfo(float).tiny))[group]
     shared /= shared.sum()
     return shared

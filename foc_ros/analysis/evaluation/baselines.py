@@ -24,7 +24,7 @@ from scipy.interpolate import BPoly
 
 from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig
 from foc_ros.core.hand.straight import compute_straight_effort
-from foc_ros.core.likelihood import OWN_SPREAD, compute_likelihoods, share_among_goals
+from foc_ros.core.likelihood import OWN_SPREAD, ClassGoals, compute_likelihoods
 from foc_ros.core.registry import Registry
 from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import Array, Record
@@ -108,9 +108,8 @@ def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Arr
     branch_times, shortfalls = candidates.branch_times.take(solved), candidates.safety_shortfall[solved]
     time_s = float(candidates.time_s[solved].min()) if len(solved) else 0.0
     decided = branch_times, shortfalls, candidates.decisions, time_s, OWN_SPREAD
-    shares = compute_likelihoods(candidates.cost_to_go[solved], config, *decided)
-    if len(observation.goals) > 1:
-        shares = share_among_goals(shares, candidates.cost_to_go[solved], candidates.goal[solved], config)
+    goals = ClassGoals(candidates.goal[solved]) if len(observation.goals) > 1 else None
+    shares = compute_likelihoods(candidates.cost_to_go[solved], config, *decided, goals)
     return _share_among_solved(observation, shares)
 
 
