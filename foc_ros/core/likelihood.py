@@ -10,9 +10,10 @@ factor k is below the wanted one has a smaller weight, by the factor exp(-likeli
 
 J_i is the integral of the squared control of class i: its effort to go times the length of a step.
 
-This is for operators who plan the whole way; among several goals they decide as `share_among_goals` says. They do so where they need less time than their planning horizon. Otherwise they
-look ahead: they weigh what is near and leave distant choices open, with p' from the rules below. The horizon has a log-normal
-distribution with the median H = `likelihood.planning_horizon_s` and the spread sigma, between operators or of one from choice to
+This is for operators who plan the whole way; among several goals they decide as `share_among_goals` says. They do so where they
+need less time than their planning horizon. Otherwise they look ahead: they weigh what is near and leave distant choices open,
+with p' from the rules below. The horizon has a log-normal distribution with the median H = `likelihood.planning_horizon_s` and
+the spread sigma, between operators or of one from choice to
 choice, so that with the shortest time to go T of the classes
 
     p_i <- (1 - s) p_i + s p'_i,   s = Phi(log(T / H) / sigma).
