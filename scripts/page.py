@@ -15,7 +15,7 @@ IMAGES, SHARED = ROOT / 'doc' / 'images', ROOT.parent / 'shared' / 'data'
 def format_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table."""
     lines = [head, ['---'] * len(head), *rows]
-    return '\n'.join('| ' + ' | '.join(cells) + ' |' for cells in lines)
+    return '\n'.join(f'|{"|".join(cells)}|' for cells in lines)
 
 
 def find_blocks(page: str) -> dict[str, str]:
