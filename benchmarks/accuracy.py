@@ -38,7 +38,7 @@ from page import IMAGES, ROOT, format_table, write_blocks
 
 PAGE = ROOT / 'doc' / 'accuracy.md'
 CASES, SHAPES = ROOT / 'test' / 'reference_cases.json', ROOT / 'test' / 'reference_shapes.json'
-SAMPLES = 2000
+SAMPLES, REACHES = 2000, 200
 SETTINGS: dict[str, tuple[str, dict[str, float]]] = {
     'lv': ('lv', {}),
     'hc': ('hc', {}),
@@ -143,7 +143,7 @@ class Outcomes:
 def measure_guarantee() -> dict[str, Outcomes]:
     """Solve all reaches by each strategy and simulate the solutions."""
     measured = {name: Outcomes() for name in SETTINGS}
-    for reach in varied_reaches.feasible_reaches():
+    for reach in varied_reaches.feasible_reaches(REACHES, tries=3 * REACHES):
         for name, (strategy, settings) in SETTINGS.items():
             measured[name].add(reach, strategy, settings)
     return measured

@@ -33,6 +33,6 @@ def write_reach(folder: Path, rate_hz: float = 100.0) -> Path:
 def test_steadiness_of_a_reach_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = str(write_reach(tmp_path))
     flicker.main([folder, '--strategy', 'lv', '--noise', '0', '--set', 'foc.steps=20', '--set', 'rate_hz=25'])
-    cells = capsys.readouterr().out.splitlines()[-1].strip('| ').split(' | ')
+    cells = capsys.readouterr().out.splitlines()[-1].strip('|').split('|')
     assert cells[1:3] == ['`lv`', '0']
     assert int(cells[3]) == 24
