@@ -97,6 +97,16 @@ def is_smooth(margins: Margins, control: np.ndarray, time: float) -> bool:
     return len(set(found.is_on_edge.tolist())) == 1
 
 
+def check_derivatives(made: Gradients, control: np.ndarray, find, least: float, rate: float = 1.0, within: float = 1e-9) -> None:
+    """Compare the derivatives at a control with differences of `find`, a function of the control, times a rate."""
+    for direction in 1e-3 * random_directions(control):
+        more, less = (find(control + sign * direction) for sign in (1, -1))
+        along = made.factors[0] @ direction
+        added = made.diagonal[0] @ direction**2 + along @ made.weights[0] @ along
+        assert made.gradient[0] @ direction == pytest.approx(rate * (more - less) / 2, rel=1e-3, abs=1e-9)
+        assert added == pytest.approx(-rate * (more - 2 * least + less), rel=2e-2, abs=within)
+
+
 @EVERY
 def test_the_gradient_of_a_margin_is_its_derivative_at_any_time(case):
     make, *given = MADE[case]
@@ -126,12 +136,7 @@ def test_the_hessian_is_that_of_the_least_margin_which_slides(case):
         seen += 1
         made = linearise(margins, control, np.array([time]))
         assert made.value[0] == pytest.approx(least, abs=1e-9)
-        for direction in 1e-3 * random_directions(control):
-            more, less = (find_least(margins, control + sign * direction, time)[1] for sign in (1, -1))
-            along = made.factors[0] @ direction
-            added = made.diagonal[0] @ direction**2 + along @ made.weights[0] @ along
-            assert made.gradient[0] @ direction == pytest.approx((more - less) / 2, rel=1e-3, abs=1e-9)
-            assert added == pytest.approx(-(more - 2 * least + less), rel=2e-2, abs=1e-9)
+        check_derivatives(made, control, lambda moved, time=time: find_least(margins, moved, time)[1], least)
     assert seen or 'box' in case or 'hull' in case, 'a circle has a least margin where it is smooth'
 
 
@@ -148,12 +153,8 @@ def test_where_the_safety_factor_is_free_the_hessian_is_that_of_the_least_one(ca
         seen += 1
         made = linearise(margins, control, np.array([time]), k, is_free=True)
         assert made.value[0] == pytest.approx(0.0, abs=1e-9)
-        for direction in 1e-3 * random_directions(control):
-            more, less = (find_least_factor(margins, control + sign * direction, time)[1] for sign in (1, -1))
-            along = made.factors[0] @ direction
-            added = made.diagonal[0] @ direction**2 + along @ made.weights[0] @ along
-            assert made.gradient[0] @ direction == pytest.approx(made.stddev_rate[0] * (more - less) / 2, rel=1e-3, abs=1e-9)
-            assert added == pytest.approx(-made.stddev_rate[0] * (more - 2 * k + less), rel=2e-2, abs=2e-9)
+        factor = lambda moved, time=time: find_least_factor(margins, moved, time)[1]  # noqa: E731
+        check_derivatives(made, control, factor, k, made.stddev_rate[0], within=2e-9)
     assert seen or 'circle' not in case, 'a circle has a least safety factor where it is smooth'
 
 

@@ -80,15 +80,15 @@ def test_measures_of_a_trial_with_known_answers() -> None:
     assert measures['opposing_share'] == pytest.approx(0.5, rel=0.02)
 
 
-@pytest.mark.parametrize('rule', ASSISTANCE)
-def test_every_rule_keeps_force_and_slew_within_the_limits(rule: str) -> None:
+@pytest.mark.parametrize('name', [*ASSISTANCE, *RIVALS])
+def test_every_rule_keeps_force_and_slew_within_the_limits(name: str) -> None:
     task = draw_task(NOISY, np.random.default_rng(2))
     noise = np.random.default_rng(3).normal(size=(900, 2, 2))
-    trial = run_trial(task, RULES[rule], QUICK, noise)
+    trial = run_trial(task, {**RULES, **RIVALS}[name], QUICK, noise)
     sizes = np.hypot(*trial.assistance.T)
     assert sizes.max() <= QUICK.guidance.f_max + 1e-9
     assert np.hypot(*np.diff(trial.assistance, axis=0).T).max() <= QUICK.guidance.slew * DT + 1e-9
-    assert (sizes.max() > 0.0) == (rule != 'none')
+    assert (sizes.max() > 0.0) == (name != 'none')
 
 
 class Misled(Assistance):
@@ -181,16 +181,6 @@ def test_the_potential_field_pushes_outward_within_its_influence_only() -> None:
     eta = ASSISTANCE_N * FULL_FORCE_M**2 / (1 / FULL_FORCE_M - 1 / INFLUENCE_M)
     potential = lambda rho: 0.5 * eta * (1 / rho - 1 / INFLUENCE_M) ** 2  # noqa: E731
     assert at(rho)[0] == pytest.approx(-(potential(rho + step) - potential(rho - step)) / (2 * step), rel=1e-5)
-
-
-@pytest.mark.parametrize('rule', RIVALS)
-def test_every_rival_keeps_force_and_slew_within_the_limits(rule: str) -> None:
-    task = draw_task(NOISY, np.random.default_rng(2))
-    noise = np.random.default_rng(3).normal(size=(900, 2, 2))
-    trial = run_trial(task, RIVALS[rule], QUICK, noise)
-    sizes = np.hypot(*trial.assistance.T)
-    assert 0.0 < sizes.max() <= QUICK.guidance.f_max + 1e-9
-    assert np.hypot(*np.diff(trial.assistance, axis=0).T).max() <= QUICK.guidance.slew * DT + 1e-9
 
 
 def run_study(*options: str) -> subprocess.CompletedProcess[str]:

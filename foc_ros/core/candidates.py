@@ -117,13 +117,14 @@ def find_similar(candidate: Candidate, solved: Sequence[PredictedCandidate]) -> 
     It is one that passes all obstacles on the same sides, if there is one, though it may lead to another goal; otherwise one to
     the same goal, if there is one; of several, that of most similar effort.
     """
+    effort = compute_detour_effort(*_measure(candidate))
 
     def measure(other: PredictedCandidate) -> tuple[bool, bool, float]:
         differs = other.candidate.sides != candidate.sides, other.candidate.goal != candidate.goal
         return *differs, abs(math.log(find_ratio(other)))
 
     def find_ratio(other: PredictedCandidate) -> float:
-        return compute_detour_effort(*_measure(candidate)) / compute_detour_effort(*_measure(other.candidate))
+        return effort / compute_detour_effort(*_measure(other.candidate))
 
     similar = min(solved, key=measure)
     return similar, find_ratio(similar)

@@ -11,7 +11,7 @@ goals are therefore compared for the common time
 with the distance D_i of the goal: the second term is what a hand half way of a minimum-jerk movement has left. M_i(T) is the
 least integral of squared jerk that brings the hand to rest at goal i at T. The costs of all candidates to a goal get the factor
 M_i(T) / J_i, with the cost J_i of the best one. Ratios between candidates to one goal stay as they are. Obstacles decide on the
-way, and not on the goal (`likelihood.share_among_goals`): people want an object that stands behind others no less.
+way, and not on the goal (`likelihood.decide_goals`): people want an object that stands behind others no less.
 
 The hand may also go to a goal that nobody announced. Without obstacles, M_i(T) = 720 / T^5 (|g_i - e|^2 + (v T)^2 / 60), with e =
 x + v T / 2 the goal that takes least effort. As a density of the goal, M^-2 is a bivariate t distribution about e,

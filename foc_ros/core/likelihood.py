@@ -10,7 +10,7 @@ factor k is below the wanted one has a smaller weight, by the factor exp(-likeli
 
 J_i is the integral of the squared control of class i: its effort to go times the length of a step.
 
-This is for operators who plan the whole way; among several goals they decide as `share_among_goals` says. They do so where they
+This is for operators who plan the whole way; among several goals they decide as `decide_goals` says. They do so where they
 need less time than their planning horizon. Otherwise they look ahead: they weigh what is near and leave distant choices open,
 with p' from the rules below. The horizon has a log-normal distribution with the median H = `likelihood.planning_horizon_s` and
 the spread sigma, between operators or of one from choice to
@@ -116,7 +116,7 @@ def compute_likelihoods(
     woven = np.zeros(len(values)) if decisions is None else config.weaving * decisions.woven
     planned = normalise_logs(logs - woven)
     if goals is not None and len(logs):
-        planned = share_among_goals(planned, values, goals, config)
+        planned = decide_goals(planned, values, goals, config)
     share = compute_lookahead_share(time_s, config, planning_spread)
     if share == 0.0 or not len(logs) or (branch_times is None and decisions is None):
         return planned
@@ -130,13 +130,15 @@ def compute_likelihoods(
     return mixed
 
 
-def share_among_goals(shares: Array, costs: Array, goals: ClassGoals, config: LikelihoodConfig) -> Array:
-    """Return likelihoods (k,) by which the classes of a goal share what it has by the least of their costs.
+def decide_goals(shares: Array, costs: Array, goals: ClassGoals, config: LikelihoodConfig) -> Array:
+    """Return the likelihoods (k,) of classes whose goals were chosen first.
+
+    The likelihood of a goal follows from the least cost of its classes, times its weight. Its classes divide it as before.
 
     Parameters
     ----------
     shares
-        Likelihoods of the classes (k,), whose ratios within a goal stay as they are.
+        Likelihoods of the classes (k,) before the choice of goals.
     costs
         Their costs (k,), comparable between goals [m^2/s^5].
     goals
@@ -148,9 +150,16 @@ def share_among_goals(shares: Array, costs: Array, goals: ClassGoals, config: Li
     least = np.full(len(rows), np.inf)
     np.minimum.at(least, group, costs)
     of_goal = compute_likelihoods(least, config) * (1.0 if goals.weights is None else goals.weights[rows])
-    shared: Array = shares * (of_goal / np.maximum(np.bincount(group, shares, len(rows)), np.finfo(float).tiny))[group]
-    shared /= shared.sum()
-    return shared
+    decided = divide_among_groups(shares, group, of_goal)
+    decided /= decided.sum()
+    return decided
+
+
+def divide_among_groups(weights: Array, group: NDArray[np.intp], totals: Array) -> Array:
+    """Return weights (k,) scaled so that those of each group sum to its total (g,); a group without weights gets none."""
+    sums = np.bincount(group, weights, len(totals))
+    divided: Array = weights * np.divide(totals, sums, out=np.zeros_like(totals), where=sums > 0.0)[group]
+    return divided
 
 
 def compute_lookahead_share(time_s: float, config: LikelihoodConfig, planning_spread: float) -> float:

@@ -28,6 +28,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .likelihood import divide_among_groups
 from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
@@ -216,12 +217,13 @@ NO_TRACKS = Tracks()
 
 def share_among_goals(weights: Sequence[float], candidates: Sequence[PredictedCandidate]) -> list[float]:
     """Return weights with the same sum, of which each goal has the share that it has of the likelihoods of its candidates."""
-    goal = [each.candidate.goal for each in candidates]
-    if len(set(goal)) < 2:
+    goal = np.array([each.candidate.goal for each in candidates], dtype=np.intp)
+    if len(np.unique(goal)) < 2:
         return list(weights)
-    now, mixed = (np.bincount(goal, each) for each in ([each.likelihood for each in candidates], weights))
-    factors = now / np.where(mixed > 0.0, mixed, 1.0) * (mixed.sum() / (now.sum() or 1.0))
-    return [weight * float(factors[row]) for weight, row in zip(weights, goal, strict=True)]
+    now = np.bincount(goal, [each.likelihood for each in candidates])
+    totals = now * (sum(weights) / (float(now.sum()) or 1.0))
+    shared: list[float] = divide_among_groups(np.array(weights), goal, totals).tolist()
+    return shared
 
 
 def count_shared(before: Candidate, now: Candidate) -> int | None:
