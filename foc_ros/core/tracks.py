@@ -221,7 +221,7 @@ def share_among_goals(weights: Sequence[float], candidates: Sequence[PredictedCa
     if len(np.unique(goal)) < 2:
         return list(weights)
     now = np.bincount(goal, [each.likelihood for each in candidates])
-    totals = now * (sum(weights) / (float(now.sum()) or 1.0))
+    totals: Array = now * (sum(weights) / (float(now.sum()) or 1.0))
     shared: list[float] = divide_among_groups(np.array(weights), goal, totals).tolist()
     return shared
 
