@@ -220,8 +220,8 @@ def share_among_goals(weights: Sequence[float], candidates: Sequence[PredictedCa
     goal = np.array([each.candidate.goal for each in candidates], dtype=np.intp)
     if len(np.unique(goal)) < 2:
         return list(weights)
-    now = np.bincount(goal, [each.likelihood for each in candidates])
-    totals: Array = now * (sum(weights) / (float(now.sum()) or 1.0))
+    now = np.bincount(goal, [each.likelihood for each in candidates]).astype(float)
+    totals = now * (sum(weights) / (float(now.sum()) or 1.0))
     shared: list[float] = divide_among_groups(np.array(weights), goal, totals).tolist()
     return shared
 
