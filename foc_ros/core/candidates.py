@@ -112,10 +112,10 @@ def compute_detour_effort(length: float, distance: float) -> float:
 
 
 def find_similar(candidate: Candidate, solved: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, float]:
-    """Return the solved candidate that tells most of the effort of another class, and the ratio of both efforts.
+    """Return the solved candidate by which the effort of another class is estimated, and the ratio of both efforts.
 
-    It is one that passes all obstacles on the same sides, if there is one, though it may lead to another goal; otherwise one to
-    the same goal, if there is one; of several, that of most similar effort.
+    The first choice is a candidate that passes all obstacles on the same sides, to any goal. The second choice is one to the
+    same goal, the third one is any. Of several, the one of most similar effort is taken.
     """
     effort = compute_detour_effort(*_measure(candidate))
 

@@ -9,8 +9,8 @@ most sides, that was seen last, and is the most likely. No two candidates contin
 From its track a class has its number, the solution from which the next one starts, and its likelihood before. A class that could
 not be solved, or that the search has missed, keeps the rest of its last solution for at most `HOLD_S`: of an age a, a movement of
 duration T over [a, T], resampled at N steps of (T - a) / N, that begins where the hand is now and has the cost of that rest.
-So does an unlikely class, as long as the scene stays the same, until it is its turn to be solved again: of these classes, each
-prediction solves the part of `TURNS` whose solutions are oldest.
+An unlikely class keeps it too, as long as the scene stays the same. Each prediction solves one in `TURNS` of these classes: those
+whose solutions are oldest.
 
 Likelihoods change gradually: with p_i of this prediction, l_i before (0 for a new class), and the time h between both,
 
@@ -38,9 +38,9 @@ from .types import NANOSECONDS, Array, Record, Rest, as_readonly
 HOLD_S = 0.2
 """Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten
 predictions, within which a solver or a search that missed a class finds it again."""
-UNLIKELY, TURNS, REST_S = 0.02, 5, 0.1
-"""Likelihood, relative to the largest one, below which a class is not solved in every prediction; in how many predictions all of
-these classes are solved once; and the longest time that a class is not solved [s]."""
+SELDOM, TURNS, REST_S = 0.02, 5, 0.1
+"""A class is solved in one of TURNS predictions if its likelihood is less than the part SELDOM of the largest one. No class waits
+for more than REST_S [s]."""
 SMOOTHING_S = 0.1
 """Time constant of the filter of the likelihoods [s]: half the time in which people react to what they see."""
 LEAD = 0.05
@@ -142,7 +142,7 @@ class Tracks(Record):
         """Return the numbers of the tracks whose last solution is good enough, because their classes are unlikely."""
         if self.obstacles is None or not obstacles.is_near(self.obstacles, MOVED_M):
             return set()
-        least = UNLIKELY * max([each.likelihood for each in matched], default=0.0)
+        least = SELDOM * max([each.likelihood for each in matched], default=0.0)
         unlikely = [each for each in matched if each.likelihood < least and each.is_solved_within(stamp_ns, REST_S)]
         unlikely.sort(key=lambda each: (each.solved_ns, each.number))
         return {each.number for each in unlikely[math.ceil(len(unlikely) / TURNS) :]}

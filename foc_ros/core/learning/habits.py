@@ -8,10 +8,11 @@ sum e_i of its q_i over all reaches, the likelihoods of its candidates get the w
 
     w_i = (1 + c n_i) / (1 + c e_i),   c = `likelihood.past_goals`.
 
-This is the mean of a rate of Poisson events relative to the expected one, whose prior is a gamma distribution with the mean 1 and
-the variance c.
+If reaches to a goal are Poisson events, w_i is the posterior mean of their rate relative to the expected one. The prior of this
+ratio is a gamma distribution with the mean 1 and the variance c.
 
-A goal is the one of before if it is the only one in an obstacle with the same id, or, where it is in none, at the same place.
+Two goals are the same if each is the only goal in the obstacle with the same id. Goals outside of obstacles are the same if they
+are at the same place.
 
 Reaches are expected to end at the mean displacement from their goal of the n earlier ones, times n / (n + `PRIOR_REACHES`).
 """
