@@ -12,15 +12,18 @@ from numpy.typing import NDArray
 from foc_ros.core.registry import QP_BACKENDS
 from foc_ros.core.types import Array
 
-from .gradients import Gradients, linearise
+from .gradients import linearise
 from .iterates import Iterates
 from .margin import NO_CONTACTS, Contacts, Indices, Margins
 from .minima import mark_lowest
 from .objective import Objective
 from .qp import ReducedQP, number_rows, solve_dual
 
-BESIDE = 0.3
-"""Time on both sides of a contact with a polygon at which there are rows too: its margin may have a kink [steps]."""
+BESIDE = 0.6
+"""Time on both sides of a contact with a polygon at which there are rows too, because its margin may have a kink [steps].
+
+These rows hold the mean where it is then, so that a contact slides by about as much in an iteration.
+"""
 APART = 0.05
 """Time from other contacts beyond which one that held the mean off is kept: along a side there may be two [steps]."""
 SAME = 1e-3
@@ -32,11 +35,11 @@ FREE = 1e-3
 """Part of the wanted safety factor that is missing where it is chosen with the control."""
 ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
-VIOLATED, VIOLATED_APART = 1e-3, 0.25
-"""Broken margin, relative to the scene, for which a row is added, and its least time from other rows [steps]."""
+LEAP, LEAP_OF_DISTANCE, LEAP_APART = 0.02, 1e-3, 0.25
+"""Broken margin, relative to the scene, for which a row is added: where margins hold against uncertainty, which shows what a path
+leaps over, and where they are but distances. Its least time from other rows [steps]. More rows keep contacts from sliding."""
 CURVED = 1.0
-"""Gain of a step below which second derivatives of the margins count, and margins are corrected to second order after a step that
-failed: farther away both tell nothing."""
+"""Gain of a step below which second derivatives of the margins count: farther away they tell nothing."""
 ACCURACY = 3e-10
 """Margin relative to the scene that counts as none: accuracy of a QP."""
 
@@ -57,14 +60,6 @@ class Plan:
     contacts: Contacts
     multipliers: Array
     further: Contacts
-
-    def take(self, is_taken: NDArray[np.bool_]) -> Plan:
-        """Return the plans of some of the problems."""
-        rows = self.rows[is_taken]
-        kept, further = np.isin(self.contacts.problem, rows), np.isin(self.further.problem, rows)
-        step, k, gain, fall = (each[is_taken] for each in (self.step, self.k, self.gain, self.fall))
-        contacts, multipliers = self.contacts.take(kept), self.multipliers[kept]
-        return Plan(rows, step, k, gain, fall, contacts, multipliers, self.further.take(further))
 
     def replace(self, other: Plan) -> Plan:
         """Return the plans with those of some of the problems replaced."""
@@ -114,16 +109,13 @@ class Planner:
             return NO_CONTACTS
         moved = self.margins.find_step(plan.step[is_wanted])[:, :, None]
         margin = now.at.margin[rows] + (now.at.normal[rows] * moved).sum(axis=1)
-        bound = -VIOLATED * self.margins.extent[rows, None, None]
+        bound = -(LEAP if self.margins.is_chance else LEAP_OF_DISTANCE) * self.margins.extent[rows, None, None]
         row, obstacle, place = np.nonzero(mark_lowest(margin) & (margin < bound))
         found = Contacts(rows[row], obstacle, self.margins.times[place])
-        return found.take(~_is_known(found, plan.contacts, VIOLATED_APART))
+        return found.take(~_is_known(found, plan.contacts, LEAP_APART))
 
-    def solve(self, now: Iterates, rows: Indices, further: Contacts, failed: Plan | None = None) -> Plan:
-        """Return the solutions of the QPs of some problems (r,); further: places that have rows besides the contacts.
-
-        After steps that failed, margins are corrected to second order: by what they are there, beyond what was foretold.
-        """
+    def solve(self, now: Iterates, rows: Indices, further: Contacts) -> Plan:
+        """Return the solutions of the QPs of some problems (r,); further: places that have rows besides the contacts."""
         margins, objective = self.margins, self.objective
         places, known = self._choose_places(now, rows, further)
         at, control, k_now = np.searchsorted(rows, places.problem), now.control[rows], now.k[rows]
@@ -131,8 +123,6 @@ class Planner:
         gradients = linearise(margins, places, control[at], k_now[at], known > 0.0, is_free[at])
         is_near = ~((now.gain >= CURVED) & np.isfinite(now.gain))[places.problem[known > 0.0]]
         gradients = gradients._replace(weights=gradients.weights * is_near[:, None, None])
-        if failed is not None:
-            gradients = self._look_back(gradients, places, at, rows, now, failed)
         quadratic = objective.expand(rows, control, now.at.cost[rows])
         numbered, wanted = number_rows(at, len(rows)), self.wanted_k[rows]
         short = gradients.value - gradients.stddev_rate * (wanted - k_now)[at]
@@ -158,18 +148,6 @@ class Planner:
         largest = np.maximum(multipliers.max(axis=1, initial=0.0), 1.0 / margins.extent[rows])
         multipliers[multipliers < HELD * largest[:, None]] = 0.0
         return Plan(rows, step, k, np.maximum(gain, 0.0), fall, places, multipliers[numbered.problem, numbered.slot], further)
-
-    def _look_back(
-        self, gradients: Gradients, places: Contacts, at: Indices, rows: Indices, now: Iterates, failed: Plan
-    ) -> Gradients:
-        """Return gradients with the margins measured at the steps that failed, less what the gradients foretold of them."""
-        place = np.searchsorted(failed.rows, rows)
-        step, change = failed.step[place], failed.k[place] - now.k[rows]
-        motion, k = self.margins.move(rows, now.control[rows] + step), failed.k[place]
-        there = self.margins.measure(places, at, motion, k[at]).value
-        foretold = (gradients.gradient * step[at]).sum(axis=1) - gradients.stddev_rate * change[at]
-        is_near = (failed.gain[place] < CURVED)[at]
-        return gradients._replace(value=np.where(is_near, there - foretold, gradients.value))
 
     def _choose_places(self, now: Iterates, rows: Indices, further: Contacts) -> tuple[Contacts, Array]:
         """Return the places at which the QPs have rows, and what is known of their multipliers."""

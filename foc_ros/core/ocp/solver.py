@@ -24,7 +24,7 @@ from .iterates import Evaluation, Iterates
 from .margin import Contacts, Indices, Margins
 from .minima import find_minima
 from .objective import Objective
-from .planner import CURVED, FREE, Plan, Planner
+from .planner import FREE, Plan, Planner
 
 MOST_ITERATIONS = 150
 """Iterations after which a problem counts as not settled; ten are usual from a guess, three from an earlier solution."""
@@ -48,11 +48,11 @@ UNLIKELY, SMALL_PART = 6.0, 0.05
 """A class can wait for the next prediction if it is less likely than the best by more than the first number, as a logarithm, and
 if its QP promises less than the second one as a part of that."""
 LARGEST_TOLERANCE = 5e-3
-"""Gain of its last whole step up to which an unlikely class counts as solved."""
+"""Gain of its last whole step up to which a class without the wanted eta counts as settled."""
 STALLED_GAIN = 2e-5
 """Gain below which a problem is solved that no step improves: rounding hides it."""
-MOST_TRIALS, SHORTER = 5, 0.25
-"""Steps that are tried besides corrected ones: the whole one, and a part of the last one each."""
+MOST_TRIALS, SHORTER = 5, 0.35
+"""Steps that are tried: the whole one, and a part of the last one each."""
 SUFFICIENT = 1e-4
 """Share of the promised gain that a step has to bring."""
 GRACE = 0.02
@@ -158,18 +158,16 @@ class Solver:
         rows, before, share = plan.rows, now.at.loss[plan.rows].copy(), 1.0
         now.iterations[rows] += 1
         is_open = ~self._end(now, plan)
-        for trial in range(MOST_TRIALS):
+        for _ in range(MOST_TRIALS):
             if not is_open.any():
                 break
             failed = self._step(now, plan, np.flatnonzero(is_open), share, may_end=share == 1.0)
             is_open[:] = False
             is_open[failed] = True
             # what rounding hides is not worth another trial
-            stalled = is_open & (plan.gain < STALLED_GAIN * self._tolerate(now, rows))
+            stalled = is_open & (plan.gain < STALLED_GAIN)
             now.is_done[rows[stalled]] = now.is_settled[rows[stalled]] = True
             is_open &= ~stalled
-            if not trial:
-                plan = self._correct(now, plan, is_open)
             share *= SHORTER
         now.bound[rows] = np.maximum(before, now.at.loss[rows])
         others = ~np.isin(now.contacts.problem, rows)
@@ -181,25 +179,6 @@ class Solver:
         now.has_failed[rows] = is_open
         now.is_done[rows[stuck]] = True
         now.is_settled[rows[stuck]] = plan.gain[stuck] < STALLED_GAIN
-
-    def _correct(self, now: Iterates, plan: Plan, is_open: NDArray[np.bool_]) -> Plan:
-        """Take steps in place of whole ones that failed, with rows and margins as they were found there; return the new plan.
-
-        A whole step along a curved obstacle hits it, because the margins that it was planned with hold to first order only. Near
-        a solution this is the second-order correction of sequential QPs (Nocedal and Wright, Numerical Optimization, 18.3).
-        """
-        is_near = plan.gain < CURVED
-        place = np.flatnonzero(is_open & (is_near | now.is_exact[plan.rows]))
-        if not len(place):
-            return plan
-        corrected, is_near = self._planner.solve(now, plan.rows[place], plan.further.join(now.trial), plan), is_near[place]
-        corrected.gain[is_near], corrected.fall[is_near] = plan.gain[place[is_near]], plan.fall[place[is_near]]
-        failed = self._step(now, corrected, np.arange(len(place)), 1.0, may_end=False)
-        is_taken = np.ones(len(place), dtype=np.bool_)
-        is_taken[failed] = False
-        is_open[place[is_taken]] = False
-        # farther away, where the new rows are all that is new, shorter steps follow them too
-        return plan.replace(corrected.take(is_taken | ~is_near))
 
     def _step(self, now: Iterates, plan: Plan, place: Indices, share: float, *, may_end: bool) -> Indices:
         """Take a share of some steps of a plan where that brings enough in their class; return the places of the others."""
@@ -215,8 +194,7 @@ class Solver:
             is_free = plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
             is_exact = is_free | now.is_exact[rows]
             left = np.where(is_exact, plan.gain[place], np.maximum(plan.gain[place] * FORETOLD, missed))
-            last = np.where(now.is_exact[rows], LAST_EXACT_GAIN, LAST_GAIN)
-            is_small = left < last * np.where(is_free, 1.0, self._tolerate(now, rows))
+            is_small = left < np.where(now.is_exact[rows], LAST_EXACT_GAIN, LAST_GAIN)
             is_met = is_free | (at.factor >= self.objective.wanted_k[rows])
             is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
@@ -234,14 +212,3 @@ class Solver:
         is_small: NDArray[np.bool_] = plan.gain < self._small_gain + rounding
         now.is_done[plan.rows[is_small]] = now.is_settled[plan.rows[is_small]] = True
         return is_small
-
-    def _tolerate(self, now: Iterates, rows: Indices) -> Array:
-        """Return by how much more than that of the best class the loss of some classes may be inexact, (r,).
-
-        A likelihood changes by a share of itself: a class that is a hundred times less likely may be a hundred times less exact.
-        The points of a curve of tau and lambda are no answers yet, and have to be exact.
-        """
-        if not self._goes_on:
-            return np.ones(len(rows))
-        most = LARGEST_TOLERANCE / LAST_GAIN
-        return np.exp(np.minimum(self.objective.compare(now.at.loss)[rows], np.log(most)))
