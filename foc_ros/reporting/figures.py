@@ -14,20 +14,8 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
-from .draw import (
-    STYLE,
-    Bounds,
-    Span,
-    compute_bounds,
-    draw_candidates,
-    draw_hand,
-    draw_hand_now,
-    draw_movement,
-    draw_scene,
-    number_labels,
-    open_figure,
-    save_figure,
-)
+from . import draw
+from .draw import Bounds, Span, compute_bounds, open_figure
 from .legend import draw_legend, measure_legend
 from .views import HandTrajectory, build_snapshot
 
@@ -42,10 +30,10 @@ def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array |
 
     hand (s, 2): where it is now [m], if it is not drawn yet.
     """
-    draw_scene(axes, snapshot.obstacles, snapshot.goal_positions, bounds, names=snapshot.goal_names)
-    draw_candidates(axes, snapshot, number_labels(snapshot))
+    draw.draw_scene(axes, snapshot.obstacles, snapshot.goal_positions, bounds, names=snapshot.goal_names)
+    draw.draw_candidates(axes, snapshot, draw.number_labels(snapshot))
     if hand is not None and len(hand):
-        draw_hand_now(axes, hand)
+        draw.draw_hand_now(axes, hand)
     draw_legend(axes, None if snapshot.candidates_with_likelihood else 'no candidate could be solved')
 
 
@@ -70,7 +58,7 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
 
     snapshot = build_snapshot(prediction)
     hand, bounds = _frame_scene(snapshot)
-    with plt.rc_context(STYLE):
+    with plt.rc_context(draw.STYLE):
         if axes is None:
             axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, snapshot)), layout='constrained').subplots()
         draw_snapshot(axes, snapshot, bounds, hand)
@@ -82,7 +70,7 @@ def write_picture(file: Path | str, prediction: Prediction) -> None:
 
     Raises InputError if the suffix is not that of a picture format or the file cannot be written.
     """
-    save_figure(make_scene_figure(build_snapshot(prediction)), file)
+    draw.save_figure(make_scene_figure(build_snapshot(prediction)), file)
 
 
 def make_scene_figure(snapshot: Prediction) -> Figure:
@@ -99,10 +87,10 @@ def make_recording_figure(
     """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each movement."""
     with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
         axes = figure.subplots()
-        draw_scene(axes, obstacles, goals, bounds, named=False)
+        draw.draw_scene(axes, obstacles, goals, bounds, named=False)
         axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
         for number, span in enumerate(spans):
-            draw_movement(axes, hand.positions[hand.between(*span)], number)
+            draw.draw_movement(axes, hand.positions[hand.between(*span)], number)
     return figure
 
 
@@ -112,7 +100,7 @@ def make_moment_figure(hand: HandTrajectory, snapshot: Prediction, span: Span) -
     bounds = compute_bounds(snapshot.obstacles, snapshot.goal_positions, paths, during)
     with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
         axes = figure.subplots()
-        draw_hand(axes, hand, snapshot.stamp_ns, span)
+        draw.draw_hand(axes, hand, snapshot.stamp_ns, span)
         draw_snapshot(axes, snapshot, bounds)
     return figure
 

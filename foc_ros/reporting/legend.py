@@ -11,20 +11,10 @@ from weakref import WeakKeyDictionary
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.ros.messages.ranking import describe_candidate
 
-LONGEST_WORDS = 60
-"""Number of characters in the words of a class beyond which the legend has its label only."""
-SIZE_PT, NARROW_IN = 8.0, 3.5
-"""Size of the text, where there is room for it [pt], and the width below which lines are shorter and signs in one column [in]."""
-COLUMNS, NARROW_COLUMNS = 70, 40
-"""Characters in a line of a candidate."""
-LABELS_IN = 0.5
-"""Height of the labels below axes [in]."""
+SIZE_PT, COLUMNS = 8.0, 70
+"""Size of the text, where there is room for it [pt], and characters in a line of a candidate."""
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
-SIGNS = 6
-"""Signs of a scene at most, but for those of a hand that moves and for dotted lines."""
-DOTTED = 'dotted: not known to avoid as surely as wanted'
-"""What the line of a compromised or estimated candidate means."""
 _PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
 """Subplot and place of axes before a legend took a part of it."""
 
@@ -32,7 +22,7 @@ _PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
 def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
     """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
     name = describe_candidate(candidate, goals)
-    if len(name) > LONGEST_WORDS:  # the words of a class with many obstacles would leave no room for the plot
+    if len(name) > 60:  # the words of a class with many obstacles would leave no room for the plot
         name = candidate.label
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
@@ -42,8 +32,8 @@ def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = 
 
 
 def measure_legend(snapshot: Prediction) -> float:
-    """Return the height of the legend of a scene that is as wide as a page [in]."""
-    signs = SIGNS + any(not each.is_solved for each in snapshot.candidates_with_likelihood)
+    """Return the height of the legend of a scene that is as wide as a page [in], with its signs except those of a moving hand."""
+    signs = 6 + any(not each.is_solved for each in snapshot.candidates_with_likelihood)
     texts = [fill(describe_in_legend(each, len(snapshot.goal_positions)), COLUMNS) for each in snapshot]
     lines = sum(1 + text.count('\n') for text in texts) + -(-signs // 2)
     return lines * LINE * SIZE_PT / 72.0 + 0.05
@@ -61,15 +51,15 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
         earlier.remove()
     slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
     width_in, height_in = figure.get_figwidth() * place.width, figure.get_figheight() * place.height
-    is_narrow = width_in < NARROW_IN
-    columns = NARROW_COLUMNS if is_narrow else COLUMNS
+    is_narrow = width_in < 3.5
+    columns, sign_columns = (40, 1) if is_narrow else (COLUMNS, 2)
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    candidates = sorted((label for label in named if '%  ' in label), key=lambda label: (-_read_share(label), label))
+    shares = {label: float(label.partition('%')[0][1:].strip().replace('-', '-1')) for label in named if '%  ' in label}
+    candidates = sorted(shares, key=lambda label: (-shares[label], label))
     if any(isinstance(named[label], Line2D) and named[label].get_linestyle() == ':' for label in candidates):
-        named[DOTTED] = Line2D([], [], color='0.35', linestyle=':', linewidth=2.0)
+        named['dotted: not known to avoid as surely as wanted'] = Line2D([], [], color='0.35', linestyle=':', linewidth=2.0)
     signs = [label for label in named if label not in candidates]
     texts = [fill(label, columns, subsequent_indent=' ' * 10) for label in candidates]
-    sign_columns = 1 if is_narrow else 2
     lines = sum(1 + text.count('\n') for text in texts) + -(-len(signs) // sign_columns) + (title is not None)
     size_pt = min(SIZE_PT, 72.0 * width_in / (0.62 * (columns + 5)))
     wanted_in = min(lines * LINE * size_pt / 72.0 + 0.05, 0.5 * height_in)
@@ -84,14 +74,10 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
     below.legend(handles, signs, loc='lower left', ncols=sign_columns, columnspacing=2.0, prop=font, **look)
 
 
-def _read_share(label: str) -> float:
-    return float(label.partition('%')[0][1:].strip().replace('-', '-1'))
-
-
 def _take_place(axes: Any, slot: Any, place: Any, height_in: float, wanted_in: float) -> Any:
     """Return new axes of a height [in] below axes, which become so much smaller."""
     figure = axes.figure
-    gap_in = 0.0 if figure.get_layout_engine() else LABELS_IN
+    gap_in = 0.0 if figure.get_layout_engine() else 0.5  # of the labels below axes
     parts = [max(height_in - wanted_in - gap_in, 0.2 * height_in), gap_in, wanted_in]
     if slot is None:
         bottom = place.y0 + place.height * (gap_in + wanted_in) / sum(parts)

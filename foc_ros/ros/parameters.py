@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from foc_ros.core.config import Config, Parameter, flatten, list_parameters, replace_values
+from foc_ros.core.config import Config, flatten, list_parameters, replace_values
 from foc_ros.core.errors import InputError, ParameterError, warn
 from foc_ros.io.documents import read_document
 
@@ -123,9 +123,16 @@ def dump_parameter_file(config: Config) -> str:
         if head != group:
             lines.append(f'    {head}:')
             group = head
-        indent = ' ' * (6 if head else 4)
+        bound, indent = parameter.bound, ' ' * (6 if head else 4)
+        parts = [f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning]
+        if bound.low is not None and bound.high is not None:
+            parts.append(f'{bound.low:g} to {bound.high:g}')
+        if choices := tuple(bound.choices):
+            parts.append(' | '.join(choices))
+        if bound.read_only:
+            parts.append('fixed once the node runs')
         value = yaml.safe_dump(values[parameter.name], default_flow_style=True).splitlines()[0]
-        lines += [f'{indent}# {_describe(parameter)}', f'{indent}{leaf}: {value}']
+        lines += [f'{indent}# {"; ".join(parts)}', f'{indent}{leaf}: {value}']
     return '\n'.join(lines) + '\n'
 
 
@@ -135,16 +142,3 @@ def write_parameter_file(option: str, file: Path, config: Config) -> None:
         file.write_text(dump_parameter_file(config), encoding='utf-8')
     except OSError as error:
         raise InputError(option, 'a file that can be written', f'{file}: {error.strerror}') from error
-
-
-def _describe(parameter: Parameter) -> str:
-    """Return the description, unit, and range or choices of a parameter in one line."""
-    bound, choices = parameter.bound, tuple(parameter.bound.choices)
-    parts = [f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning]
-    if bound.low is not None and bound.high is not None:
-        parts.append(f'{bound.low:g} to {bound.high:g}')
-    if choices:
-        parts.append(' | '.join(choices))
-    if bound.read_only:
-        parts.append('fixed once the node runs')
-    return '; '.join(parts)

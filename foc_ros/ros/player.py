@@ -23,8 +23,6 @@ from .messages.types import find_message_class
 
 CONNECT_S = 30.0
 """Timeout of the connection to the node, which starts in about one second."""
-RETRY_S = 0.2
-"""Seconds between two attempts to send the scene to the node."""
 QUIET_S, LAST_ANSWER_S = 0.5, 5.0
 """After the last input the player ends once nothing has arrived for QUIET_S, and at the latest after LAST_ANSWER_S."""
 DEPTH = 200
@@ -92,7 +90,7 @@ class Player:
                 raise NodeDiedError(f'the node did not connect within {CONNECT_S:g} s: {", ".join(missing) or "no scene"}')
             for item in () if missing else first.values():
                 self._publishers[item.role].publish(bytes(item.raw))
-            self._spin(RETRY_S)
+            self._spin(0.2)
             if not self._tick():
                 return False
         return True

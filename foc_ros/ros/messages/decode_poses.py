@@ -19,9 +19,6 @@ MAX_COORDINATE = 1e4
 """Largest coordinate of a hand, a goal or an obstacle [m]; a larger one has a wrong unit."""
 
 MAX_GOALS = 256
-NORM_ERROR = 0.1
-"""Difference from 1 of the norm of a rotation that is one, rounded or not normalised."""
-
 
 Place = Callable[[Any], tuple[str, Transform]]
 """Function from a std_msgs/Header to the frame in which its message is used, and the transform to there."""
@@ -58,7 +55,7 @@ def check_hand_pose(pose: Any) -> None:
         if not math.isfinite(value):
             raise LostHandError(f'pose.position.{axis}', 'a finite number [m]', value)
     norm = math.hypot(turn.x, turn.y, turn.z, turn.w)
-    if not any(place) and not abs(norm - 1.0) < NORM_ERROR:
+    if not any(place) and not abs(norm - 1.0) < 0.1:
         raise LostHandError(
             'pose', 'a position, or an orientation of norm 1', f'0 and norm {norm:g}: the tracker has lost the hand'
         )
