@@ -13,7 +13,6 @@ from report_samples import START_NS, prediction, predictions, samples, scene
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Status
 from foc_ros.io.bags import TYPESTORE
-from foc_ros.reporting.received import read_snapshot
 from foc_ros.reporting.views import (
     HandTrajectory,
     Slots,
@@ -22,6 +21,7 @@ from foc_ros.reporting.views import (
     build_snapshot,
     is_late,
     parse_label,
+    read_snapshot,
 )
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.ranking import compute_cost_ratios

@@ -25,9 +25,6 @@ from .scenes import POSITION, RecordedScene, check_not_empty, read_recording
 FRAME = 'world'
 EPOCH_NS = NANOSECONDS
 """Stamp of t_s = 0. It is not 0, which means `not set` in a message."""
-LATEST_S, LONGEST_S = 2e9, 86400.0
-"""Bounds on a time (a stamp has 31 bits for seconds) and on a recording's length (beyond a day, two clocks are mixed up) [s]."""
-TIME_UNITS = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
 LENGTH_UNITS = {'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6}
 Doubt = tuple[str, str, str]
 """What is doubted, what is wrong with it, and the reason."""
@@ -59,7 +56,8 @@ def _parse_movement(name: str, table: Iterable[Row]) -> Movement | RecordingErro
     samples: list[list[float]] = []
 
     def parse(row: Row) -> None:
-        bounds = (samples[-1][0], samples[0][0] + LONGEST_S) if samples else (0.0, LATEST_S)
+        # a stamp has 31 bits for seconds; in a recording of more than a day, two clocks are mixed up
+        bounds = (samples[-1][0], samples[0][0] + 86400.0) if samples else (0.0, 2e9)
         samples.append(row.read_numbers(Column('t_s', *bounds), *POSITION))
 
     try:
@@ -83,7 +81,8 @@ def _find_doubt(rows: Sequence[Row]) -> Doubt | None:
         return None
     step_s = float(np.median(forward[:, 0]))
     if not 1e-4 <= step_s <= 1.0:  # of a tracker
-        words = f'seems to be in {_find_nearest_unit(TIME_UNITS, step_s, 0.01)}'
+        units = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
+        words = f'seems to be in {_find_nearest_unit(units, step_s, 0.01)}'
         return 't_s', words, f'the median time between two poses is {step_s:.3g} s'
     speed = float(np.quantile(np.linalg.norm(forward[:, 1:], axis=1) / forward[:, 0], 0.99))
     if speed <= 20.0:  # beyond that of any hand

@@ -44,9 +44,8 @@ class Replay:
     """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
 
     Transforms of the recording are applied as the node applies those of tf2, by the log times of the messages. budget_s: time
-    limit of each prediction [s], with which results depend on the speed of the machine; None for none.
-
-    Raises RecordingError or InputError where the class library cannot be used.
+    limit of each prediction [s], with which results depend on the speed of the machine; None for none. Raises RecordingError or
+    InputError where the class library cannot be used.
     """
 
     def __init__(self, config: Config, budget_s: float | None = None) -> None:
@@ -189,7 +188,7 @@ class GuidanceReplay:
         config, prediction = self._pipeline.config, self._prediction
         while self._next_ns < end_ns:
             prediction_ns = self._next_ns if prediction is None else prediction.stamp_ns
-            ages = ((self._next_ns - stamp_ns) / NANOSECONDS for stamp_ns in (hand.stamp_ns, prediction_ns))
+            ages = (self._next_ns - hand.stamp_ns) / NANOSECONDS, (self._next_ns - prediction_ns) / NANOSECONDS
             # seconds since the epoch would be rounded to a quarter of a microsecond
             t = (self._next_ns - self._first_ns) / NANOSECONDS
             given = GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages, acceleration=hand.mean[4:6])

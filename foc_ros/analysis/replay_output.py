@@ -75,9 +75,9 @@ def _write_element(file: TextIO, element: object) -> None:
 class Summary:
     """Counts over the steps of one replay.
 
-    samples: hand poses read; predictions; solved: predictions with a candidate that has a likelihood; compromised, estimated:
-    candidates with a likelihood; cleared_by_height: obstacles that a predicted height cleared, over all predictions; seconds:
-    wall time of each prediction.
+    samples: hand poses read; solved: predictions with a candidate that has a likelihood; compromised, estimated: candidates with
+    one; cleared_by_height: obstacles that a predicted height cleared, over all predictions; seconds: wall time of each
+    prediction.
     """
 
     samples: int = 0

@@ -31,9 +31,8 @@ from foc_ros.io import topics
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter, Item
 from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
-from foc_ros.reporting.received import read_snapshot
 from foc_ros.reporting.report import describe_late, write_report
-from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory
+from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory, read_snapshot
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, isolated_graph
 from foc_ros.ros.messages.decode_poses import decode_stamp

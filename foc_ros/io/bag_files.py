@@ -12,6 +12,7 @@ import re
 import shutil
 import sqlite3
 import struct
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -110,7 +111,29 @@ class Channel:
         return MessageError('message', f'a serialized {self.msgtype}', f'{len(raw)} other bytes ({reason})')
 
 
-class McapFile:
+class StoredFile(ABC):
+    """A file of a recording, opened by `_open`, to be closed after use; :class:`McapFile` has its attributes."""
+
+    doubt = ''
+
+    def __init__(self, path: Path) -> None:
+        self._stack = ExitStack()
+        try:
+            self._open(path)
+        except BaseException:
+            self.close()
+            raise
+
+    @abstractmethod
+    def _open(self, path: Path) -> None:
+        """Open the file and set the attributes."""
+
+    def close(self) -> None:
+        """Close the file, and remove its copy if there is one."""
+        self._stack.close()
+
+
+class McapFile(StoredFile):
     """An MCAP file, to be closed after use.
 
     It is read from begin to end once before its messages are, by the library mcap, which compares the checksums of the chunks and
@@ -121,21 +144,6 @@ class McapFile:
     recorder received are missing, empty if the file is whole; doubt, why they may be missing where nothing states their number;
     is_counted, whether the file itself states how many messages it has, and has them.
     """
-
-    doubt = ''
-
-    def __init__(self, path: Path) -> None:
-        self._stream = path.open('rb')
-        try:
-            self.loss = '' if self._has_footer() else 'the recorder was killed; read up to the last whole chunk'
-            self._scan()
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """Close the file."""
-        self._stream.close()
 
     def messages(self, channels: list[Channel]) -> Iterator[tuple[Channel, int, bytes]]:
         """Yield channel, log time [ns] and bytes of every message of some channels, in the order of their log times."""
@@ -170,8 +178,10 @@ class McapFile:
             if not self.loss:
                 raise
 
-    def _scan(self) -> None:
+    def _open(self, path: Path) -> None:
         """Find the channels and count the messages, which must be as many as the statistics state if there are any."""
+        self._stream = self._stack.enter_context(path.open('rb'))
+        self.loss = '' if self._has_footer() else 'the recorder was killed; read up to the last whole chunk'
         schemas: dict[int, Schema] = {}
         records: dict[int, ChannelRecord] = {}
         counts, stated, first_ns, last_ns, self._is_in_order = Counter[int](), None, 1 << 64, 0, True
@@ -222,26 +232,14 @@ def add_checksums(file: Path) -> None:
             start = end
 
 
-class SqliteFile:
-    """A file of SQLite in any version that rosbag2 has written, to be closed after use, with the attributes of McapFile.
+class SqliteFile(StoredFile):
+    """A file of SQLite in any version that rosbag2 has written.
 
     A file whose recorder was killed has a log of its last transactions beside it. It is read with them, from a copy: SQLite would
     otherwise write into the recording.
     """
 
     is_counted = False
-
-    def __init__(self, path: Path) -> None:
-        self._stack = ExitStack()
-        try:
-            self._open(path)
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """Close the file, and remove its copy if there is one."""
-        self._stack.close()
 
     def messages(self, channels: list[Channel]) -> Iterator[tuple[Channel, int, bytes]]:
         """Yield channel, log time [ns] and bytes of every message of some channels, in the order of their log times."""

@@ -103,12 +103,10 @@ def read_rows(
 ) -> Iterator[Row]:
     """Yield the rows of a CSV file with a header; empty lines are skipped, and other columns are allowed.
 
-    The separator is one of :data:`SEPARATORS`, found in the header, before which a spreadsheet may name it (`sep=;`).
-
-    optional: columns that may be missing; instead: columns that together replace a needed one.
-
-    Raises RecordingError for a file that cannot be read, for one that lacks a needed column, names a column twice or has a
-    misspelt one, and after the last row for rows with more or fewer cells than the header.
+    The separator is found in the header, before which a spreadsheet may name it (`sep=;`). optional: columns that may be missing;
+    instead: columns that together replace a needed one. Raises RecordingError for a file that cannot be read, for one that lacks
+    a needed column, names a column twice or has a misspelt one, and after the last row for rows with more or fewer cells than the
+    header.
     """
     try:
         with file.open(newline='', encoding='utf-8-sig') as stream:

@@ -37,10 +37,9 @@ TRANSFORMS, STATIC_TRANSFORMS = 'tf', 'tf_static'
 
 
 def assign_topics(topics: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the topic of every role that the recording contains.
+    """Return the topic of every role that the recording contains; topics: message type by topic; chosen: topic by role.
 
-    topics: message type by topic; chosen: topic by role, overriding names and types. Raises RecordingError for an impossible
-    choice, for several topics that fit equally, and for a recording without a hand, obstacles or goals.
+    Raises RecordingError for an impossible choice, for several topics that fit equally, and without a hand, obstacles or goals.
     """
     roles = dict(chosen or {})
     for role, topic in roles.items():

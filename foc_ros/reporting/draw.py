@@ -24,15 +24,15 @@ from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obs
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
-from foc_ros.ros.messages.ranking import find_drawn_curve
+from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
 
-from .legend import describe_in_legend
 from .views import COLOURS, LIKELY, SLOTS, HandTrajectory, describe_ghost, list_unsolved
 
 try:
     import matplotlib as mpl
     from matplotlib.colors import to_rgba
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
+    from matplotlib.lines import Line2D as Line2D
     from matplotlib.patches import Circle, Ellipse, Patch, Polygon
     from matplotlib.rcsetup import cycler
 except ImportError as error:
@@ -101,6 +101,18 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
     return {'color': colour, 'linestyle': ':' if is_compromised else '-', 'linewidth': 1.2 + 3.0 * likelihood}
 
 
+def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
+    """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
+    name = describe_candidate(candidate, goals)
+    if len(name) > 60:  # the words of a class with many obstacles would leave no room for the plot
+        name = candidate.label
+    if not candidate.has_likelihood:
+        return f'{letter}    - %  {name}; {candidate.reason}'
+    found = 'estimated' if candidate.is_estimated else 'compromised'
+    words = '' if candidate.is_solved else f'; {found}: eta {candidate.eta:.3f}'
+    return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
+
+
 def number_labels(snapshot: Prediction) -> dict[str, int]:
     """Return slots of the candidates of a single prediction, by label; candidates beyond the number of slots have none."""
     return {each.label: number for number, each in enumerate(snapshot.candidates_with_likelihood[:SLOTS])}
@@ -145,9 +157,9 @@ def draw_scene(
 ) -> None:
     """Draw obstacles and goals.
 
-    An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the
-    goals (g, 2) have their names, by default the numbers in the labels of candidates. An obstacle that is a goal of its own name
-    has it once.
+    An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the goals (g,
+    2) have their names, by default the numbers in the labels of candidates; a name that is also that of the obstacle is written
+    once.
     """
     holds_goal = np.any(find_holders(goals, obstacles), axis=0).tolist()
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):

@@ -39,7 +39,8 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
     console = console or Console()
     waiting = 'Waiting for the first prediction of the node ...'
     live = Live(waiting, console=console, auto_refresh=False) if console.is_terminal else None
-    next_update, bounds = -np.inf, None
+    next_update = -np.inf
+    bounds: Bounds | None = None
 
     def show(now: float, snapshot: Prediction, heading: str, hand: Array) -> None:
         nonlocal next_update, bounds

@@ -10,13 +10,17 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.solution import LEFT, RIGHT, Status
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
+from foc_ros.ros.messages.decode_poses import decode_frame, decode_stamp
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STATUSES, UNKNOWN
 from foc_ros.ros.messages.ranking import find_drawn_curve, order_candidates
 
 COLOURS, SLOTS = 6, 12
@@ -47,6 +51,56 @@ def build_snapshot(prediction: Prediction) -> Prediction:
         )
         kept.append(replace(each, solution=solution, height=None))
     return replace(prediction, candidates=tuple(kept))
+
+
+def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Prediction:
+    """Return the snapshot in a pair of messages of `~/prediction` and `~/likelihoods`: inverse of `messages.encode_prediction`.
+
+    obstacles and goals (g, 2) [m] are those at the stamp of the messages. Costs are relative to the least one.
+    """
+    rows = np.frombuffer(cloud.data, dtype=CLOUD_ROW) if len(cloud.data) else np.zeros(0, dtype=CLOUD_ROW)
+    columns = np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
+    labels = likelihoods.layout.dim[0].label.split(';') if len(columns) else []
+    shares = {UNKNOWN: 0.0 if labels else 1.0, OTHER: 0.0}
+    while labels and labels[-1] in shares:
+        shares[labels[-1]], labels, columns = float(columns[-1, 0]), labels[:-1], columns[:-1]
+    parts = (rows[rows['candidate'] == number] for number in range(len(labels)))
+    read = zip(labels, columns, parts, strict=True)
+    candidates = tuple(_read_candidate(label, obstacles.ids, values, part, plane) for label, values, part in read)
+    cleared = np.zeros(len(obstacles), dtype=bool)
+    if len(rows):
+        height = rows[next(axis for axis in 'xyz' if axis not in plane)]
+        cleared = (height.min() > obstacles.heights[:, 1]) | (height.max() < obstacles.heights[:, 0])
+    return Prediction(
+        decode_stamp(cloud.header),
+        decode_frame(cloud.header),
+        0.0,
+        candidates,
+        candidates[0].label if candidates else None,
+        obstacles=obstacles,
+        goal_positions=goals,
+        cleared=tuple(cleared.tolist()),
+        unknown=shares[UNKNOWN],
+        other=shares[OTHER],
+    )
+
+
+def _read_candidate(label: str, ids: Collection[str], values: Array, rows: Any, plane: str) -> PredictedCandidate:
+    x, y = plane[0], plane[1]
+    mean = _stack(rows, (x, y, f'v{x}', f'v{y}'))
+    pairs = x + x, plane, plane, y + y
+    total, motor = (_stack(rows, [prefix + pair for pair in pairs]).reshape(-1, 2, 2) for prefix in ('', 'motor_'))
+    likelihood, effort, cost_ratio, eta = values.tolist()
+    status, dt = STATUSES[int(rows['status'][0])], float(rows['t'][-1]) / max(len(rows) - 1, 1)
+    only_motor = None if np.array_equal(total, motor) else motor
+    solution = Solution(status, '', dt, mean, total, np.zeros((0, 2)), effort, {}, 0.0, 0.0, eta, motor_covariance=only_motor)
+    sides = parse_label(label, ids)[1]
+    candidate = Candidate(label, int(rows['goal'][0]), tuple(sides.items()), mean[:, :2], 0.0)
+    return PredictedCandidate(candidate, solution, sides, cost_ratio, likelihood, way=int(rows['way'][0]))
+
+
+def _stack(rows: Any, names: Sequence[str]) -> Array:
+    return np.stack([rows[name].astype(float) for name in names], axis=-1)
 
 
 def list_unsolved(prediction: Prediction) -> tuple[PredictedCandidate, ...]:
@@ -145,8 +199,7 @@ class HandTrajectory(Record):
     def find_movements(self, onset_speed: float = ONSET_SPEED) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement.
 
-        During a movement the hand is faster than onset_speed [m/s], pauses shorter than PAUSE_S apart; it extends over more than
-        LEAST_M.
+        During it the hand is faster than onset_speed [m/s], pauses shorter than PAUSE_S apart; it extends over more than LEAST_M.
         """
         rows = np.flatnonzero(self.speed > onset_speed)
         if not len(rows):
@@ -183,8 +236,7 @@ def parse_label(label: str, ids: Collection[str]) -> tuple[str, dict[str, int]]:
 class CandidateTracks:
     """Snapshots with their candidates associated over time: a track has the candidates of one class.
 
-    tracks: for each snapshot, the number of the track of each candidate, by label; slots: of each track, the slot that gives its
-    letter and colour. Tracks without a slot are missing there.
+    tracks: for each snapshot, the number of the track of each candidate, by label; slots: of the tracks with a letter and colour.
     """
 
     snapshots: Sequence[Prediction]
@@ -232,8 +284,7 @@ class Slots:
 def build_candidate_tracks(snapshots: Sequence[Prediction]) -> CandidateTracks:
     """Return the candidates of successive snapshots by track, and the letters and colours of the tracks.
 
-    A track has the candidates of one class, as long as it has one letter. Tracks are numbered from 0 in order of their
-    appearance, whatever the classes were numbered before the first snapshot.
+    A track lasts as long as its class has one letter. Tracks are numbered from 0 in order of their appearance.
     """
     given, numbers, tracks = Slots(), dict[tuple[int, int | None], int](), list[dict[str, int]]()
     for snapshot in snapshots:

@@ -79,9 +79,7 @@ def isolated_graph() -> Iterator[tuple[int, Path]]:
 
 
 class NodeProcess:
-    """The node as a process that starts on entering the context and has ended on leaving it.
-
-    It also ends with the thread that started it.
+    """The node as a process that starts on entering the context, and has ended on leaving it or with the thread that started it.
 
     environment: variables of the process; log: file for its output; arguments: those of ROS. Attributes: pid; is_clean, whether
     it has ended, without an error.

@@ -80,8 +80,7 @@ class Player:
         """Wait until all topics are connected and the other node is ready; return False if tick returns False before.
 
         The two ends of a topic discover each other at different times, and a message sent between is lost. So the first message
-        of every input except the hand is repeated until the node says that it has the scene. Raises NodeDiedError after
-        CONNECT_S.
+        of every input except the hand is repeated until the node has the scene. Raises NodeDiedError after CONNECT_S.
         """
         deadline = time.monotonic() + CONNECT_S
         first = {item.role: item for item in reversed(self._items) if item.role != topics.HAND}

@@ -167,10 +167,9 @@ class _Frame:
 
 
 class TransformTree:
-    """The frames of a recording, looked up as tf2 does, without ROS; a `TransformSource`.
+    """The frames of a recording, each with one parent, looked up as tf2 does, without ROS; a `TransformSource`.
 
-    A frame has one parent. Between the stamps of two messages the translation is interpolated linearly, the rotation along the
-    shortest arc.
+    Between two stamps the translation is interpolated linearly, the rotation along the shortest arc.
     """
 
     def __init__(self) -> None:

@@ -27,17 +27,12 @@ from .scores import TENTHS, Scores, choose_held_out, compare_scores, compute_log
 
 FITTED_TO = {PATH_CLASS: PATH_CLASS, GAP: PATH_CLASS, GOAL: GOAL}
 """The question by whose answers the settings of a predictor are chosen, for each question that it is scored by."""
-SUBJECTS = {PATH_CLASS: 'Homotopy classes', GAP: 'Next gaps', GOAL: 'Goals'}
 OURS = 'likelihood-weighted'
 """The predicted positions that are compared with those of the baselines."""
 COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
 """Horizon and probability of the region that is judged."""
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, columns, rows."""
-GAIN_TITLES = {
-    PATH_CLASS: 'Homotopy class: log-likelihood above uniform [nat]',
-    GOAL: 'Goal: log-likelihood above uniform [nat]',
-}
 GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
 REGIONS = {
     'inside': 'ellipse of the most likely candidate',
@@ -185,15 +180,17 @@ def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
         words = f'{baseline} ({factor * each["difference"]:+.2g} {unit}{where})'
         groups['better than' if low > 0.0 else 'worse than' if high < 0.0 else 'not distinguishable from'].append(words)
     judged = '; '.join(f'{verdict} {", ".join(each)}' for verdict, each in groups.items() if each)
-    return f'{SUBJECTS[name]}: {PUBLISHED} is {judged}.'
+    subject = {PATH_CLASS: 'Homotopy classes', GAP: 'Next gaps', GOAL: 'Goals'}[name]
+    return f'{subject}: {PUBLISHED} is {judged}.'
 
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
     """Yield the tables of an answer of `evaluate --json`."""
     questions = answer['questions']
     tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
-    for name, title in GAIN_TITLES.items():
+    for name, subject in ((PATH_CLASS, 'Homotopy class'), (GOAL, 'Goal')):
         if name in questions:
+            title = f'{subject}: log-likelihood above uniform [nat]'
             by_predictor = questions[name].items()
             lines = [_format_tenths(predictor, each, 'gain') for predictor, each in by_predictor]
             yield f'{title}, by tenths of the movement', tenths, lines

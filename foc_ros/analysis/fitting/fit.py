@@ -55,10 +55,10 @@ Rows = list[tuple[str, ...]]
 
 @dataclass
 class Fit:
-    """The state of a fit.
+    """The state of a fit: the configuration with what was found so far.
 
-    config: with what was found so far; found; recordings: how many are used; failed recordings with reasons; scores as plain
-    values; comparison: of the given parameters with the fitted ones.
+    recordings: how many are used; failed recordings with reasons; scores as plain values; comparison: of given and fitted
+    parameters.
     """
 
     config: Config
@@ -265,7 +265,7 @@ def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...
     """Yield title, columns and rows of the tables of an answer of `fit --json`."""
     yield 'Before and after', ('with the same recordings', 'before', 'after', ''), format_comparison(answer)
     yield 'Parameters', ('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer)
-    scores = [
+    scores: Rows = [
         (SCORE_TITLES[score], setting, '-' if value is None else f'{value:.3f}')
         for score, values in answer['scores'].items()
         for setting, value in values.items()

@@ -32,8 +32,7 @@ def stay(header: Any) -> tuple[str, Transform]:
 def decode_hand_sample(message: Any, plane: str, place: Place = stay) -> HandSample:
     """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
 
-    Raises LostHandError for a pose without data, and MessageError for a coordinate beyond MAX_COORDINATE and for a stamp of 0,
-    which means "not set".
+    Raises LostHandError for a pose without data, MessageError for a coordinate beyond MAX_COORDINATE and a stamp that is not set.
     """
     check_hand_pose(message.pose)
     stamp_ns = decode_stamp(message.header)
