@@ -27,13 +27,8 @@ from foc_ros.core.solution import Goal
 from foc_ros.core.support import check_config, check_number, check_vector, collect_goals, find_shape
 from foc_ros.core.types import NANOSECONDS, HandSample, SampleStatus
 
-STEP_COLUMNS = ('ahead_s', 'x_m', 'y_m', 'vx_m_s', 'vy_m_s', 'xx_m2', 'xy_m2', 'yy_m2')
-"""Columns of the steps in `Prediction.to_records`."""
 LATEST_S = 9e9
 """Bound on a time [s]: stamps are 64-bit numbers of nanoseconds."""
-MOST_SAMPLES = 10_000_000
-SHAPES = 'shapes'
-"""Name of the source of the obstacles of a `Predictor`."""
 PLANE, SPACE = 2, 3
 """Number of coordinates of a position in the task plane, and of one with its height over the plane."""
 
@@ -91,6 +86,7 @@ class Prediction(core_prediction.Prediction):
             (from then on), `x_m`, `y_m`, `vx_m_s`, `vy_m_s`, and of the total covariance `xx_m2`, `xy_m2`, `yy_m2`.
         """
         names = [each.name for each in self.goals]
+        columns = ('ahead_s', 'x_m', 'y_m', 'vx_m_s', 'vy_m_s', 'xx_m2', 'xy_m2', 'yy_m2')
         rows: list[dict[str, Any]] = []
         for each in self.candidates:
             known = {
@@ -103,7 +99,7 @@ class Prediction(core_prediction.Prediction):
                 'eta': each.eta,
             }
             numbers = [each.times, *each.mean[:, :4].T, *(each.covariance[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1)))]
-            rows += [known | dict(zip(STEP_COLUMNS, row, strict=True)) for row in np.column_stack(numbers).tolist()]
+            rows += [known | dict(zip(columns, row, strict=True)) for row in np.column_stack(numbers).tolist()]
         return rows
 
     def plot(self, axes: Any = None) -> Any:
@@ -322,7 +318,7 @@ class Predictor:
         frame_id = pipeline.frame_id or ''
         sample = HandSample(stamp_ns, point[:PLANE], 0.0 if heights is None else float(point[PLANE]), frame_id)
         if self._obstacles is not None:
-            pipeline.set_obstacles(SHAPES, self._obstacles, stamp_ns, frame_id)
+            pipeline.set_obstacles('shapes', self._obstacles, stamp_ns, frame_id)
         if pipeline.add_hand_sample(sample) is SampleStatus.JUMPED:
             assert before is not None
             raise describe_jump('position', before, sample, self.config.estimator)

@@ -27,9 +27,6 @@ from foc_ros.core.solution import Candidate, Goal
 from foc_ros.core.support import GoalTable, check_array, check_config, check_number, check_vector, collect_goals, find_shape
 from foc_ros.core.types import HandState
 
-MOST_SAMPLES = 10_000_000
-"""Largest number of movements that are sampled."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(core_solution.Solution):
@@ -239,7 +236,7 @@ def monte_carlo(solution: Solution, samples: int = 10_000, seed: int = 0) -> sam
     problem = getattr(solution, 'problem', None)
     if problem is None:
         raise InputError('solution', 'a result of foc_ros.solve or solve_classes', repr(solution))
-    if not check_number('samples', samples, 1, MOST_SAMPLES).is_integer():
+    if not check_number('samples', samples, 1, 10_000_000).is_integer():
         raise InputError('samples', 'a whole number', samples)
     return sampling.monte_carlo(problem, solution.control.T.ravel(), int(samples), seed)
 

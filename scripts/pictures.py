@@ -45,8 +45,7 @@ from foc_ros.reporting import draw
 from foc_ros.reporting.draw import compute_bounds, draw_scene, get_class_style, open_figure, save_figure
 from foc_ros.reporting.figures import make_moment_figure, make_scene_figure
 from foc_ros.reporting.report import ReportCollector
-from foc_ros.reporting.tracks import CandidateTracks, build_candidate_tracks
-from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import CandidateTracks, HandTrajectory, build_candidate_tracks, build_hand_trajectory, build_snapshot
 from foc_ros.ros.parameters import dump_parameter_file
 
 sys.path.append(str(ROOT / 'test'))
@@ -111,9 +110,11 @@ def pictures(
                 scene, shares = figure.subplots(1, 2, width_ratios=(1.55, 1.0))
                 scene.grid(False)
                 draw_scene(scene, snapshot.obstacles, snapshot.goal_positions, bounds)
-                draw.draw_candidates(scene, snapshot, tracks.slots_at(row))
+                slots = {label: tracks.slots[track] for label, track in tracks.tracks[row].items() if track in tracks.slots}
+                draw.draw_candidates(scene, snapshot, slots)
                 draw.draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
-                draw_likelihoods(shares, tracks.between(start_ns, snapshot.stamp_ns), start_ns)
+                until_now = CandidateTracks(tracks.snapshots[: row + 1], tracks.tracks[: row + 1], tracks.slots)
+                draw_likelihoods(shares, until_now, start_ns)
                 limits = (0.0, (end_ns - start_ns) / NANOSECONDS)
                 shares.set(xlim=limits, ylim=(-0.03, 1.03), xlabel='time [s]', title='likelihood of each candidate')
                 figure.legend(*zip(*make_signs(), strict=True), loc='outside lower center', ncols=5, frameon=False, fontsize=9)

@@ -12,9 +12,9 @@ import pytest
 from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
-from foc_ros.analysis.evaluation.other_goal import leave_goals_out
 from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask_all
 from foc_ros.analysis.evaluation.report import find_label_mismatches
+from foc_ros.analysis.evaluation.scores import leave_goals_out
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.errors import RecordingError

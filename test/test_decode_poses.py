@@ -179,5 +179,5 @@ def test_a_wrong_choice_of_topics_is_refused(topics: dict[str, str], chosen: dic
     [(0, (0, 0)), (1_500_000_000, (1, 500_000_000)), (-1, (-1, 999_999_999)), (2**80, (2**31 - 1, 2**80 % 10**9))],
 )
 def test_stamps_split_and_stay_in_range(stamp_ns: int, expected: tuple[int, int]) -> None:
-    made = conversion_types.make_stamp(RosbagsTypes(STORE), stamp_ns)
+    made = conversion_types.make_header(RosbagsTypes(STORE), stamp_ns, 'world').stamp
     assert (made.sec, made.nanosec) == expected

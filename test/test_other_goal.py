@@ -17,7 +17,7 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.json_output import encode_prediction
-from foc_ros.reporting.received import read_snapshot
+from foc_ros.reporting.views import read_snapshot
 from foc_ros.ros.messages.encode_markers import encode_markers
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.types import RosbagsTypes

@@ -23,8 +23,7 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import Candidate, Solution, Status
 from foc_ros.core.types import NANOSECONDS, HandSample, HandState
-from foc_ros.ros.freshness import Freshness
-from foc_ros.ros.health import Monitor
+from foc_ros.ros.health import Freshness, Monitor
 from foc_ros.ros.intake import Intake
 
 CONFIG = replace_values(Config(), {'estimator.position_stddev': 1e-4})

@@ -230,4 +230,4 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
     file = tmp_path / 'params.yaml'
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
-        assert declare_parameters(node_with(ros), Config()) == config == load_parameter_file(file)
+        assert declare_parameters(node_with(ros)) == config == load_parameter_file(file)

@@ -24,7 +24,7 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState
 from foc_ros.io.bags import BagReader
-from foc_ros.ros.freshness import Freshness
+from foc_ros.ros.health import Freshness
 from foc_ros.ros.intake import Intake
 
 START = 1000 * NANOSECONDS

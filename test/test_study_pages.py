@@ -18,10 +18,10 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import BagReader, Item
-from foc_ros.reporting import evaluation_report, simulation_report
-from foc_ros.reporting.example import FEW, draw_example, warn_of_few
-from foc_ros.reporting.fit_report import write_report
+from foc_ros.reporting import study_pages
 from foc_ros.reporting.page import Section, write_page
+from foc_ros.reporting.study_pages import FEW, draw_example, warn_of_few
+from foc_ros.reporting.study_pages import write_fit as write_report
 
 RECORDING = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 ANSWER = {
@@ -116,12 +116,12 @@ def test_results_are_told_in_plain_words_first() -> None:
             'inside_all': {'0.9': {'0.5': 0.87}},
         },
     }
-    told = ' '.join(evaluation_report.summarise(answer))
+    told = ' '.join(study_pages.summarise_evaluation(answer))
     for words in ('3 recordings', '40 moments', 'in 80 % of them', 'probability of 50 %', 'gives it 25 %', '31 mm', 'held 87 %'):
         assert words in told
     cell = {'operator': 'changes_way', 'collision_rate': 0.1, 'completion_s': 1.234}
     cells = [cell | {'assistance': 'none'}, cell | {'assistance': 'foc', 'collision_rate': 0.05, 'completion_s': None}]
-    assert simulation_report.summarise(cells)[1:] == [
+    assert study_pages.summarise_simulation(cells)[1:] == [
         'Changes way: collisions in 5 % of the trials with guidance; '
         'collisions in 10 % of the trials and 1.23 s for a movement without guidance.'
     ]

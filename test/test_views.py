@@ -13,9 +13,16 @@ from report_samples import START_NS, prediction, predictions, samples, scene
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Status
 from foc_ros.io.bags import TYPESTORE
-from foc_ros.reporting.received import read_snapshot
-from foc_ros.reporting.tracks import Slots, build_candidate_tracks
-from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory, build_snapshot, is_late, parse_label
+from foc_ros.reporting.views import (
+    HandTrajectory,
+    Slots,
+    build_candidate_tracks,
+    build_hand_trajectory,
+    build_snapshot,
+    is_late,
+    parse_label,
+    read_snapshot,
+)
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.ranking import compute_cost_ratios
 from foc_ros.ros.messages.types import RosbagsTypes

@@ -25,22 +25,9 @@ from .scenes import POSITION, RecordedScene, check_not_empty, read_recording
 FRAME = 'world'
 EPOCH_NS = NANOSECONDS
 """Stamp of t_s = 0. It is not 0, which means `not set` in a message."""
-LATEST_S, LONGEST_S = 2e9, 86400.0
-"""Bounds on a time (a stamp has 31 bits for seconds) and on a recording's length (beyond a day, two clocks are mixed up) [s]."""
-SHORTEST_STEP_S, LONGEST_STEP_S, FASTEST = 1e-4, 1.0, 20.0
-"""Median times between two poses that a tracker has [s], and a speed that no hand has [m/s]; beyond them, a unit is wrong."""
-USUAL_STEP_S, USUAL_SPEED = 0.01, 0.5
-"""Step [s] and speed [m/s] with which units of time and length are compared."""
-FARTHEST_SCENE_M, FARTHEST_EXTENTS = 10.0, 20.0
-"""Distance of the nearest goal or obstacle from a movement [m], and in its own extents; beyond both, a unit is wrong."""
-SHORTEST_EXTENT_M = 0.1
-"""Extent of a movement [m] for which a shorter one counts where a distance is compared with it."""
-FEWEST_STEPS = 2
-"""Steps from which the unit of a recording can be told."""
-TIME_UNITS = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
 LENGTH_UNITS = {'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6}
-SCENE_PERIOD_NS, SCENE_LEAD_NS = NANOSECONDS // 2, NANOSECONDS // 10
-"""The scene is sent twice a second, for the first time a tenth of a second before the first hand pose."""
+Doubt = tuple[str, str, str]
+"""What is doubted, what is wrong with it, and the reason."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +47,7 @@ def read_movements(file: Path, errors: list[FocError]) -> dict[str, Movement | R
     collect(errors, parse_rows, rows, lambda row: found.setdefault(read_recording(row), []).append(row))
     if len(errors) == known:
         collect(errors, check_not_empty, file, found)
-    warn_of_doubts(file, found)
+    _warn_once_for_each(file, ((name, doubt) for name, rows in found.items() if (doubt := _find_doubt(rows))))
     return {name: _parse_movement(name, rows) for name, rows in found.items()}
 
 
@@ -69,7 +56,8 @@ def _parse_movement(name: str, table: Iterable[Row]) -> Movement | RecordingErro
     samples: list[list[float]] = []
 
     def parse(row: Row) -> None:
-        bounds = (samples[-1][0], samples[0][0] + LONGEST_S) if samples else (0.0, LATEST_S)
+        # a stamp has 31 bits for seconds; in a recording of more than a day, two clocks are mixed up
+        bounds = (samples[-1][0], samples[0][0] + 86400.0) if samples else (0.0, 2e9)
         samples.append(row.read_numbers(Column('t_s', *bounds), *POSITION))
 
     try:
@@ -79,18 +67,27 @@ def _parse_movement(name: str, table: Iterable[Row]) -> Movement | RecordingErro
     return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
 
 
-def warn_of_doubts(file: Path, found: Mapping[str, Sequence[Row]]) -> None:
-    """Warn of recordings whose times or positions cannot be in s and m, or whose times repeat; once for each kind of doubt.
-
-    The rows of each recording are given, also those that cannot be used: a bound that they exceed may be due to their unit.
-    """
-    doubts: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for name, rows in found.items():
-        columns = [column for column in ('t_s', 'x_m', 'y_m', 'z_m') if column in rows[0].cells]
-        doubt, reason = _find_doubt(np.array([[row.parse_number(column) for column in columns] for row in rows]))
-        if reason:
-            doubts.setdefault(doubt, []).append((name, reason))
-    _warn_once_for_each(file, doubts)
+def _find_doubt(rows: Sequence[Row]) -> Doubt | None:
+    """Find times or positions that cannot be in s and m, or that repeat, also in rows that cannot be used because of that."""
+    columns = [column for column in ('t_s', 'x_m', 'y_m', 'z_m') if column in rows[0].cells]
+    numbers = np.array([[row.parse_number(column) for column in columns] for row in rows])
+    steps = np.diff(numbers[np.isfinite(numbers).all(axis=1)], axis=0)
+    forward, repeated = steps[steps[:, 0] > 0.0], int((steps[:, 0] == 0.0).sum())
+    if len(steps) < 2:
+        return None
+    if 2 * repeated >= len(steps):
+        return 't_s', 'repeats', f'{repeated} of {len(steps)} rows have the time of the row before'
+    if not len(forward):
+        return None
+    step_s = float(np.median(forward[:, 0]))
+    if not 1e-4 <= step_s <= 1.0:  # of a tracker
+        units = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
+        words = f'seems to be in {_find_nearest_unit(units, step_s, 0.01)}'
+        return 't_s', words, f'the median time between two poses is {step_s:.3g} s'
+    speed = float(np.quantile(np.linalg.norm(forward[:, 1:], axis=1) / forward[:, 0], 0.99))
+    if speed <= 20.0:  # beyond that of any hand
+        return None
+    return 'the position', f'seems to be in {_find_nearest_unit(LENGTH_UNITS, speed, 0.5)}', f'the hand moves at {speed:.3g} m/s'
 
 
 def warn_of_far_scenes(file: Path, recorded: Iterable[tuple[Movement, RecordedScene]]) -> None:
@@ -98,50 +95,28 @@ def warn_of_far_scenes(file: Path, recorded: Iterable[tuple[Movement, RecordedSc
 
     Positions that are in another unit themselves give no second warning here: their movement is larger by the same factor.
     """
-    doubts: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    doubts: list[tuple[str, Doubt]] = []
     for movement, scene in recorded:
         low, high = movement.positions.min(axis=0), movement.positions.max(axis=0)
-        extent = max(float(np.linalg.norm(high - low)), SHORTEST_EXTENT_M)
+        extent = max(float(np.linalg.norm(high - low)), 0.1)
         for kind, rows in (('goals', scene.goals), ('obstacles', scene.obstacles)):
             places = np.array([row[:3] for row in (() if rows is None else rows)]).reshape(-1, 3)
-            gaps = np.linalg.norm(places - np.clip(places, low, high), axis=1)
-            gap = float(gaps.min(initial=math.inf))
-            if max(FARTHEST_SCENE_M, FARTHEST_EXTENTS * extent) < gap < math.inf:
+            gap = float(np.linalg.norm(places - np.clip(places, low, high), axis=1).min(initial=math.inf))
+            if max(10.0, 20.0 * extent) < gap < math.inf:
                 words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, gap, extent)}'
                 reason = f'the nearest is {gap:.3g} m from the movement of the hand'
-                doubts.setdefault((f'the {kind}', words), []).append((movement.name, reason))
+                doubts.append((movement.name, (f'the {kind}', words, reason)))
     _warn_once_for_each(file, doubts)
 
 
-def _warn_once_for_each(file: Path, doubts: Mapping[tuple[str, str], Sequence[tuple[str, str]]]) -> None:
-    """Warn once of each doubt: what is doubted and what is wrong with it, with the names and reasons of recordings."""
-    for (what, words), doubted in doubts.items():
-        name, reason = doubted[0]
-        others = f' and {len(doubted) - 1} others' if doubted[1:] else ''
+def _warn_once_for_each(file: Path, doubts: Iterable[tuple[str, Doubt]]) -> None:
+    """Warn once of what is doubted in several recordings, given with their names."""
+    grouped: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for name, (what, words, reason) in doubts:
+        grouped.setdefault((what, words), []).append((name, reason))
+    for (what, words), ((name, reason), *rest) in grouped.items():
+        others = f' and {len(rest)} others' if rest else ''
         warn(f'{file}: {what} of recording {name}{others} {words}: {reason}')
-
-
-def _find_doubt(rows: Array) -> tuple[tuple[str, str], str]:
-    """Return a column with what is wrong with it, and the reason; empty texts if the numbers can be right.
-
-    rows (n, 3) or (n, 4): time [s] and position [m], NaN where there is no number.
-    """
-    steps = np.diff(rows[np.isfinite(rows).all(axis=1)], axis=0)
-    steps_s, is_moving_on = steps[:, 0], steps[:, 0] > 0.0
-    repeated = int((steps_s == 0.0).sum())
-    if len(steps_s) >= FEWEST_STEPS and 2 * repeated >= len(steps_s):
-        return ('t_s', 'repeats'), f'{repeated} of {len(steps_s)} rows have the time of the row before'
-    if len(steps_s) < FEWEST_STEPS or not is_moving_on.any():
-        return ('', ''), ''
-    step_s = float(np.median(steps_s[is_moving_on]))
-    if not SHORTEST_STEP_S <= step_s <= LONGEST_STEP_S:
-        words = f'seems to be in {_find_nearest_unit(TIME_UNITS, step_s, USUAL_STEP_S)}'
-        return ('t_s', words), f'the median time between two poses is {step_s:.3g} s'
-    speed = float(np.quantile(np.linalg.norm(steps[is_moving_on, 1:], axis=1) / steps_s[is_moving_on], 0.99))
-    if speed <= FASTEST:
-        return ('', ''), ''
-    words = f'seems to be in {_find_nearest_unit(LENGTH_UNITS, speed, USUAL_SPEED)}'
-    return ('the position', words), f'the hand moves at {speed:.3g} m/s'
 
 
 def _find_nearest_unit(units: Mapping[str, float], value: float, usual: float) -> str:
@@ -154,7 +129,8 @@ def recorded_messages(movement: Movement, scene: RecordedScene) -> Iterator[tupl
     types, boxes = RosbagsTypes(TYPESTORE), scene.find_boxes(movement.positions)
 
     def list_scenes() -> Iterator[tuple[int, str, Any]]:
-        for stamp_ns in range(movement.stamps_ns[0] - SCENE_LEAD_NS, movement.stamps_ns[-1] + 1, SCENE_PERIOD_NS):
+        # twice a second, for the first time before the first hand pose
+        for stamp_ns in range(movement.stamps_ns[0] - NANOSECONDS // 10, movement.stamps_ns[-1] + 1, NANOSECONDS // 2):
             if boxes:
                 yield stamp_ns, '/obstacle_markers', encode_boxes(types, stamp_ns, FRAME, boxes)
             else:

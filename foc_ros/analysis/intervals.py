@@ -31,15 +31,15 @@ def resample(statistic: Callable[[NDArray[np.intp]], float], n: int) -> Array:
 def compute_mean_interval(values: Array, group: NDArray[Any], seed: int = SEED, resamples: int = RESAMPLES) -> list[float]:
     """Return the interval of 95 % [low, high] of the mean of values (m,), at least one, of which groups (m,) are drawn."""
     _, number = np.unique(group, return_inverse=True)
-    sums, counts = np.bincount(number, values), np.bincount(number)
-    if len(sums) == 1:
+    parts = np.bincount(number, values), np.bincount(number)
+    if len(parts[0]) == 1:
         return [float(values.mean())] * 2
-    found = _bootstrap((sums, counts), _divide_sums, seed, resamples, paired=True, vectorized=True)
+
+    def find_mean(sums: Array, counts: Array, axis: int) -> Array:
+        return np.asarray(sums.sum(axis=axis) / counts.sum(axis=axis))
+
+    found = _bootstrap(parts, find_mean, seed, resamples, paired=True, vectorized=True)
     return [float(end) for end in found.confidence_interval]
-
-
-def _divide_sums(sums: Array, counts: Array, axis: int) -> Array:
-    return np.asarray(sums.sum(axis=axis) / counts.sum(axis=axis))
 
 
 def _bootstrap(

@@ -35,10 +35,6 @@ CONNECT_S = 10.0
 """Time within which a scheduler and its first worker have to answer [s]."""
 DASK = 'foc_ros.dask'
 """Name of :class:`DaskBackend` among the backends of joblib."""
-MOST_THREADS = 512
-"""Most calls that wait for a cluster at the same time."""
-WATCH_S = 0.5
-"""Period at which a worker process looks for its parent [s]."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +76,8 @@ class DaskBackend(ThreadingBackend):
         return DaskBackend, ()
 
     def effective_n_jobs(self, n_jobs: int) -> int:  # noqa: ARG002 (joblib's signature)
-        """Return the number of calls at the same time; with a single one joblib would compute here."""
-        return int(max(2, min(sum(self._client.nthreads().values()), MOST_THREADS)))
+        """Return the number of calls at the same time, each in a thread; with a single one joblib would compute here."""
+        return int(max(2, min(sum(self._client.nthreads().values()), 512)))
 
     def submit(self, func: Callable[[], Any], callback: Callable[[Any], None] | None = None) -> Any:
         """Schedule a call."""
@@ -190,7 +186,7 @@ def _end_with(parent: int) -> None:
 
     def watch() -> None:
         while os.getppid() == parent:
-            time.sleep(WATCH_S)
+            time.sleep(0.5)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

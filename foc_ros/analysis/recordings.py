@@ -76,7 +76,9 @@ def find_recordings(data: Path) -> dict[str, Recording]:
         check_bag(data)
         bags = [data.resolve()]
     elif data.is_dir():
-        bags = [path for path in sorted(data.iterdir()) if _may_be_bag(path)]
+        visible = [path for path in sorted(data.iterdir()) if not path.name.startswith('.')]
+        # a directory with bag files but without metadata counts, so that it is reported as broken
+        bags = [path for path in visible if any(map(is_bag_file, path.iterdir() if path.is_dir() else [path]))]
     else:
         raise RecordingError(f'{data}: no such file or directory')
     if not bags:
@@ -120,35 +122,22 @@ def _read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> 
     return found
 
 
-def _may_be_bag(path: Path) -> bool:
-    """Tell bags from other files; a directory with bag files but without metadata counts, so that it is reported as broken."""
-    if path.name.startswith('.'):
-        return False
-    return is_bag_file(path) or (path.is_dir() and any(map(is_bag_file, path.iterdir())))
-
-
 def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, output: Path) -> str:
     """Convert the tables, all of which are checked before the first bag is written; return in words what was written.
 
-    Parameters
-    ----------
-    table, obstacles, goals
-        The recordings and their scenes, or a folder of all three tables.
-    output
-        Folder for the bags.
-
-    Raises
-    ------
-    RecordingError
-        For a table that cannot be read, and for a bag that exists.
-    InputError
-        For a table of recordings without one of obstacles.
+    table, obstacles, goals: the recordings and their scenes, or a folder of all three tables; output: folder for the bags. Raises
+    RecordingError for a table that cannot be read and for a bag that exists, InputError for a table without one of obstacles.
     """
     if obstacles is None and not table.is_dir():
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
     found = read_tables(table) if obstacles is None else _read_with_scenes(table, partial(read_scenes, obstacles, goals), table)
     movements = collect_all(TableRecording.read_movement, [(each,) for each in found.values()])
-    bags = {output / name: movement for name, movement in _name_bags(movements).items()}
+    bags: dict[Path, Movement] = {}
+    for movement in movements:
+        name = re.sub(r'[^A-Za-z0-9._-]', '_', movement.name).lstrip('.-') or '_'  # valid on any file system
+        if (bag := output / name) in bags:
+            raise RecordingError(f'recordings {bags[bag].name!r} and {movement.name!r} would both be written to {name}')
+        bags[bag] = movement
     for bag in bags:
         if bag.exists():
             raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
@@ -161,14 +150,3 @@ def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, outp
     numbers = [len(scene.find_boxes(each.positions) or scene.obstacles) for each, scene in scenes]
     count = ' to '.join(str(each) for each in sorted({min(numbers), max(numbers)}))
     return f'{len(bags)} bags with {hands} hand poses and {count} obstacles written to {output}'
-
-
-def _name_bags(movements: list[Movement]) -> dict[str, Movement]:
-    """Return the recordings by a name that is valid on any file system; raises RecordingError if two have the same name."""
-    named: dict[str, Movement] = {}
-    for movement in movements:
-        name = re.sub(r'[^A-Za-z0-9._-]', '_', movement.name).lstrip('.-') or '_'
-        if name in named:
-            raise RecordingError(f'recordings {named[name].name!r} and {movement.name!r} would both be written to {name}')
-        named[name] = movement
-    return named

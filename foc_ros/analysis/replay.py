@@ -25,9 +25,6 @@ from foc_ros.ros.intake import DROPPED, Intake
 from foc_ros.ros.messages.encode_guidance import Place
 from foc_ros.ros.transforms import Transforms, TransformTree
 
-LATEST_NS = 2**63 - 1
-"""Stamp that is later than those of all messages [ns]."""
-
 
 @dataclass(frozen=True)
 class Step:
@@ -47,9 +44,8 @@ class Replay:
     """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
 
     Transforms of the recording are applied as the node applies those of tf2, by the log times of the messages. budget_s: time
-    limit of each prediction [s], with which results depend on the speed of the machine; None for none.
-
-    Raises RecordingError or InputError where the class library cannot be used.
+    limit of each prediction [s], with which results depend on the speed of the machine; None for none. Raises RecordingError or
+    InputError where the class library cannot be used.
     """
 
     def __init__(self, config: Config, budget_s: float | None = None) -> None:
@@ -75,7 +71,13 @@ class Replay:
         for item in items:
             now_s = item.log_ns / NANOSECONDS
             if item.role in (TRANSFORMS, STATIC_TRANSFORMS):
-                self._take_transforms(item)
+                if isinstance(item.message, MessageError):
+                    self.intake.refuse(item.role, item.message)
+                    self._note(item.role, None)
+                else:
+                    left_out = self._tree.add(item.message, is_static=item.role == STATIC_TRANSFORMS)
+                    self.intake.count_dropped(item.role, 'not_usable', left_out)
+                    self._note(item.role, SampleStatus.ACCEPTED)
                 yield item, None
             else:
                 self._held[item.role].append(item)
@@ -100,7 +102,7 @@ class Replay:
         self.pipeline.forget_scene()
         hand = self.pipeline.hand_state
         if hand is not None:  # the next sample restarts the filter, also if its stamp is only a little earlier than the last one
-            self.pipeline.hand_state = replace(hand, stamp_ns=LATEST_NS)
+            self.pipeline.hand_state = replace(hand, stamp_ns=2**63 - 1)
         self._begin_recording()
 
     def describe_losses(self) -> str:
@@ -128,15 +130,6 @@ class Replay:
                 status = None
             self._note(role, status)
             yield self._held[role].popleft(), status
-
-    def _take_transforms(self, item: Item) -> None:
-        if isinstance(item.message, MessageError):
-            self.intake.refuse(item.role, item.message)
-            self._note(item.role, None)
-            return
-        left_out = self._tree.add(item.message, is_static=item.role == STATIC_TRANSFORMS)
-        self.intake.count_dropped(item.role, 'not_usable', left_out)
-        self._note(item.role, SampleStatus.ACCEPTED)
 
     def _note(self, role: str, status: SampleStatus | None) -> None:
         """Count a message, and why it was refused if it was."""
@@ -185,26 +178,23 @@ class GuidanceReplay:
         stamp_ns, hand = step.sample.stamp_ns, self._pipeline.hand_state
         if self._hand is None or stamp_ns < self._hand.stamp_ns:  # the recording began anew
             self._state, self._first_ns, self._next_ns, self._prediction = GuidanceState(), stamp_ns, stamp_ns, None
-        elif self._hand is not None:
+        else:
             yield from self._update_until(stamp_ns, self._hand)
         self._hand = hand
         if step.prediction is not None:
             self._prediction = step.prediction
 
     def _update_until(self, end_ns: int, hand: HandState) -> Iterator[GuidanceStep]:
-        config = self._pipeline.config
+        config, prediction = self._pipeline.config, self._prediction
         while self._next_ns < end_ns:
-            output, self._state = guide(config, self._state, self._make_input(hand))
+            prediction_ns = self._next_ns if prediction is None else prediction.stamp_ns
+            ages = (self._next_ns - hand.stamp_ns) / NANOSECONDS, (self._next_ns - prediction_ns) / NANOSECONDS
+            # seconds since the epoch would be rounded to a quarter of a microsecond
+            t = (self._next_ns - self._first_ns) / NANOSECONDS
+            given = GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages, acceleration=hand.mean[4:6])
+            output, self._state = guide(config, self._state, given)
             yield GuidanceStep(self._next_ns, Place(hand.stamp_ns, hand.frame_id, hand.height, config.plane), output)
             self._next_ns += self._period_ns
             if output.status is GuidanceStatus.STALE and not output.force.any() and not output.authority:
                 self._next_ns = max(self._next_ns, end_ns)
                 self._state = replace(self._state, t=(self._next_ns - self._first_ns) / NANOSECONDS)
-
-    def _make_input(self, hand: HandState) -> GuidanceInput:
-        now_ns, prediction = self._next_ns, self._prediction
-        prediction_ns = now_ns if prediction is None else prediction.stamp_ns
-        ages = (now_ns - hand.stamp_ns) / NANOSECONDS, (now_ns - prediction_ns) / NANOSECONDS
-        # seconds since the epoch would be rounded to a quarter of a microsecond
-        t = (now_ns - self._first_ns) / NANOSECONDS
-        return GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages, acceleration=hand.mean[4:6])

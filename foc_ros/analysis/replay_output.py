@@ -75,9 +75,9 @@ def _write_element(file: TextIO, element: object) -> None:
 class Summary:
     """Counts over the steps of one replay.
 
-    samples: hand poses read; predictions; solved: predictions with a candidate that has a likelihood; compromised, estimated:
-    candidates with a likelihood; cleared_by_height: obstacles that a predicted height cleared, over all predictions; seconds:
-    wall time of each prediction.
+    samples: hand poses read; solved: predictions with a candidate that has a likelihood; compromised, estimated: candidates with
+    one; cleared_by_height: obstacles that a predicted height cleared, over all predictions; seconds: wall time of each
+    prediction.
     """
 
     samples: int = 0
@@ -124,6 +124,7 @@ class Summary:
 def facts(answer: Mapping[str, Any]) -> dict[str, str]:
     """Return the answer of a summary in words, for a table or a report."""
     times = answer['prediction_ms']
+    unsolved = {f'{name} ({Status(name).remedy})': count for name, count in answer['failures'].items() if count}
     return {
         'recording': f'{answer["duration_s"]:.1f} s',
         'hand poses': str(answer['samples']),
@@ -131,7 +132,7 @@ def facts(answer: Mapping[str, Any]) -> dict[str, str]:
         'rejected': _list_counts(answer['refused']),
         'candidates compromised': _list_with_note(answer['compromised'], Status.COMPROMISED.remedy),
         'candidates estimated': _list_with_note(answer['estimated'], 'unlikely or late'),
-        'candidates not solved': _list_failures(answer['failures']),
+        'candidates not solved': _list_counts(unsolved),
         'obstacles cleared by height': f'{answer["cleared_by_height"]} over all predictions',
         **({'demonstrations learned': str(answer['learned'])} if 'learned' in answer else {}),
         'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
@@ -141,11 +142,6 @@ def facts(answer: Mapping[str, Any]) -> dict[str, str]:
 def _list_with_note(count: int, note: str) -> str:
     """Return a count with a note, which is left out where nothing was counted."""
     return f'{count} ({note})' if count else _list_counts({})
-
-
-def _list_failures(counts: Mapping[str, int]) -> str:
-    """Return counts by status, each with its remedy."""
-    return _list_counts({f'{name} ({Status(name).remedy})': count for name, count in counts.items() if count})
 
 
 def _list_counts(counts: Mapping[str, int]) -> str:

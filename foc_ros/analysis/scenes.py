@@ -25,10 +25,7 @@ from foc_ros.ros.messages.decode_poses import MAX_GOALS
 SIZES = ('size_x_m', 'size_y_m')
 POSITION = (Column('x_m'), Column('y_m'), Column('z_m', default=0.0))
 EXTENT = tuple(Column(name, 0.0, default=0.0) for name in ('radius_m', 'radius_stddev_m', *SIZES))
-YAW = Column('yaw_rad', default=0.0)
-BOX = tuple(Column(name) for name in ('x_m', 'y_m', 'z_m')) + tuple(
-    Column(name, 0.0) for name in ('width_m', 'depth_m', 'height_m')
-)
+BOX = [*map(Column, ('x_m', 'y_m', 'z_m')), *(Column(name, 0.0) for name in ('width_m', 'depth_m', 'height_m'))]
 TARGET = 'Target'
 NO_GOAL = -1
 """Row of a goal that is not in the list: the movement ends with its recording."""
@@ -86,7 +83,7 @@ def read_obstacles(file: Path) -> dict[str, tuple[tuple[float, ...], ...]]:
 
     def parse(row: Row) -> None:
         rows = found.setdefault(read_recording(row), {})
-        x, y, z, radius, stddev, *size, yaw = row.read_numbers(*POSITION, *EXTENT, YAW)
+        x, y, z, radius, stddev, *size, yaw = row.read_numbers(*POSITION, *EXTENT, Column('yaw_rad', default=0.0))
         identity = row.read_integer('id', -(2**31), 2**31 - 1, default=len(rows))
         if identity in rows:
             raise row.make_error('id', 'another id than the rows above')

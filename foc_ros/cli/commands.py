@@ -21,7 +21,7 @@ from cyclopts import Parameter
 from foc_ros.core.errors import FocError
 from foc_ros.io.outputs import REPORT_FILES, check_folder, check_page, check_picture
 
-from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Learning, Params, Port, Remaps, Samples, app, warn_all
+from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Json, Learning, Params, Port, Remaps, Samples, app, warn_all
 
 
 @app.command(group=TRY)
@@ -55,8 +55,6 @@ def play(*, host: str = '127.0.0.1', port: Port = 8420, data: Path = Path('play_
         Port to serve on; 0: a free one.
     data
         Folder for recordings, reports and fitted parameters.
-    params
-        The node's parameter file (default: every parameter has its default).
     """
     from foc_ros.play.address import open_sockets
 
@@ -86,15 +84,13 @@ def node(*arguments: Annotated[str, Parameter(allow_leading_hyphen=True, metavar
 
 
 @app.command(group=PREDICT)
-def solve(scene: Existing, /, *, json: bool = False, monte_carlo: Samples | None = None, plot: Path | None = None) -> int:
+def solve(scene: Existing, /, *, json: Json = False, monte_carlo: Samples | None = None, plot: Path | None = None) -> int:
     """Solve one scene from a YAML or JSON file.
 
     Parameters
     ----------
     scene
         YAML or JSON file.
-    json
-        Print one JSON object.
     monte_carlo
         Estimate the probability of avoidance from so many noisy movements.
     plot
@@ -137,7 +133,7 @@ def replay(
     params: Params = DEFAULTS,
     learning: Learning = NO_LEARNING,
     guidance: bool = False,
-    json: bool = False,
+    json: Json = False,
     remap: Remaps = (),
 ) -> int:
     """Compute predictions from a recording, without ROS and without a time limit: the same ones each time.
@@ -150,12 +146,8 @@ def replay(
         New bag for inputs and predictions.
     report
         Folder for a page, its numbers and a picture of all movements.
-    params
-        The node's parameter file (default: every parameter has its default).
     guidance
         Compute guidance as well, at guidance.rate_hz: into the output bag and, with --json, as a list `guidance`.
-    json
-        Print one JSON object.
     remap
         Take an input from a topic, as in hand_pose:=/PSM1/measured_cp (default: by name, else by type).
     """

@@ -31,9 +31,8 @@ from foc_ros.io import topics
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter, Item
 from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
-from foc_ros.reporting.received import read_snapshot
 from foc_ros.reporting.report import describe_late, write_report
-from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory
+from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory, read_snapshot
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, isolated_graph
 from foc_ros.ros.messages.decode_poses import decode_stamp
@@ -45,8 +44,6 @@ MARK = '.foc_ros_demo'
 RECEIVED = {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()} | {'/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}
 """Types of the outputs of the node."""
 PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
-RATES = {'hand samples': 'hand_pose', 'predictions': 'prediction'}
-"""Rates that are shown, and their names in the diagnostics."""
 
 
 class Recorder:
@@ -101,8 +98,9 @@ class Recorder:
     def describe(self, items: Sequence[Item]) -> str:
         """Return how far the recording has been played, with the rates of the node's diagnostics and the delay."""
         progress = f'{(self.snapshots[-1].stamp_ns - items[0].log_ns) / NANOSECONDS:4.1f} of {_measure_duration_s(items):.1f} s'
-        rates = ', '.join(f'{name} {self.health.get(f"{key} rate [Hz]", "-")}/s' for name, key in RATES.items())
-        return f'{progress}   {rates}, delay {1e3 * float(np.median(self.delays[-50:])):.0f} ms'
+        poses, predictions = (self.health.get(f'{name} rate [Hz]', '-') for name in ('hand_pose', 'prediction'))
+        delay_ms = 1e3 * float(np.median(self.delays[-50:]))
+        return f'{progress}   hand samples {poses}/s, predictions {predictions}/s, delay {delay_ms:.0f} ms'
 
 
 def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -> int:

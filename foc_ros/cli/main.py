@@ -28,19 +28,19 @@ from .options import app
 
 MOVED = {'paper': 'the studies of the paper are an example now: python examples/paper/paper.py'}
 """Commands of earlier releases, and what took their place."""
-INTERRUPTED, PIPE_CLOSED = 130, 141
+INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, without one the help, and return the exit code; arguments: those of the process by default."""
     if sys.stdout is None:  # the process was started with its standard output closed
         sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
-    if arguments is None and sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
-        os.execv(sys.executable, [sys.executable, '-X', 'utf8', *sys.orig_argv[1:]])  # noqa: S606
-    if arguments is None:  # matrices are small: threads of a linear algebra library would only wait for each other
+    if arguments is None:
+        if sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
+            os.execv(sys.executable, [sys.executable, '-X', 'utf8', *sys.orig_argv[1:]])  # noqa: S606
+        # matrices are small: threads of a linear algebra library would only wait for each other
         os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-    if arguments is None:  # pictures are files; the backend of a notebook or of a desktop may not exist here
-        os.environ['MPLBACKEND'] = 'agg'
+        os.environ['MPLBACKEND'] = 'agg'  # pictures are files; the backend of a notebook or of a desktop may not exist here
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors='backslashreplace')  # a name of a file or topic may have characters that it cannot show
     given = list(sys.argv[1:] if arguments is None else arguments) or ['--help']
@@ -52,8 +52,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except OSError as error:
-        _discard_lost_output()
-        return PIPE_CLOSED if isinstance(error, BrokenPipeError) else _reject(program, [str(error)])
+        try:
+            sys.stdout.flush()
+        except OSError:  # the interpreter would write what is left again at exit and print an error
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141 if isinstance(error, BrokenPipeError) else _reject(program, [str(error)])
     return code
 
 
@@ -85,14 +88,6 @@ def _reject(program: str, messages: Sequence[str]) -> int:
     return 2
 
 
-def _discard_lost_output() -> None:
-    """Discard what standard output does not take: the interpreter would write it again at exit and print an error."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 @contextmanager
 def handle_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt on SIGINT within the context; during an import, end the process at once with `INTERRUPTED`.
@@ -103,16 +98,16 @@ def handle_interrupts() -> Iterator[None]:
     if before is not signal.default_int_handler:
         yield
         return
-    signal.signal(signal.SIGINT, _interrupt)
+
+    def interrupt(_: int, frame: FrameType | None) -> None:
+        while frame is not None:
+            if frame.f_globals.get('__name__') == 'importlib._bootstrap':
+                os._exit(INTERRUPTED)
+            frame = frame.f_back
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def _interrupt(_: int, frame: FrameType | None) -> None:
-    while frame is not None:
-        if frame.f_globals.get('__name__') == 'importlib._bootstrap':
-            os._exit(INTERRUPTED)
-        frame = frame.f_back
-    raise KeyboardInterrupt

@@ -46,22 +46,13 @@ PREDICT = Group.create_ordered('To predict')
 RECORDINGS = Group.create_ordered('For recordings of people')
 OTHER = Group.create_ordered('Other')
 
-MOST_SAMPLES, MOST_TRIALS, MOST_WORKERS, LARGEST_PORT = 10_000_000, 100_000, 1024, 65535
-ALLOWED = ('eta', 'positions')
-"""What `fit` lowers or makes worse only if it is allowed to."""
 Table = tuple[str | None, Sequence[str], Iterable[Sequence[str]]]
 """Title, columns and rows."""
-_ADDRESS = re.compile(r'(\w+://)?[^\s/]+:\d{1,5}')
 
 
 def _read(read: Callable[[str], Any], **options: Any) -> Parameter:
     """Return the parameter whose text is read by a function."""
     return Parameter(converter=lambda _, tokens: read(tokens[0].value), n_tokens=1, accepts_keys=False, **options)
-
-
-def _whole(low: int, high: int) -> Parameter:
-    """Return the parameter of a whole number in [low, high]."""
-    return Parameter(validator=Number(gte=low, lte=high))
 
 
 def names(known: tuple[str, ...]) -> Parameter:
@@ -80,7 +71,7 @@ def names(known: tuple[str, ...]) -> Parameter:
 
 
 def _read_address(text: str) -> str:
-    if not _ADDRESS.fullmatch(text):
+    if not re.fullmatch(r'(\w+://)?[^\s/]+:\d{1,5}', text):
         raise InputError('--scheduler', 'the address of a Dask scheduler, as in tcp://host:8786', text)
     return text
 
@@ -105,18 +96,23 @@ def _read_remaps(_: object, tokens: Sequence[Token]) -> tuple[tuple[str, str], .
 
 DEFAULTS = Config()
 Existing = ExistingPath
-Params = Annotated[Config, _read(load_parameter_file, name='--params', metavar='YAML', show_default=False)]
+_PARAMS_HELP = "The node's parameter file (default: every parameter has its default)."
+Params = Annotated[Config, _read(load_parameter_file, name='--params', metavar='YAML', show_default=False, help=_PARAMS_HELP)]
+Data = Annotated[
+    ExistingPath, Parameter(help='Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.')
+]
+Json = Annotated[bool, Parameter(help='Print one JSON object.')]
 Remaps = Annotated[
     tuple[tuple[str, str], ...],
     Parameter(converter=_read_remaps, n_tokens=1, allow_repeating=True, metavar='INPUT:=TOPIC', show_default=False),
 ]
-Samples = Annotated[int, _whole(1, MOST_SAMPLES)]
-Port = Annotated[int, _whole(0, LARGEST_PORT)]
-Trials = Annotated[int, _whole(1, MOST_TRIALS)]
-Seed = Annotated[int, _whole(0, MOST_TRIALS)]
+Samples = Annotated[int, Parameter(validator=Number(gte=1, lte=10_000_000))]
+Port = Annotated[int, Parameter(validator=Number(gte=0, lte=65535))]
+Trials = Annotated[int, Parameter(validator=Number(gte=1, lte=100_000))]
+Seed = Annotated[int, Parameter(validator=Number(gte=0, lte=100_000))]
 Operators = Annotated[tuple[str, ...], names(OPERATORS)]
 Assistance = Annotated[tuple[str, ...], names(ASSISTANCE)]
-Allowed = Annotated[tuple[str, ...], names(ALLOWED)]
+Allowed = Annotated[tuple[str, ...], names(('eta', 'positions'))]
 
 
 @Parameter(name='*')
@@ -162,10 +158,6 @@ class Study:
 
     Parameters
     ----------
-    params
-        The node's parameter file (default: every parameter has its default).
-    json
-        Print one JSON object.
     report
         Folder for a page with plots.
     workers
@@ -175,9 +167,9 @@ class Study:
     """
 
     params: Params = DEFAULTS
-    json: bool = False
+    json: Json = False
     report: Path | None = None
-    workers: Annotated[int, _whole(1, MOST_WORKERS)] | None = None
+    workers: Annotated[int, Parameter(validator=Number(gte=1, lte=1024))] | None = None
     scheduler: Annotated[str, _read(_read_address)] | None = None
 
     def check(self, page: str) -> None:
@@ -193,11 +185,11 @@ class Study:
 
         return parallel.open_workers(self.workers or len(os.sched_getaffinity(0)), self.scheduler)
 
-    def load_report(self, module: str) -> Callable[..., None]:
+    def load_report(self, kind: str) -> Callable[..., None]:
         """Return what writes the report, so that a missing library is reported before the work; without one it does nothing."""
         if self.report is None:
             return lambda *_: None
-        return partial(import_module(f'foc_ros.reporting.{module}').write_report, self.report)
+        return partial(getattr(import_module('foc_ros.reporting.study_pages'), f'write_{kind}'), self.report)
 
     def show(self, answer: object, tables: Iterable[Table], sentences: Iterable[str], page: str, commands: str = '') -> None:
         """Print an answer as JSON, or as tables, sentences, commands as they are, and the address of the report."""

@@ -8,46 +8,24 @@ import json as json_format
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from foc_ros.analysis.simulation import ASSISTANCE, HUMAN_PATHS, OPERATORS
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE, check_file, check_folder
 
-from .options import (
-    DEFAULTS,
-    OTHER,
-    PLAIN,
-    RECORDINGS,
-    Allowed,
-    Assistance,
-    Existing,
-    Operators,
-    Params,
-    Seed,
-    Study,
-    Trials,
-    app,
-    confirm,
-    warn_all,
-)
+from . import options
+from .options import PLAIN, RECORDINGS, Data, Existing, Study, app, warn_all
 
 
 @app.command(group=RECORDINGS)
-def learn(data: Existing, /, *, output: Path, params: Params = DEFAULTS, json: bool = False) -> int:
+def learn(data: Data, /, *, output: Path, params: options.Params = options.DEFAULTS, json: options.Json = False) -> int:
     """Write the recordings of a scene as experience for predictions in this scene.
 
     Parameters
     ----------
-    data
-        Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.
     output
         Class library to write, for homotopy.library; an earlier one is replaced.
-    params
-        The node's parameter file (default: every parameter has its default).
-    json
-        Print one JSON object.
     """
     from foc_ros.analysis.recordings import find_recordings
     from foc_ros.io.class_library import MOST_WAYS
@@ -69,13 +47,11 @@ def learn(data: Existing, /, *, output: Path, params: Params = DEFAULTS, json: b
 
 
 @app.command(group=RECORDINGS)
-def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = PLAIN) -> int:
+def fit(data: Data, /, *, output: Path, allow: options.Allowed = (), study: Study = PLAIN) -> int:
     """Find the parameters that explain recordings best.
 
     Parameters
     ----------
-    data
-        Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.
     output
         Parameter file to write.
     allow
@@ -87,7 +63,7 @@ def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = 
     check_file('--output', output)
     study.check(FIT_PAGE)
     recordings = find_recordings(data)
-    write_report = study.load_report('fit_report')
+    write_report = study.load_report('fit')
     from foc_ros.analysis.fitting import fit as fitting
     from foc_ros.ros.parameters import write_parameter_file
 
@@ -97,7 +73,7 @@ def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = 
     losses = fitting.find_worse_positions(found.comparison)
     for loss in losses:
         print(f'foc_ros fit: {loss}', file=sys.stderr)
-    if losses and 'positions' not in allow and not confirm(f'Write {output} all the same?'):
+    if losses and 'positions' not in allow and not options.confirm(f'Write {output} all the same?'):
         print(f'foc_ros fit: {output} is not written; --allow positions writes it all the same', file=sys.stderr)
         return 2
     write_parameter_file('--output', output, found.config)
@@ -107,13 +83,11 @@ def fit(data: Existing, /, *, output: Path, allow: Allowed = (), study: Study = 
 
 
 @app.command(group=RECORDINGS)
-def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = False, study: Study = PLAIN) -> int:
+def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False, study: Study = PLAIN) -> int:
     """Compare predictions with recordings of people, beside simple baselines.
 
     Parameters
     ----------
-    data
-        Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.
     in_order
         Replay the recordings of an operator one after the other, with what is learnt from one to the next.
     unannounced
@@ -123,8 +97,8 @@ def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = F
 
     study.check(EVALUATION_PAGE)
     recordings = find_recordings(data)
-    write_report = study.load_report('evaluation_report')
-    from foc_ros.analysis.evaluation import observations, other_goal, report
+    write_report = study.load_report('evaluation')
+    from foc_ros.analysis.evaluation import observations, report, scores
 
     with study.open_workers():
         observed, failed = observations.observe_all(recordings, study.params, in_order)
@@ -134,12 +108,12 @@ def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = F
             return 3
         answer = report.evaluate(observed, study.params)
         if unannounced:
-            left_out, _ = observations.observe_all(other_goal.leave_goals_out(recordings), study.params, in_order)
-            answer['other_goal'] = other_goal.score_other_goal(observed, left_out, study.params.likelihood.other_goal)
+            left_out, _ = observations.observe_all(scores.leave_goals_out(recordings), study.params, in_order)
+            answer['other_goal'] = scores.score_other_goal(observed, left_out, study.params.likelihood.other_goal)
             if answer['other_goal'] is None:
                 warn_all('evaluate', ['no recording has several goals of which one could be left out'])
             else:
-                answer['verdict'].append(other_goal.describe_scores(answer['other_goal']))
+                answer['verdict'].append(scores.describe_other_goal(answer['other_goal']))
     mismatches = report.find_label_mismatches(data, observed)
     differ = 'the label differs from the recorded path'
     warn_all('evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
@@ -149,13 +123,13 @@ def evaluate(data: Existing, /, *, in_order: bool = False, unannounced: bool = F
     return 2 if failed else 0
 
 
-@app.command(group=OTHER)
+@app.command(group=options.OTHER)
 def simulate(
     *,
-    operators: Operators | None = None,
-    assistance: Assistance = ASSISTANCE,
-    trials: Trials = 20,
-    seed: Seed = 0,
+    operators: options.Operators | None = None,
+    assistance: options.Assistance = ASSISTANCE,
+    trials: options.Trials = 20,
+    seed: options.Seed = 0,
     recordings: Existing | None = None,
     study: Study = PLAIN,
 ) -> int:
@@ -185,7 +159,7 @@ def run_simulation(
     seed: int,
     recordings: Path | None,
     study: Study,
-    rivals: Mapping[str, Any] = MappingProxyType({}),
+    rivals: Mapping[str, Any] | None = None,
 ) -> int:
     """Run the study of `simulate`, with further assistance rules by name; return the exit code."""
     from foc_ros.analysis.recordings import find_recordings
@@ -195,20 +169,20 @@ def run_simulation(
     if HUMAN_PATHS in operators and recordings is None:
         raise InputError('--recordings', f'recordings of people for the operator {HUMAN_PATHS}', 'none')
     found = find_recordings(recordings) if recordings is not None and HUMAN_PATHS in operators else {}
-    write_report = study.load_report('simulation_report')
+    write_report = study.load_report('simulation')
     from foc_ros.analysis.simulation.operators import read_tasks
     from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, simulate, summarise
 
     tasks = read_tasks(found.values(), study.params) if found else []
     with study.open_workers():
-        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params, {**RULES, **rivals})
+        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params, {**RULES, **(rivals or {})})
     cells = summarise(results, seed)
     write_report(cells, results, study.params)
     study.show({'cells': cells, 'seed': seed}, make_tables(cells), (), SIMULATION_PAGE)
     return 0
 
 
-@app.command(group=OTHER)
+@app.command(group=options.OTHER)
 def convert(csv: Existing, /, *, output: Path, obstacles: Existing | None = None, goals: Existing | None = None) -> int:
     """Convert motion capture in CSV tables to bags.
 
@@ -230,7 +204,7 @@ def convert(csv: Existing, /, *, output: Path, obstacles: Existing | None = None
     return 0
 
 
-@app.command(group=OTHER)
+@app.command(group=options.OTHER)
 def warm_up() -> int:
     """Do nothing any more: the command will be removed."""
     print('there is nothing to do: foc_ros compiles nothing any more')

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from heapq import merge
@@ -26,7 +26,7 @@ import yaml
 from foc_ros.core.errors import FocError, RecordingError, warn
 
 try:
-    import mcap  # noqa: F401  of `mcap_files`
+    import mcap  # noqa: F401  of `bag_files`
     import zstandard  # a requirement of mcap
     from rosbags.interfaces import Connection
     from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
@@ -34,15 +34,12 @@ except ImportError as error:
     raise FocError(f'recordings need the package {error.name}: pip install mcap rosbags') from error
 
 from . import topics
-from .channels import TYPESTORE as TYPESTORE
-from .mcap_files import McapFile, add_checksums
-from .sqlite_files import SqliteFile
+from .bag_files import TYPESTORE as TYPESTORE
+from .bag_files import Channel, McapFile, SqliteFile, add_checksums
 
 FILE_TYPES: dict[str, type[McapFile | SqliteFile]] = {'.mcap': McapFile, '.db3': SqliteFile}
 COMPRESSED = ('.zstd', '.zst')
 """What follows these suffixes where the file as a whole is compressed."""
-ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
-"""Begin of a message that is compressed by itself; one in CDR begins with a zero."""
 LARGEST_MESSAGE = 100_000_000
 """Size of a compressed message above which it is not unpacked [bytes]; a cloud of a million points has 32 MB."""
 
@@ -64,23 +61,12 @@ class Item:
 class BagReader:
     """The predictor's inputs in a recording, as an iterator in order of log time, within a context manager.
 
-    Other topics are not read, and their definitions are not parsed. Raises RecordingError on opening and on iteration.
+    path: bag directory, with or without metadata.yaml, or one .mcap or .db3 file; each file may be compressed with zstd. chosen:
+    topic by name of the input, overriding names and types. is_whole: whether a recording of which a part is missing is an error;
+    otherwise it is a warning. Other topics are not read, and their definitions are not parsed. Raises RecordingError on opening
+    and on iteration.
 
-    Parameters
-    ----------
-    path
-        Bag directory, with or without metadata.yaml, or one .mcap or .db3 file; each file may be compressed with zstd.
-    chosen
-        Topic by name of the input, overriding names and types.
-    is_whole
-        Whether a recording of which a part is missing is an error; otherwise it is a warning.
-
-    Attributes
-    ----------
-    roles
-        The topic of every input found.
-    message_count, duration_s
-        Of the whole bag; from the first to the last message.
+    Attributes: roles, the topic of every input found; message_count, of the bag; duration_s, from its first to its last message.
     """
 
     def __init__(self, path: Path | str, chosen: Mapping[str, str] | None = None, *, is_whole: bool = False) -> None:
@@ -109,7 +95,7 @@ class BagReader:
             parts = [file.messages(channels) for file, channels in zip(self._files, needed, strict=True)]
             for channel, log_ns, stored in merge(*parts, key=lambda each: each[1]):
                 counts[channel.topic] += 1
-                raw = _decompress(stored) if stored.startswith(ZSTD_MAGIC) else stored
+                raw = _decompress(stored) if stored.startswith(b'\x28\xb5\x2f\xfd') else stored  # CDR begins with a zero
                 yield Item(roles[channel.topic], channel.topic, log_ns, channel.decode(raw), raw)
             if missing := sum(each.count for channels in needed for each in channels) - counts.total():
                 found = self.message_count - missing
@@ -117,10 +103,9 @@ class BagReader:
             if not counts[self.roles[topics.HAND]]:
                 raise RecordingError(f'topic {self.roles[topics.HAND]} holds no message')
 
-    def describe_connection(self, topic: str) -> dict[str, Any]:
-        """Return a topic's type, definitions and offered quality of service, as a writer needs them."""
-        channel = next(each for each in self._channels if each.topic == topic and each.is_read)
-        return {'msgtype': channel.msgtype, 'typestore': channel.typestore, 'offered_qos_profiles': channel.read_qos()}
+    def find_channel(self, topic: str) -> Channel:
+        """Return the channel of a topic that is read."""
+        return next(each for each in self._channels if each.topic == topic and each.is_read)
 
     def _open(self) -> None:
         _refuse_unreadable(self.path)
@@ -146,7 +131,12 @@ class BagReader:
                 warn(f'{self.path}: metadata.yaml is wrong: it {words}')
             else:
                 self._report_loss(f'metadata.yaml {words}')
-        self.roles = self._assign_topics()
+        # a topic that is read hides one of the same name that is not
+        kinds = {each.topic: each.msgtype for each in sorted(self._channels, key=lambda each: each.is_read)}
+        self.roles = topics.assign_topics(kinds, self._chosen)
+        for each in self._channels:
+            if each.is_read and each.topic in self.roles.values() and each.msgtype != kinds[each.topic]:
+                raise RecordingError(f'topic {each.topic}: expected one message type, got {each.msgtype} and {kinds[each.topic]}')
         self._transforms = topics.find_transforms({each.topic: each.msgtype for each in self._channels})
 
     def _open_file(self, path: Path) -> McapFile | SqliteFile:
@@ -163,15 +153,6 @@ class BagReader:
         if self._is_whole:
             raise RecordingError(text)
         warn(f'{self.path}: {text}')
-
-    def _assign_topics(self) -> dict[str, str]:
-        # a topic that is read hides one of the same name that is not
-        kinds = {each.topic: each.msgtype for each in sorted(self._channels, key=lambda each: each.is_read)}
-        roles = topics.assign_topics(kinds, self._chosen)
-        for each in self._channels:
-            if each.is_read and each.topic in roles.values() and each.msgtype != kinds[each.topic]:
-                raise RecordingError(f'topic {each.topic}: expected one message type, got {each.msgtype} and {kinds[each.topic]}')
-        return roles
 
 
 class BagWriter:
@@ -214,7 +195,10 @@ class BagWriter:
 
     def copy(self, item: Item, reader: BagReader) -> None:
         """Write a message as it was read, with its topic's definitions and offered quality of service."""
-        connection = {} if item.topic in self._connections else reader.describe_connection(item.topic)
+        connection: dict[str, Any] = {}
+        if item.topic not in self._connections:
+            given = reader.find_channel(item.topic)
+            connection = {'msgtype': given.msgtype, 'typestore': given.typestore, 'offered_qos_profiles': given.read_qos()}
         self._write(item.topic, item.log_ns, item.raw, connection)
 
     def _write(self, topic: str, log_ns: int, raw: bytes | memoryview, connection: Mapping[str, Any]) -> None:
@@ -293,16 +277,14 @@ def _list_files(folder: Path) -> tuple[list[Path], int | None, str]:
     return [found[name] for name in names if name in found], count, words
 
 
-def _find_gap(names: Iterable[str]) -> str:
+def _find_gap(names: Collection[str]) -> str:
     """Return in words which file lacks among those of a recorder, which numbers the parts of a recording from 0."""
-    parts = [re.fullmatch(r'(.*)_(\d+)(\.\w+)', name) for name in names]
-    stems = {(part[1], part[3]) if part else None for part in parts}
-    if len(parts) < 2 or len(stems) > 1 or None in stems:
+    parts = [part for name in names if (part := re.fullmatch(r'(.*_)(\d+)(\.\w+)', name))]
+    numbers, stems = {int(part[2]) for part in parts}, {(part[1], part[3]) for part in parts}
+    missing = next((number for number in range(max(numbers, default=0)) if number not in numbers), None)
+    if missing is None or len(numbers) < max(2, len(names)) or len(stems) > 1:
         return ''
-    numbers = {int(part[2]) for part in parts if part}
-    missing = next((number for number in range(max(numbers)) if number not in numbers), None)
-    stem, end = next(each for each in stems if each)
-    return '' if missing is None else f'{stem}_{missing}{end} is missing, by the numbers of the other files'
+    return f'{parts[0][1]}{missing}{parts[0][3]} is missing, by the numbers of the other files'
 
 
 def _refuse_unreadable(path: Path) -> None:

@@ -11,7 +11,6 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -48,7 +47,15 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
     """
     if len(ways) > MOST_WAYS:
         raise InputError(f'{file}: ways', f'at most {MOST_WAYS}', f'{len(ways)} with the new ones')
-    text = json.dumps({'ways': [_dump_demonstration(way) for way in ways]}, allow_nan=False) + '\n'
+    words, rows = {side: word for word, side in SIDES.items()}, []
+    for way in ways:
+        passed = [
+            {'id': identity, 'x': x, 'y': y, 'side': words[side]}
+            for identity, (x, y), side in zip(way.ids, way.centre.tolist(), way.sides, strict=True)
+        ]
+        states = {} if way.states is None else {'states': way.states.tolist()}
+        rows.append({'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist(), **states})
+    text = json.dumps({'ways': rows}, allow_nan=False) + '\n'
     if len(text) > MAX_BYTES:
         raise InputError(f'{file}: ways', f'at most {MAX_BYTES:,} bytes', f'{len(text):,} of {len(ways)} ways')
     unfinished = file.with_name(f'{file.name}.{os.getpid()}.unfinished')  # another process may write its own
@@ -88,16 +95,6 @@ def _lock(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def _dump_demonstration(way: Demonstration) -> dict[str, Any]:
-    sides = {side: word for word, side in SIDES.items()}
-    passed = [
-        {'id': identity, 'x': x, 'y': y, 'side': sides[side]}
-        for identity, (x, y), side in zip(way.ids, way.centre.tolist(), way.sides, strict=True)
-    ]
-    states = {} if way.states is None else {'states': way.states.tolist()}
-    return {'frame_id': way.frame_id, 'passed': passed, 'path': way.path.tolist(), **states}
 
 
 def _read_demonstration(field: str, way: object) -> Demonstration:

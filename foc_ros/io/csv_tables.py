@@ -26,8 +26,6 @@ MOST_ERRORS = 100
 """Wrong rows after which a table is not read further."""
 SEPARATORS = (',', ';', '\t', '|', ' ')
 """What may stand between two cells; with another one than the comma, a number may have a decimal comma."""
-SIMILARITY = 0.8
-"""Similarity to a missing column from which an unknown one is taken for a misspelt one: `radius_stdev_m` is, `yaw_deg` is not."""
 
 
 class Column(NamedTuple):
@@ -105,19 +103,18 @@ def read_rows(
 ) -> Iterator[Row]:
     """Yield the rows of a CSV file with a header; empty lines are skipped, and other columns are allowed.
 
-    The separator is one of :data:`SEPARATORS`, found in the header, before which a spreadsheet may name it (`sep=;`).
-
-    optional: columns that may be missing; instead: columns that together replace a needed one.
-
-    Raises RecordingError for a file that cannot be read, for one that lacks a needed column, names a column twice or has a
-    misspelt one, and after the last row for rows with more or fewer cells than the header.
+    The separator is found in the header, before which a spreadsheet may name it (`sep=;`). optional: columns that may be missing;
+    instead: columns that together replace a needed one. Raises RecordingError for a file that cannot be read, for one that lacks
+    a needed column, names a column twice or has a misspelt one, and after the last row for rows with more or fewer cells than the
+    header.
     """
     try:
         with file.open(newline='', encoding='utf-8-sig') as stream:
             if file.stat().st_size > MAX_BYTES:
                 raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got {file.stat().st_size:,}')
             first = next((line for line in stream if line.strip() and not line.startswith('sep=')), '')
-            separator = _find_separator(first, {*needed, *optional})
+            names = {*needed, *optional}  # the separator is that with which the header has the most of them
+            separator = max(SEPARATORS, key=lambda each: len({cell.strip(' "\r\n') for cell in first.split(each)} & names))
             decimal_mark = '.' if separator == ',' else ','
             reader = csv.reader(chain([first], stream), delimiter=separator, skipinitialspace=True, strict=True)
             header = _check_header(file, next(reader, []), needed, optional, instead)
@@ -125,15 +122,15 @@ def read_rows(
             for cells in reader:
                 if len(errors) == MOST_ERRORS:
                     break
-                if any(cell.strip() for cell in cells) and len(cells) != len(header):
-                    hint = (
-                        ' (are there decimal commas? then separate the cells by semicolons)' if len(cells) > len(header) else ''
-                    )
-                    words = f'expected {len(header)} cells, got {len(cells)}{hint}'
-                    errors.append(RecordingError(f'{file}: row {reader.line_num}: {words}'))
-                elif any(cell.strip() for cell in cells):
+                if not any(cell.strip() for cell in cells):
+                    continue
+                if len(cells) == len(header):
                     named = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
                     yield Row(file, reader.line_num, named, decimal_mark)
+                    continue
+                hint = ' (are there decimal commas? then separate the cells by semicolons)' if len(cells) > len(header) else ''
+                words = f'expected {len(header)} cells, got {len(cells)}{hint}'
+                errors.append(RecordingError(f'{file}: row {reader.line_num}: {words}'))
             if errors:
                 raise join_errors(errors)
     except OSError as error:
@@ -142,11 +139,6 @@ def read_rows(
         raise RecordingError(f'{file}: expected UTF-8 text, got byte {error.object[error.start]:#04x}') from error
     except csv.Error as error:
         raise RecordingError(f'{file}: not a CSV table: {error}') from error
-
-
-def _find_separator(header: str, columns: set[str]) -> str:
-    """Return the separator by which a line has the most names of columns; the comma if all are equal."""
-    return max(SEPARATORS, key=lambda each: len({cell.strip(' "\r\n') for cell in header.split(each)} & columns))
 
 
 def _check_header(
@@ -163,9 +155,8 @@ def _check_header(
     if len(set(named)) < len(named):
         raise RecordingError(f'{file}: row 1: a column is named twice: {", ".join(header)}')
     absent = [name for name in optional if name not in header]
-    misspelt = [
-        (name, hint) for name in header if name not in (*needed, *optional) and (hint := suggest(name, absent, SIMILARITY))
-    ]
-    if misspelt:
-        raise join_errors([RecordingError(f'{file}: row 1: unknown column {name}{hint}') for name, hint in misspelt])
+    # similar enough to be misspelt: `radius_stdev_m` is, `yaw_deg` is not
+    hints = {name: suggest(name, absent, 0.8) for name in header if name not in (*needed, *optional)}
+    if any(hints.values()):
+        raise join_errors([RecordingError(f'{file}: row 1: unknown column {name}{hint}') for name, hint in hints.items() if hint])
     return header

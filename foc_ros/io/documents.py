@@ -69,7 +69,7 @@ def read_document(file: Path) -> Any:
         if len(held) > MAX_BYTES:
             raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got more')
         text = held.decode('utf-8-sig')
-        document = json.loads(text, object_pairs_hook=_build_mapping) if is_json else parse_yaml(text)
+        document = json.loads(text, object_pairs_hook=_build_mapping) if is_json else yaml.load(text, _StrictLoader)  # noqa: S506
         _check_depth(document)
         return document
     except OSError as error:
@@ -78,11 +78,6 @@ def read_document(file: Path) -> Any:
         raise RecordingError(f'{file}: expected at most {MAX_DEPTH} mappings and lists within each other, got more') from error
     except (ValueError, yaml.YAMLError) as error:
         raise RecordingError(f'{file}: not a {"JSON" if is_json else "YAML"} file: {error}') from error
-
-
-def parse_yaml(text: str) -> Any:
-    """Return the content of a YAML text; raises ValueError or YAMLError."""
-    return yaml.load(text, _StrictLoader)  # noqa: S506
 
 
 def _build_mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 import re
 import reprlib
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from foc_ros.core.errors import FocError, suggest
 
@@ -59,11 +58,8 @@ def describe_errors(invalid: ValidationError, known: Mapping[str, Iterable[str]]
             names = () if known is None else tuple(known[str(tag)])
             hint = suggest(parts[-1], names) or ': ' + ', '.join(names)
             expected = f'a known field{hint}' if names else 'no such field'
-        found.append((field, expected, _describe_value(kind, each['input'], each.get('ctx', {}))))
+        got = 'nothing' if kind == 'missing' else reprlib.repr(each['input'])
+        if kind == 'too_long' and each['ctx']['actual_length']:
+            got = f'one of {each["ctx"]["actual_length"]}'
+        found.append((field, expected, got))
     return found
-
-
-def _describe_value(kind: str, value: Any, context: dict[str, Any]) -> str:
-    if kind == 'missing':
-        return 'nothing'
-    return f'one of {context["actual_length"]}' if kind == 'too_long' and context['actual_length'] else reprlib.repr(value)

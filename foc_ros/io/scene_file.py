@@ -29,8 +29,8 @@ from foc_ros.core.types import HandState
 from .documents import read_document
 from .fields import Fields, describe_errors
 
-MOST_OBSTACLES, MOST_GOALS, MOST_POINTS = 20_000, 256, 10_000
-"""Bounds on the rows of a scene, those of the node's messages, and on the points of a guess."""
+MOST_OBSTACLES, MOST_GOALS = 20_000, 256
+"""Bounds on the rows of a scene, those of the node's messages."""
 
 PARAMETERS = {
     'duration_s': 'duration.fixed_s',
@@ -53,7 +53,7 @@ PARAMETERS = {
 Number = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Length = Annotated[float, Field(ge=0.0, le=FARTHEST)]
 Point = Annotated[tuple[Number, Number], Strict(False)]
-Points = Annotated[list[Point], Field(max_length=MOST_POINTS)]
+Points = Annotated[list[Point], Field(max_length=10_000)]
 Identity = Annotated[
     str,
     BeforeValidator(lambda given: str(given) if type(given) is int and abs(given) < 10**40 else given),
@@ -196,9 +196,11 @@ def parse_scene(document: object) -> ReachingScene:
     if not isinstance(document, dict):
         raise SceneError('scene', 'a mapping of fields', reprlib.repr(document))
     errors: list[FocError] = []
-    config = collect(errors, _read_config, document)
-    fields = collect(errors, _read_fields, {name: value for name, value in document.items() if name not in PARAMETERS})
-    obstacles = table = None
+    config, fields, obstacles, table = collect(errors, _read_config, document), None, None, None
+    try:
+        fields = SceneFields.model_validate({name: value for name, value in document.items() if name not in PARAMETERS})
+    except ValidationError as invalid:
+        errors += [SceneError(*each) for each in describe_errors(invalid, NAMES)]
     if fields is not None:
         obstacles, table = collect(errors, fields.build_obstacles), collect(errors, fields.build_goals)
     if config is None or fields is None or obstacles is None or table is None or errors:
@@ -213,13 +215,6 @@ def parse_scene(document: object) -> ReachingScene:
     bulge = fields.guess.amplitude if isinstance(fields.guess, BulgeFields) else 0.0
     via = None if isinstance(fields.guess, BulgeFields) else np.array(fields.guess).reshape(-1, 2)
     return replace(scene, guess=guess_path(scene.hand.mean[:2], scene.goals[0], config.foc.steps, bulge, via))
-
-
-def _read_fields(given: Mapping[str, Any]) -> SceneFields:
-    try:
-        return SceneFields.model_validate(given)
-    except ValidationError as invalid:
-        raise join_errors([SceneError(*each) for each in describe_errors(invalid, NAMES)]) from None
 
 
 def _read_config(scene: Mapping[str, Any]) -> Config:

@@ -22,8 +22,6 @@ COLUMNS = 80
 """Width of a terminal, into which all tables fit [characters]."""
 QUIET_S = 10.0
 """Time after which a progress is printed, where there is no terminal [s]."""
-LONGEST_FIRST, LEAST_LAST = 32, 12
-"""Widths to which the first and the last column of a wide table are folded [characters]."""
 
 
 class _Console(Console):
@@ -63,9 +61,9 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str
     gap = int(first + sum(each + 2 for each in widths) <= COLUMNS)  # between two columns, beside 1
     if not gap:
         longest_word = max((len(word) for row in (columns, *cells) for word in row[0].split()), default=0)
-        widths[-1:] = [min(each, LEAST_LAST) for each in widths[-1:]]
+        widths[-1:] = [min(each, 12) for each in widths[-1:]]
         is_enough = longest_word + sum(each + 1 for each in widths) <= COLUMNS
-        first = min(longest_word if is_enough else first, LONGEST_FIRST)
+        first = min(longest_word if is_enough else first, 32)
     parts, left = [[0]], COLUMNS - first
     for number, width in enumerate(widths, 1):
         if width + gap >= left and len(parts[-1]) > 1:

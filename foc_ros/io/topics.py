@@ -35,21 +35,28 @@ REQUIRED = ((HAND,), (CLOUD, MARKERS, COLLISION, DETECTIONS), (GOALS, GOAL))
 TRANSFORMS, STATIC_TRANSFORMS = 'tf', 'tf_static'
 """Last parts of the topics of transforms, which are no input of the predictor but move its inputs into the working frame."""
 
-OUTPUTS = ('prediction', 'likelihoods', 'path', 'markers', 'reference')
-"""Last parts of the node's own outputs, which are never used as an input because of their type."""
-
 
 def assign_topics(topics: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the topic of every role that the recording contains.
+    """Return the topic of every role that the recording contains; topics: message type by topic; chosen: topic by role.
 
-    topics: message type by topic; chosen: topic by role, overriding names and types. Raises RecordingError for an impossible
-    choice, for several topics that fit equally, and for a recording without a hand, obstacles or goals.
+    Raises RecordingError for an impossible choice, for several topics that fit equally, and without a hand, obstacles or goals.
     """
-    roles = {role: _check_choice(topics, role, topic) for role, topic in (chosen or {}).items()}
-    for role in TYPES:
-        found = None if role in roles else _find_by_name(topics, role)
-        if found is not None and found not in roles.values():
-            roles[role] = found
+    roles = dict(chosen or {})
+    for role, topic in roles.items():
+        if role not in TYPES:
+            raise RecordingError(f'no input is named {role!r}: expected one of {", ".join(TYPES)}')
+        if topic not in topics:
+            raise RecordingError(f'topic {topic} chosen for {role} is not in the recording, which has {_list_topics(topics)}')
+        if topics[topic] != TYPES[role]:
+            raise RecordingError(f'topic {topic} chosen for {role}: expected type {TYPES[role]}, got {topics[topic]}')
+    for role in (role for role in TYPES if role not in roles):
+        for name in NAMES[role]:
+            fitting = [topic for topic, kind in topics.items() if kind == TYPES[role] and topic.rpartition('/')[2] == name]
+            if fitting:
+                _check_is_unique(role, fitting)
+                if fitting[0] not in roles.values():
+                    roles[role] = fitting[0]
+                break
     for alternatives in REQUIRED:
         if not any(role in roles for role in alternatives):
             role, topic = _find_by_type(topics, alternatives, roles)
@@ -63,27 +70,10 @@ def find_transforms(topics: Mapping[str, str]) -> dict[str, str]:
     return {topic: name for topic, name in names.items() if name in (TRANSFORMS, STATIC_TRANSFORMS)}
 
 
-def _check_choice(topics: Mapping[str, str], role: str, topic: str) -> str:
-    if role not in TYPES:
-        raise RecordingError(f'no input is named {role!r}: expected one of {", ".join(TYPES)}')
-    if topic not in topics:
-        raise RecordingError(f'topic {topic} chosen for {role} is not in the recording, which has {_list_topics(topics)}')
-    if topics[topic] != TYPES[role]:
-        raise RecordingError(f'topic {topic} chosen for {role}: expected type {TYPES[role]}, got {topics[topic]}')
-    return topic
-
-
-def _find_by_name(topics: Mapping[str, str], role: str) -> str | None:
-    for name in NAMES[role]:
-        fitting = [topic for topic, kind in topics.items() if kind == TYPES[role] and topic.rpartition('/')[2] == name]
-        if fitting:
-            return _check_is_unique(role, fitting)
-    return None
-
-
 def _find_by_type(topics: Mapping[str, str], alternatives: tuple[str, ...], roles: Mapping[str, str]) -> tuple[str, str]:
     """Return the role and topic of a requirement that no name meets; never a single goal, whose type is the hand's too."""
-    unused = [topic for topic in topics if topic not in roles.values() and topic.rpartition('/')[2] not in OUTPUTS]
+    outputs = ('prediction', 'likelihoods', 'path', 'markers', 'reference')  # of the node, of the same types as its inputs
+    unused = [topic for topic in topics if topic not in roles.values() and topic.rpartition('/')[2] not in outputs]
     fitting = [(role, topic) for role in alternatives if role != GOAL for topic in unused if topics[topic] == TYPES[role]]
     if not fitting:
         wanted = ' or '.join(f'{role} ({TYPES[role]})' for role in alternatives)
@@ -92,10 +82,9 @@ def _find_by_type(topics: Mapping[str, str], alternatives: tuple[str, ...], role
     return fitting[0]
 
 
-def _check_is_unique(role: str, fitting: list[str]) -> str:
+def _check_is_unique(role: str, fitting: list[str]) -> None:
     if len(fitting) > 1:
         raise RecordingError(f'several topics could be {role}: {", ".join(sorted(fitting))}; choose with --remap {role}:=TOPIC')
-    return fitting[0]
 
 
 def _list_topics(topics: Mapping[str, str]) -> str:

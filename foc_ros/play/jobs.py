@@ -23,9 +23,6 @@ from foc_ros.core.errors import FocError, InputError
 
 from .recording import OPERATOR, PARAMETERS, UNGUIDED, Recording
 
-NICENESS = 10
-COMPARE_COLUMNS, FITTED_COLUMNS = ('', 'before', 'after'), ('parameter', 'before', 'after')
-QUESTIONS = {'way': 'path class', 'goal': 'goal'}
 Note = Callable[[str], None]
 """Takes a line about the progress of a command."""
 
@@ -51,7 +48,7 @@ async def run_command(note: Note, *arguments: str | Path) -> str:
     lines = ['']
     try:
         with contextlib.suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, process.pid, NICENESS)
+            os.setpriority(os.PRIO_PROCESS, process.pid, 10)
         output = asyncio.ensure_future(process.stdout.read())
         async for line in process.stderr:
             if text := line.decode(errors='replace').strip():
@@ -72,15 +69,9 @@ async def run_command(note: Note, *arguments: str | Path) -> str:
 class Jobs:
     """Runs one job at a time and tells the page how it goes.
 
-    Attributes: recording, of the last session, None before the first; report, the page of the last report; operator, the
-    parameter file of the last fit.
-
-    Parameters
-    ----------
-    say
-        Sends the page a message of a kind, with values.
-    note_fitted
-        Called when there are new fitted parameters, with whether they are to be used: no position becomes worse.
+    say: sends the page a message of a kind, with values; note_fitted: called when there are new fitted parameters, with whether
+    they are to be used: no position becomes worse. Attributes: recording, of the last session, None before the first; report, the
+    page of the last report; operator, the parameter file of the last fit.
     """
 
     def __init__(self, say: Callable[..., None], note_fitted: Callable[[bool], None]) -> None:
@@ -142,8 +133,8 @@ class Jobs:
             text = f'{"; ".join(losses)}. Predictions use the standard parameters, unless you choose yours.'
         fitted = {**answer['parameters'], **answer['chosen']}
         rows = [(name, _format(each['given']), _format(each['value'])) for name, each in fitted.items()]
-        changed = [row for row in rows if row[1] != row[2]]
-        return {'text': text[0].upper() + text[1:] + _name_unused(answer['failed']), 'columns': FITTED_COLUMNS, 'rows': changed}
+        changed, text = [row for row in rows if row[1] != row[2]], text[0].upper() + text[1:] + _name_unused(answer['failed'])
+        return {'text': text, 'columns': ('parameter', 'before', 'after'), 'rows': changed}
 
     async def _compare(self, recording: Recording, note: Note) -> dict[str, Any]:
         """Score the trials without guidance of a session, before and after a fit."""
@@ -158,13 +149,13 @@ class Jobs:
         is_same = folder == operator.parent
         text = 'on the trials of the fit; record new trials for an independent comparison' if is_same else 'on new trials'
         unused = _name_unused({**answers[0]['failed'], **answers[1]['failed']})
-        return {'text': f'Before and after the fit, {text}.{unused}', 'columns': COMPARE_COLUMNS, 'rows': rows}
+        return {'text': f'Before and after the fit, {text}.{unused}', 'columns': ('', 'before', 'after'), 'rows': rows}
 
 
 def summarise_evaluation(answer: Mapping[str, Any]) -> dict[str, str]:
     """Return the main scores in an answer of `evaluate --json`."""
     rows = {}
-    for question, words in QUESTIONS.items():
+    for question, words in (('way', 'path class'), ('goal', 'goal')):
         if question in answer['questions']:
             scores = answer['questions'][question]['foc']
             rows[f'{words}: correct [%]'] = f'{100.0 * scores["right"]:.0f}'

@@ -9,15 +9,15 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter, ValidationError
 
 from foc_ros.core.errors import InputError
+from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.fields import Fields, describe_errors
 
 from .scene import PlayScene, Point, X, Y
 
 LONGEST_MESSAGE = 65_536
 """Bytes of a message, at most."""
-AHEAD_MS = 1000.0
-"""Time by which a message may be ahead of the clock of the page, as it is known from the messages before [ms]."""
-NANOSECONDS_PER_MS = 1_000_000
+AHEAD_NS = NANOSECONDS
+"""Time by which a message may be ahead of the clock of the page, as it is known from the messages before [ns]."""
 Time = Annotated[float, Field(ge=0.0, le=1e10)]
 """Time of the page's clock, which begins when the page is opened [ms]."""
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
@@ -124,15 +124,16 @@ class PageClock:
         The first messages may have taken long. When a quicker one shows it, the stamps would step back: they are None until they
         have passed the last one again.
         """
-        offset_ns = received_ns - round(t_ms * NANOSECONDS_PER_MS)
+        page_ns = round(1e6 * t_ms)
         if t_ms <= self._last_ms:
             raise InputError('hand.t', f'a time after the last one, {self._last_ms:.1f} ms', t_ms)
-        if self._offset_ns is not None and self._offset_ns - offset_ns > AHEAD_MS * NANOSECONDS_PER_MS:
-            latest = (received_ns - self._offset_ns) / NANOSECONDS_PER_MS + AHEAD_MS
-            raise InputError('hand.t', f'a time before {latest:.1f} ms', t_ms)
+        if self._offset_ns is not None and page_ns + self._offset_ns - received_ns > AHEAD_NS:
+            latest_ms = (received_ns - self._offset_ns + AHEAD_NS) / 1e6
+            raise InputError('hand.t', f'a time before {latest_ms:.1f} ms', t_ms)
+        offset_ns = received_ns - page_ns
         self._offset_ns = offset_ns if self._offset_ns is None else min(offset_ns, self._offset_ns)
         self._last_ms = t_ms
-        stamp_ns = round(t_ms * NANOSECONDS_PER_MS) + self._offset_ns
+        stamp_ns = page_ns + self._offset_ns
         if stamp_ns <= self._last_ns:
             return None
         self._last_ns = stamp_ns

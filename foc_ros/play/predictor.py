@@ -27,8 +27,6 @@ from foc_ros.ros.messages.encode_guidance import Place
 
 REMEMBERED = 20
 """Number of predictions from which the state is told."""
-LATE_SHARE = 0.5
-"""Share of them that came too late, from which the computer is called busy."""
 Outcome = Prediction | tuple[GuidanceOutput, Place]
 """A prediction, or guidance and where it holds."""
 Receive = Callable[[Outcome], None]
@@ -45,12 +43,7 @@ class State:
 class Predictor:
     """Takes messages of the inputs, and passes on predictions and guidance, between `start` and `stop`.
 
-    Parameters
-    ----------
-    config
-        The parameters with which it begins.
-    receive
-        Called with every outcome, in another thread.
+    config: with which it begins; receive: called with every outcome, in another thread.
     """
 
     def __init__(self, config: Config, receive: Receive) -> None:
@@ -60,7 +53,7 @@ class Predictor:
         self._queue: SimpleQueue[tuple[str, Any] | Config | None] = SimpleQueue()
         self._error = ''
         self._recent: deque[Prediction] = deque(maxlen=REMEMBERED)
-        self._guidance = GuidanceLoop(config, self._send_guidance, self._note_error, getLogger(__name__).warning)
+        self._guidance = GuidanceLoop(config, lambda *outcome: receive(outcome), self._note_error, getLogger(__name__).warning)
         self._thread = Thread(target=self._run, name='prediction', daemon=True)
 
     def start(self) -> None:
@@ -95,7 +88,8 @@ class Predictor:
             return State('waiting', reason)
         if recent and not recent[-1].candidates_with_likelihood:
             return State('failing', 'no path to any goal can be found')
-        if sum(_is_late(each) for each in recent) > LATE_SHARE * REMEMBERED:
+        found = [each.candidates_with_likelihood for each in recent]
+        if sum(bool(paths) and all(path.age_s for path in paths) for paths in found) > 0.5 * REMEMBERED:  # no path is new
             return State('failing', 'this computer is too busy for new paths: those from before are shown; end other programs')
         return State('well', 'predicting')
 
@@ -134,13 +128,5 @@ class Predictor:
             self._guidance.note_prediction(prediction, received_s)
             self._receive(prediction)
 
-    def _send_guidance(self, output: GuidanceOutput, place: Place) -> None:
-        self._receive((output, place))
-
     def _note_error(self, error: Exception) -> None:
         self._error = f'internal error: {error}'
-
-
-def _is_late(prediction: Prediction) -> bool:
-    """Return whether no path of a prediction is new."""
-    return bool(prediction.candidates_with_likelihood) and all(each.age_s for each in prediction.candidates_with_likelihood)

@@ -39,33 +39,26 @@ from .scene import FRAME, Point
 SESSION, UNGUIDED, GUIDED = 'session', 'unguided', 'guided'
 PARAMETERS, OPERATOR = 'parameters.yaml', 'operator.yaml'
 """Files of a session: the parameters that it began with, and those that were fitted to it."""
-NODE = '/foc'
-"""Name of the node in the topics of the outputs."""
-SENT = ('prediction', 'likelihoods')
-"""Outputs of a prediction that are recorded; markers and path say nothing more."""
-PERIOD_NS = NANOSECONDS // 20
-"""Shortest time between two predictions that are reported [ns]; a page of an hour would be too large otherwise."""
 
 
 class Recording:
     """Writes the bags of one session, and keeps what its report shows.
 
+    data: the folder for the folders of sessions; config: the parameters at the beginning; scene: the present messages of
+    `obstacles` and `goals`, so that the bag has a scene before the first hand; types: makes the messages of the outputs.
     Attributes: folder; scores, a table of the report, None before tasks have ended.
-
-    Parameters
-    ----------
-    data
-        The folder for the folders of sessions.
-    config
-        The parameters at the beginning.
-    scene
-        The present message of `obstacles` and of `goals`, so that the bag has a scene before the first hand.
-    types
-        Makes the messages of the outputs.
     """
 
     def __init__(self, data: Path, config: Config, scene: Mapping[str, Any], types: MessageTypes) -> None:
-        self.folder = _make_folder(data)
+        name, number = datetime.now().astimezone().strftime('%Y-%m-%d_%H-%M-%S'), 1
+        try:
+            data.mkdir(parents=True, exist_ok=True)
+            while (folder := data / (name if number == 1 else f'{name}_{number}')).exists():
+                number += 1
+            folder.mkdir()
+        except OSError as error:
+            raise InputError('--data', 'a folder that can be written', f'{data}: {error.strerror}') from error
+        self.folder = folder
         self.scores: Table | None = None
         self._types, self._scene = types, dict[str, bytes]()
         self._trial: list[tuple[str, bytes, int]] | None = None
@@ -92,9 +85,11 @@ class Recording:
 
     def add_prediction(self, prediction: Prediction, snapshot: Prediction) -> None:
         """Record a prediction, and keep its snapshot for the report."""
-        if not self._snapshots or snapshot.stamp_ns - self._snapshots[-1].stamp_ns >= PERIOD_NS:
+        # at 20 Hz: the page of an hour would be too large otherwise
+        if not self._snapshots or snapshot.stamp_ns - self._snapshots[-1].stamp_ns >= NANOSECONDS // 20:
             self._snapshots.append(snapshot)
-        self._add_outputs(encode_outputs(prediction, 'xy', self._types, SENT))
+        # markers and path say nothing more
+        self._add_outputs(encode_outputs(prediction, 'xy', self._types, ('prediction', 'likelihoods')))
 
     def add_guidance(self, output: GuidanceOutput, place: Place) -> None:
         """Record guidance."""
@@ -133,22 +128,8 @@ class Recording:
 
     def _add_outputs(self, messages: Mapping[str, Any]) -> None:
         for name, message in messages.items():
-            self._bag.write_raw(f'{NODE}/{name}', message.__msgtype__, _serialize(message), time_ns())
+            self._bag.write_raw(f'/foc/{name}', message.__msgtype__, _serialize(message), time_ns())
 
 
 def _serialize(message: Any) -> bytes:
     return bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
-
-
-def _make_folder(data: Path) -> Path:
-    """Make a folder for a session, named by the time of day; raises InputError."""
-    name = datetime.now().astimezone().strftime('%Y-%m-%d_%H-%M-%S')
-    try:
-        data.mkdir(parents=True, exist_ok=True)
-        number = 1
-        while (folder := data / (name if number == 1 else f'{name}_{number}')).exists():
-            number += 1
-        folder.mkdir()
-    except OSError as error:
-        raise InputError('--data', 'a folder that can be written', f'{data}: {error.strerror}') from error
-    return folder

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,8 +18,7 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.fields import Fields
 from foc_ros.reporting.encode import encode_candidates, encode_unsolved
-from foc_ros.reporting.tracks import Slots
-from foc_ros.reporting.views import list_unsolved
+from foc_ros.reporting.views import Slots, list_unsolved
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
 from foc_ros.ros.messages.types import MessageTypes
 
@@ -33,12 +32,6 @@ TARGET_RADIUS = 0.015
 RADIUS_STDDEV = 0.002
 """Standard deviation of the radius of every obstacle [m]."""
 MOST_OBSTACLES, MOST_GOALS = 32, 8
-RANDOM_OBSTACLES = (3, 5)
-RANDOM_AREA = (0.07, 0.23, -0.11, 0.11)
-"""Limits of x, then of y, for the centres of random obstacles [m]."""
-GAP = 0.025
-"""Width of the gap between random obstacles, and between them and start or goals, at least [m]."""
-ATTEMPTS = 200
 
 Point = tuple[float, float]
 X = Annotated[float, Field(ge=BOUNDS[0], le=BOUNDS[1])]
@@ -59,6 +52,7 @@ class PlacedCircle(Place):
 
     kind: Literal['circle'] = 'circle'
     radius: Size
+    box: ClassVar = (0.0, 0.0, 0.0)
 
     @property
     def shape(self) -> Circle:
@@ -73,6 +67,11 @@ class PlacedBox(Place):
     size_x: Size
     size_y: Size
     yaw: Annotated[float, Field(ge=-math.pi, le=math.pi)]
+
+    @property
+    def box(self) -> tuple[float, float, float]:
+        """Full lengths [m] and angle [rad]."""
+        return self.size_x, self.size_y, self.yaw
 
     @property
     def shape(self) -> Box:
@@ -107,19 +106,13 @@ class PlayScene(Fields):
     def encode(self, types: MessageTypes, stamp_ns: int) -> dict[str, Any]:
         """Return the messages of the inputs `obstacles` and `goals`."""
         rows = [
-            (each.x, each.y, 0.0, each.shape.radius, RADIUS_STDDEV, row, *_measure_box(each))
-            for row, each in enumerate(self.obstacles)
+            (each.x, each.y, 0.0, each.shape.radius, RADIUS_STDDEV, row, *each.box) for row, each in enumerate(self.obstacles)
         ]
         goals: Array = np.array([(*point, 0.0) for point in self.points])
         return {
             'obstacles': encode_obstacles(types, stamp_ns, FRAME, rows),
             'goals': encode_goals(types, stamp_ns, FRAME, goals),
         }
-
-
-def _measure_box(obstacle: PlacedCircle | PlacedBox) -> tuple[float, float, float]:
-    """Return full lengths [m] and yaw [rad] of a box, zeros for a circle."""
-    return (0.0, 0.0, 0.0) if isinstance(obstacle, PlacedCircle) else (obstacle.size_x, obstacle.size_y, obstacle.yaw)
 
 
 FIRST_SCENE = PlayScene(
@@ -133,18 +126,18 @@ FIRST_SCENE = PlayScene(
 
 
 def make_random_scene(random: np.random.Generator, goals: Sequence[Place]) -> PlayScene:
-    """Return random circles and boxes between the start and some goals, with gaps that a hand fits through."""
-    wanted = int(random.integers(*RANDOM_OBSTACLES, endpoint=True))
+    """Return three to five random circles and boxes between the start and some goals, with gaps of at least 25 mm for a hand."""
+    wanted = int(random.integers(3, 5, endpoint=True))
     taken = [(*START, TARGET_RADIUS), *((goal.x, goal.y, TARGET_RADIUS) for goal in goals)]
     obstacles: list[PlacedCircle | PlacedBox] = []
-    for _ in range(ATTEMPTS):
+    for _ in range(200):
         if len(obstacles) == wanted:
             break
-        x, y = random.uniform(RANDOM_AREA[0], RANDOM_AREA[1]), random.uniform(RANDOM_AREA[2], RANDOM_AREA[3])
+        x, y = random.uniform(0.07, 0.23), random.uniform(-0.11, 0.11)
         lengths, yaw = random.uniform(0.02, 0.05, 2).tolist(), random.uniform(-math.pi / 2.0, math.pi / 2.0)
         is_box = bool(random.random() < 1.0 / 3.0)
         extent = math.hypot(*lengths) / 2.0 if is_box else lengths[0] / 2.0
-        if all(math.hypot(x - other_x, y - other_y) >= extent + reach + GAP for other_x, other_y, reach in taken):
+        if all(math.hypot(x - other_x, y - other_y) >= extent + reach + 0.025 for other_x, other_y, reach in taken):
             box = PlacedBox(x=x, y=y, size_x=lengths[0], size_y=lengths[1], yaw=yaw)
             obstacles.append(box if is_box else PlacedCircle(x=x, y=y, radius=extent))
             taken.append((x, y, extent))

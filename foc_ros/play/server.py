@@ -41,13 +41,9 @@ FILES = {
 }
 REPORT = '/report'
 POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:"
-HEADERS = {'X-Content-Type-Options': 'nosniff', 'Referrer-Policy': 'no-referrer', 'Cache-Control': 'no-store'}
 OWN_HOSTS = r'localhost|[\d.]+|\[[\da-f:.]+\]'
 """Names of this computer besides the host that it is started with: localhost, and addresses. A page of an attacker can let its
 own name lead here; it has its own origin then, but also its own host."""
-TICK_MS = 500
-SWITCH_S = 0.001
-"""Longest time for which a thread keeps Python's global lock while another one waits for it [s]."""
 
 
 class _Handler(RequestHandler):
@@ -55,8 +51,9 @@ class _Handler(RequestHandler):
         self.session = session
 
     def set_default_headers(self) -> None:
-        for name, value in HEADERS.items():
-            self.set_header(name, value)
+        self.set_header('X-Content-Type-Options', 'nosniff')
+        self.set_header('Referrer-Policy', 'no-referrer')
+        self.set_header('Cache-Control', 'no-store')
 
 
 class _PageHandler(_Handler):
@@ -108,21 +105,14 @@ def listen(session: Session, host: str, sockets: Sequence[socket]) -> HTTPServer
 
 
 async def serve(config: Config, data: Path, host: str, sockets: Sequence[socket]) -> None:
-    """Serve the page until an interrupt, and say where it is.
+    """Serve the page on the sockets of a host (`open_sockets`) until an interrupt, and say where it is.
 
-    Parameters
-    ----------
-    config
-        The parameters to begin with.
-    data
-        The folder for recordings.
-    host, sockets
-        Where to serve (`open_sockets`).
+    config: to begin with; data: the folder for recordings.
     """
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
-    sys.setswitchinterval(SWITCH_S)
+    sys.setswitchinterval(0.001)  # a thread that waits for Python's global lock gets it sooner than after 5 ms
 
     def make_predictor(given: Config, receive: Receive) -> Predictor:
         def pass_on(outcome: Outcome) -> None:
@@ -132,7 +122,7 @@ async def serve(config: Config, data: Path, host: str, sockets: Sequence[socket]
 
     session = Session(make_predictor, config, data)
     server = listen(session, host, sockets)
-    ticking = PeriodicCallback(session.tick, TICK_MS)
+    ticking = PeriodicCallback(session.tick, 500)  # [ms]
     try:
         session.predictor.start()
         ticking.start()

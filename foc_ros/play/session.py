@@ -17,51 +17,26 @@ from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.core.prediction import Prediction
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND
-from foc_ros.reporting.tracks import Slots
-from foc_ros.reporting.views import build_snapshot
+from foc_ros.reporting.views import Slots, build_snapshot
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import load_parameter_file
 
-from . import scene, tasks
+from . import messages, scene, tasks
 from .jobs import Jobs
-from .messages import (
-    HandMessage,
-    JobMessage,
-    Message,
-    NameMessage,
-    PageClock,
-    SceneMessage,
-    ShuffleMessage,
-    SwitchMessage,
-    TasksMessage,
-)
 from .predictor import Predictor, Receive
 from .recording import Recording
 
 OWN_VALUES = {'plane': 'xy', 'frame_id': ''}
 """Parameters that the page fixes."""
-FORCE_PERIOD_S = 0.012
-"""Shortest time between two forces that the page receives [s]; guidance updates more often than a screen."""
-REMEMBERED_HANDS = 256
-KEPT = ('score', 'job', 'result')
-"""Kinds of messages of which the last one is repeated to a page that is loaded again."""
 Send = Callable[[dict[str, Any]], None]
 
 
 class Session:
-    """Connects one page with one predictor.
+    """Connects one page with one predictor, an attribute.
 
-    Attributes: predictor.
-
-    Parameters
-    ----------
-    make_predictor
-        Makes the predictor of parameters and a function that takes its outcomes in this thread.
-    config
-        The parameters to begin with.
-    data
-        The folder for recordings.
+    make_predictor: makes it of parameters and a function that takes its outcomes in this thread; config: to begin with; data: the
+    folder for recordings.
     """
 
     def __init__(self, make_predictor: Callable[[Config, Receive], Predictor], config: Config, data: Path) -> None:
@@ -74,23 +49,11 @@ class Session:
         self._scene: scene.PlayScene = scene.FIRST_SCENE
         self._page: Send | None = None
         self._kept: dict[str, dict[str, Any]] = {}
-        self._clock, self._slots = PageClock(), Slots()
-        self._hands: deque[tuple[int, HandMessage]] = deque(maxlen=REMEMBERED_HANDS)
+        self._clock, self._slots = messages.PageClock(), Slots()
+        self._hands: deque[tuple[int, messages.HandMessage]] = deque(maxlen=256)
         self._tasks: tasks.Tasks | None = None
         self._guided_before = self._is_guided
         self._force_s, self._touched = 0.0, 0
-        self._handlers: dict[str, Callable[[Any], None]] = {
-            'hand': self._move_hand,
-            'scene': self._change_scene,
-            'shuffle': self._shuffle_scene,
-            'guidance': self._switch_guidance,
-            'record': self._switch_recording,
-            'tasks': self._begin_tasks,
-            'stop': lambda _: self._end_tasks(),
-            'parameters': self._choose_parameters,
-            'job': self._begin_job,
-            'cancel': lambda _: self._jobs.cancel(),
-        }
 
     @property
     def report(self) -> Path | None:
@@ -100,7 +63,7 @@ class Session:
     def open(self, page: Send) -> None:
         """Serve a page from now on, in place of the one before; it is told the state of everything."""
         self._say('replaced')
-        self._page, self._clock = page, PageClock()
+        self._page, self._clock = page, messages.PageClock()
         limits = {'obstacles': scene.MOST_OBSTACLES, 'goals': scene.MOST_GOALS}
         self._say(
             'hello',
@@ -131,10 +94,45 @@ class Session:
         self._end_recording()
         self.predictor.stop()
 
-    def take(self, message: Message, page: Send) -> None:
+    def take(self, message: messages.Message, page: Send) -> None:
         """Do what a page asks for, unless it was replaced; raises FocError where that is impossible."""
-        if self._page == page:
-            self._handlers[message.type](message)
+        if self._page != page:
+            return
+        kind = message.type
+        if self._tasks is not None and kind not in ('hand', 'stop', 'job', 'cancel'):
+            changed = {'shuffle': 'scene', 'record': 'recording'}.get(kind, kind)
+            raise InputError(changed, 'no change while tasks run', 'a change')
+        match message:
+            case messages.HandMessage():
+                self._move_hand(message)
+            case messages.SceneMessage():
+                self._set_scene(scene.PlayScene(obstacles=message.obstacles, goals=message.goals))
+            case messages.ShuffleMessage():
+                self._set_scene(scene.make_random_scene(np.random.default_rng(message.seed), self._scene.goals))
+                self._say_scene()
+            case messages.SwitchMessage(type='guidance'):
+                self._set_guidance(message.on)
+            case messages.SwitchMessage(on=False):
+                self._end_recording()
+            case messages.SwitchMessage():
+                if self._recording is None:
+                    self._begin_recording()
+            case messages.TasksMessage():
+                self._begin_tasks(message)
+            case messages.NameMessage():
+                if message.name == 'mine' and self._jobs.operator is None:
+                    raise InputError('parameters', 'standard until parameters were fitted', 'mine')
+                self._parameters = message.name
+                self._configure()
+            case messages.JobMessage():
+                if self._recording is not None:
+                    raise InputError('job', 'a session that has ended', message.name)
+                self._jobs.begin(message.name)
+                self._say_settings()
+            case messages.PlainMessage(type='stop'):
+                self._end_tasks()
+            case messages.PlainMessage():
+                self._jobs.cancel()
 
     def tick(self) -> None:
         """Repeat the scene, which grows too old otherwise, and tell the page the state of the predictor; twice a second."""
@@ -142,9 +140,7 @@ class Session:
         state = self.predictor.check()
         self._say('status', level=state.level, text=state.text)
 
-    # the page's wishes
-
-    def _move_hand(self, message: HandMessage) -> None:
+    def _move_hand(self, message: messages.HandMessage) -> None:
         stamp_ns = self._clock.stamp(message.t, time_ns())
         if stamp_ns is None:
             return
@@ -155,50 +151,12 @@ class Session:
         if self._tasks is not None:
             self._follow_tasks(self._tasks, stamp_ns * 1e-9, message.position)
 
-    def _change_scene(self, message: SceneMessage) -> None:
-        self._refuse_during_tasks('scene')
-        self._set_scene(scene.PlayScene(obstacles=message.obstacles, goals=message.goals))
-
-    def _shuffle_scene(self, message: ShuffleMessage) -> None:
-        self._refuse_during_tasks('scene')
-        self._set_scene(scene.make_random_scene(np.random.default_rng(message.seed), self._scene.goals))
-        self._say_scene()
-
-    def _switch_guidance(self, message: SwitchMessage) -> None:
-        self._refuse_during_tasks('guidance')
-        self._set_guidance(message.on)
-
-    def _choose_parameters(self, message: NameMessage) -> None:
-        self._refuse_during_tasks('parameters')
-        if message.name == 'mine' and self._jobs.operator is None:
-            raise InputError('parameters', 'standard until parameters were fitted', 'mine')
-        self._parameters = message.name
-        self._configure()
-
-    def _switch_recording(self, message: SwitchMessage) -> None:
-        self._refuse_during_tasks('recording')
-        if not message.on:
-            self._end_recording()
-        elif self._recording is None:
-            self._begin_recording()
-
-    def _begin_tasks(self, settings: TasksMessage) -> None:
-        self._refuse_during_tasks('tasks')
+    def _begin_tasks(self, settings: messages.TasksMessage) -> None:
         self._end_recording()
         self._begin_recording()
         self._tasks, self._guided_before = tasks.Tasks(settings, self._scene), self._is_guided
         self._kept.pop('score', None)
         self._prepare_trial(self._tasks)
-
-    def _begin_job(self, message: JobMessage) -> None:
-        if self._recording is not None:
-            raise InputError('job', 'a session that has ended', message.name)
-        self._jobs.begin(message.name)
-        self._say_settings()
-
-    def _refuse_during_tasks(self, name: str) -> None:
-        if self._tasks is not None:
-            raise InputError(name, 'no change while tasks run', 'a change')
 
     # tasks
 
@@ -304,9 +262,9 @@ class Session:
         self._send_scene()
 
     def _send_scene(self) -> None:
-        messages = self._scene.encode(self._types, time_ns())
+        encoded = self._scene.encode(self._types, time_ns())
         for role in (CLOUD, GOALS):
-            self._send(role, messages[role])
+            self._send(role, encoded[role])
 
     def _send(self, role: str, message: Any) -> None:
         self.predictor.send(role, message)
@@ -318,7 +276,10 @@ class Session:
             self._receive_prediction(outcome)
         else:
             self._record(lambda recording: recording.add_guidance(*outcome))
-            self._say_force(*outcome[0].force.tolist())
+            force, now_s = outcome[0].force, monotonic()
+            if now_s - self._force_s >= 0.012 or not force.any():  # guidance updates more often than a screen
+                self._force_s = now_s
+                self._say('force', force=force.round(4).tolist())
 
     def _receive_prediction(self, prediction: Prediction) -> None:
         stamp_ns, snapshot = prediction.stamp_ns, build_snapshot(prediction)
@@ -339,7 +300,7 @@ class Session:
 
     def _say(self, kind: str, **values: Any) -> None:
         message = {'type': kind, **values}
-        if kind in KEPT:
+        if kind in ('score', 'job', 'result'):  # repeated to a page that is loaded again
             self._kept[kind] = message
             if 'rows' in message and kind == 'job':
                 self._kept['result'] = {'type': 'result', 'columns': values['columns'], 'rows': values['rows']}
@@ -347,12 +308,6 @@ class Session:
             self._page(message)
         if kind == 'job' and values['state'] == 'done':
             self._say_settings()
-
-    def _say_force(self, x: float, y: float) -> None:
-        now_s = monotonic()
-        if now_s - self._force_s >= FORCE_PERIOD_S or not (x or y):
-            self._force_s = now_s
-            self._say('force', force=[round(x, 4), round(y, 4)])
 
     def _say_scene(self) -> None:
         self._say('scene', **self._scene.model_dump())

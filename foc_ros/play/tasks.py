@@ -16,8 +16,6 @@ from .scene import START, TARGET_RADIUS, PlayScene, Point, make_random_scene
 
 REST_S = 0.3
 """Time for which the hand has to stay at a goal to reach it [s]."""
-WAIT_S = (0.4, 0.9)
-"""Limits of the random time for which the hand rests at the start before a goal is lit [s]."""
 SCORE_COLUMNS = ('', 'trials', 'time [s]', 'touched', 'path [cm]', 'predicted ahead [s]')
 
 
@@ -81,37 +79,27 @@ class Reach:
             self._most_likely = (t, way)
 
 
-def make_trials(settings: TasksMessage, scene: PlayScene) -> list[Trial]:
-    """Return the random sequence of a seed, in which goals, and trials with and without guidance, occur about equally often."""
-    random = np.random.default_rng(settings.seed)
-    guided = {'mixed': (False, True), 'with': (True,), 'without': (False,)}[settings.assistance]
-    kinds = [(goal, is_guided) for goal in range(len(scene.goals)) for is_guided in guided]
-    trials: list[Trial] = []
-    while len(trials) < settings.trials:
-        for row in random.permutation(len(kinds)).tolist():
-            shown_scene = make_random_scene(random, scene.goals) if settings.shuffled else scene
-            trials.append(Trial(shown_scene, *kinds[row]))
-    return trials[: settings.trials]
-
-
 class Tasks:
-    """A sequence of trials that follows the hand.
+    """A sequence of trials, made of settings and a scene, that follows the hand.
 
     Attributes: settings; trials; number, of the present one; phase; scores, of the trials that are over; touched, how often the
     hand has entered an obstacle in the present trial.
-
-    Parameters
-    ----------
-    settings, scene
-        What the sequence is made of.
     """
 
     def __init__(self, settings: TasksMessage, scene: PlayScene) -> None:
-        self.settings = settings
-        self.trials = make_trials(settings, scene)
+        self.settings, random = settings, np.random.default_rng(settings.seed)
+        guided = {'mixed': (False, True), 'with': (True,), 'without': (False,)}[settings.assistance]
+        kinds = [(goal, is_guided) for goal in range(len(scene.goals)) for is_guided in guided]
+        self.trials: list[Trial] = []  # in which goals, and trials with and without guidance, occur about equally often
+        while len(self.trials) < settings.trials:
+            for row in random.permutation(len(kinds)).tolist():
+                shown_scene = make_random_scene(random, scene.goals) if settings.shuffled else scene
+                self.trials.append(Trial(shown_scene, *kinds[row]))
+        del self.trials[settings.trials :]
         self.number, self.phase = 0, Phase.RETURN
         self.scores: list[Reach] = []
-        self._waits = np.random.default_rng([settings.seed, 1]).uniform(*WAIT_S, len(self.trials))
+        # times for which the hand rests at the start before a goal is lit [s]
+        self._waits = np.random.default_rng([settings.seed, 1]).uniform(0.4, 0.9, len(self.trials))
         self._since_s = 0.0
         self._reach: Reach | None = None
 

@@ -24,15 +24,15 @@ from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obs
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
-from foc_ros.ros.messages.ranking import find_drawn_curve
+from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
 
-from .legend import describe_in_legend
 from .views import COLOURS, LIKELY, SLOTS, HandTrajectory, describe_ghost, list_unsolved
 
 try:
     import matplotlib as mpl
     from matplotlib.colors import to_rgba
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
+    from matplotlib.lines import Line2D as Line2D
     from matplotlib.patches import Circle, Ellipse, Patch, Polygon
     from matplotlib.rcsetup import cycler
 except ImportError as error:
@@ -45,9 +45,6 @@ GHOST_COLOUR = '#777777'
 ELLIPSES_PER_CANDIDATE = 8
 NAMED_OBSTACLES = 30
 """The obstacles of larger scenes are drawn without their ids."""
-MOTOR_NOISE, TOTAL = 'motor noise, one standard deviation', 'all uncertainty of the most likely path'
-RADIUS_STDDEV = 'standard deviation of its radius'
-"""Ellipses, and the ring around an obstacle, in the legend."""
 STYLE = {
     'font.size': 10,
     'axes.spines.top': False,
@@ -58,13 +55,6 @@ STYLE = {
     'axes.prop_cycle': cycler('color', CLASS_COLOURS),
     'savefig.dpi': 110,
 }
-METADATA: dict[str, dict[str, str | None]] = {
-    '.png': {'Software': MARK},
-    '.pdf': {'Creator': MARK, 'CreationDate': None},
-    '.svg': {'Creator': MARK, 'Date': None},
-}
-"""What a picture says of itself, by its format; without its date it is the same file each time."""
-
 Bounds = tuple[float, float, float, float]
 """Limits of x, then of y [m]."""
 Span = tuple[int, int]
@@ -83,8 +73,14 @@ def save_figure(figure: Figure, file: Path | str) -> None:
     suffix = Path(file).suffix.lower()
     if suffix not in PICTURE_SUFFIXES:
         raise InputError('picture file', f'a name that ends in {", ".join(PICTURE_SUFFIXES)}', str(file))
+    # without its date it is the same file each time
+    metadata = {
+        '.png': {'Software': MARK},
+        '.pdf': {'Creator': MARK, 'CreationDate': None},
+        '.svg': {'Creator': MARK, 'Date': None},
+    }
     try:
-        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=METADATA[suffix])
+        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=metadata[suffix])
     except OSError as error:
         raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
 
@@ -103,6 +99,18 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
     """Return the line style of a candidate: the colour of its slot, dotted if compromised, the thicker the more likely."""
     colour = GHOST_COLOUR if slot is None else CLASS_COLOURS[slot % COLOURS]
     return {'color': colour, 'linestyle': ':' if is_compromised else '-', 'linewidth': 1.2 + 3.0 * likelihood}
+
+
+def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
+    """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
+    name = describe_candidate(candidate, goals)
+    if len(name) > 60:  # the words of a class with many obstacles would leave no room for the plot
+        name = candidate.label
+    if not candidate.has_likelihood:
+        return f'{letter}    - %  {name}; {candidate.reason}'
+    found = 'estimated' if candidate.is_estimated else 'compromised'
+    words = '' if candidate.is_solved else f'; {found}: eta {candidate.eta:.3f}'
+    return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
 
 
 def number_labels(snapshot: Prediction) -> dict[str, int]:
@@ -149,9 +157,9 @@ def draw_scene(
 ) -> None:
     """Draw obstacles and goals.
 
-    An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the
-    goals (g, 2) have their names, by default the numbers in the labels of candidates. An obstacle that is a goal of its own name
-    has it once.
+    An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the goals (g,
+    2) have their names, by default the numbers in the labels of candidates; a name that is also that of the obstacle is written
+    once.
     """
     holds_goal = np.any(find_holders(goals, obstacles), axis=0).tolist()
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
@@ -159,7 +167,8 @@ def draw_scene(
         look = {'facecolor': '0.65', 'edgecolor': '0.35', 'linewidth': 0.8, 'zorder': 1.0, 'label': 'obstacle'}
         axes.add_patch(make_obstacle_patch(obstacles, row, 0.0, **look))
         if ring:
-            look = {'facecolor': '0.88', 'edgecolor': '0.7', 'linewidth': 0.6, 'zorder': 0.9, 'label': RADIUS_STDDEV}
+            look = {'facecolor': '0.88', 'edgecolor': '0.7', 'linewidth': 0.6, 'zorder': 0.9}
+            look['label'] = 'standard deviation of its radius'
             axes.add_patch(make_obstacle_patch(obstacles, row, ring, **look))
         if len(obstacles) <= NAMED_OBSTACLES and not (holds_goal[row] and named and name in names):
             below = 12 if holds_goal[row] else 0  # where the sign of the goal does not cover it
@@ -197,29 +206,23 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
             draw_tag(axes, path[int((0.45 + 0.12 * (rank % 3)) * (len(path) - 1))], letter, style['color'])
     entered: set[str] = set()
     for number, (curve, label, reason, place) in enumerate(ghosts):
-        words = '' if reason in entered else reason  # those of one obstacle would cover each other
-        _draw_ghost(axes, curve, label, words, 0.5 + 0.15 * (number % 3) if place is None else place)
+        axes.plot(*curve.T, color=GHOST_COLOUR, linewidth=4.0, alpha=0.3, solid_capstyle='round', zorder=2, label=label)
+        share = 0.5 + 0.15 * (number % 3) if place is None else place
+        if reason and reason not in entered:  # those of one obstacle would cover each other
+            look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
+            look['bbox'] = {'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0}
+            axes.annotate(reason, curve[round(share * (len(curve) - 1))], annotation_clip=True, **look)
         if place is not None:
             entered.add(reason)
 
 
-def _draw_ghost(axes: Any, curve: Array, label: str, words: str, place: float) -> None:
-    """Draw a path that is no proper prediction; words: beside it, at a share of it; may be empty."""
-    axes.plot(*curve.T, color=GHOST_COLOUR, linewidth=4.0, alpha=0.3, solid_capstyle='round', zorder=2, label=label)
-    if not words:
-        return
-    look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
-    look['bbox'] = {'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0}
-    axes.annotate(words, curve[round(place * (len(curve) - 1))], annotation_clip=True, **look)
-
-
 def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, is_total: bool) -> None:
     """Draw the ellipses along one path: filled for motor noise, dashed for the total uncertainty where it is asked for."""
-    filled = {'facecolor': to_rgba(colour, 0.3), 'edgecolor': to_rgba(colour, 0.8), 'label': MOTOR_NOISE}
-    dashed = {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': TOTAL}
-    looks: list[tuple[Array, dict[str, Any]]] = [(candidate.motor_covariance, filled)]
+    look: dict[str, Any] = {'facecolor': to_rgba(colour, 0.3), 'edgecolor': to_rgba(colour, 0.8)}
+    looks = [(candidate.motor_covariance, look | {'label': 'motor noise, one standard deviation'})]
     if is_total and candidate.solution.motor_covariance is not None:
-        looks.append((candidate.covariance, dashed))
+        look = {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': 'all uncertainty of the most likely path'}
+        looks.append((candidate.covariance, look))
     path = candidate.solution.path
     for row in np.unique(np.linspace(0, len(path) - 1, ELLIPSES_PER_CANDIDATE + 1).astype(int))[1:]:
         for covariance, look in looks:

@@ -14,15 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.core.obstacle_table import Obstacles, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import find_limits
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve
 
 from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Bounds, Span, compute_bounds, compute_ellipse_axes
-from .tracks import CandidateTracks
-from .views import LIKELY, HandTrajectory, choose_moment, count_likely_paths, describe_ghost, list_unsolved
+from .views import LIKELY, CandidateTracks, HandTrajectory, choose_moment, count_likely_paths, describe_ghost, list_unsolved
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
 """Units [m], [m/s], [s]."""
@@ -30,9 +29,7 @@ MOST_FRAMES, MOST_TIMES, MOST_HAND_SAMPLES = 500, 4000, 4000
 """Numbers of predictions, evenly spread, at which the slider of a report stops, and of which likelihoods are drawn."""
 MOST_BYTES = 1_250_000
 """Size of the data of a report, beyond which the slider stops at fewer predictions."""
-PATH_POINTS, UNSOLVED_POINTS = 26, 13
-DRAWN_PERCENTILES = (0.5, 99.5)
-"""Percentiles of the paths' coordinates that fit into the scene: a single outlying prediction does not change its scale."""
+PATH_POINTS = 26
 
 
 def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence[Span], bounds: Bounds) -> dict[str, Any]:
@@ -99,7 +96,13 @@ class _ReportData:
 
     def _encode_frame(self, row: int) -> dict[str, Any]:
         snapshot, tracks = self._tracks.snapshots[row], self._tracks.tracks[row]
-        scene = json.dumps(_encode_obstacles(snapshot.obstacles))
+        obstacles, shapes = snapshot.obstacles, []
+        # name, centre, radius and its standard deviation, then two vertices or more, relative to the centre
+        for number, corners in enumerate(obstacles.corners):
+            own = [*obstacles.centre[number], obstacles.radius[number], obstacles.radius_stddev[number]]
+            polygon = obstacles.vertices[number, : corners if corners > 1 else 0].ravel()
+            shapes.append([obstacles.ids[number], *_quantise(np.array([*own, *polygon]), LENGTH)])
+        scene = json.dumps(shapes)
         goals = json.dumps([_quantise(goal, LENGTH) for goal in snapshot.goal_positions])
         found = zip(snapshot.candidates_with_likelihood, encode_candidates(snapshot), strict=True)
         candidates = [self._store_texts({'track': tracks[each.label], **encoded}) for each, encoded in found]
@@ -129,30 +132,28 @@ def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
     most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard deviation, and the angle of
     the greater one [degrees].
     """
-    shown = snapshot.candidates_with_likelihood
-    ranked = enumerate(zip(shown, compute_cost_ratios(shown), strict=True))
-    return [_encode_candidate(snapshot, each, ratio, rank == 0) for rank, (each, ratio) in ranked]
-
-
-def _encode_candidate(snapshot: Prediction, candidate: PredictedCandidate, ratio: float, is_first: bool) -> dict[str, Any]:
-    path, (ghost, ghost_at) = candidate.solution.path, describe_ghost(snapshot, candidate)
-    points = select_evenly(len(path), PATH_POINTS)
-    marks = select_evenly(len(path), ELLIPSES_PER_CANDIDATE + 1)[1:]
-    is_widened, is_likely = candidate.solution.motor_covariance is not None, is_first or candidate.likelihood >= LIKELY
-    return {
-        'label': candidate.label,
-        'description': describe_candidate(candidate, len(snapshot.goal_positions)),
-        'ghost': ghost,
-        'ghost_at': None if ghost_at is None else round(ghost_at, 2),
-        'ratio': round_number(ratio),
-        'eta': round_number(candidate.eta),
-        'compromised': not candidate.is_solved,
-        **_encode_points(find_drawn_curve(candidate), PATH_POINTS),
-        't': _quantise_differences(candidate.times[points], TIME),
-        'v': _quantise_differences(np.linalg.norm(candidate.mean[points, 2:4], axis=1), SPEED),
-        'motor': _encode_ellipses(path[marks], candidate.motor_covariance[marks]) if is_likely else [],
-        'total': _encode_ellipses(path[marks], candidate.covariance[marks]) if is_first and is_widened else [],
-    }
+    shown, encoded = snapshot.candidates_with_likelihood, list[dict[str, Any]]()
+    for each, ratio in zip(shown, compute_cost_ratios(shown), strict=True):
+        path, (ghost, ghost_at), is_first = each.solution.path, describe_ghost(snapshot, each), not encoded
+        points, marks = select_evenly(len(path), PATH_POINTS), select_evenly(len(path), ELLIPSES_PER_CANDIDATE + 1)[1:]
+        is_widened, is_likely = each.solution.motor_covariance is not None, is_first or each.likelihood >= LIKELY
+        encoded.append(
+            {
+                'label': each.label,
+                'description': describe_candidate(each, len(snapshot.goal_positions)),
+                'ghost': ghost,
+                'ghost_at': None if ghost_at is None else round(ghost_at, 2),
+                'ratio': round_number(ratio),
+                'eta': round_number(each.eta),
+                'compromised': not each.is_solved,
+                **_encode_points(find_drawn_curve(each), PATH_POINTS),
+                't': _quantise_differences(each.times[points], TIME),
+                'v': _quantise_differences(np.linalg.norm(each.mean[points, 2:4], axis=1), SPEED),
+                'motor': _encode_ellipses(path[marks], each.motor_covariance[marks]) if is_likely else [],
+                'total': _encode_ellipses(path[marks], each.covariance[marks]) if is_first and is_widened else [],
+            }
+        )
+    return encoded
 
 
 def encode_unsolved(snapshot: Prediction, candidate: PredictedCandidate) -> dict[str, Any]:
@@ -163,7 +164,7 @@ def encode_unsolved(snapshot: Prediction, candidate: PredictedCandidate) -> dict
         'reason': candidate.reason,
         'ghost': describe_ghost(snapshot, candidate)[0],
     }
-    return texts | _encode_points(find_drawn_curve(candidate), UNSOLVED_POINTS)
+    return texts | _encode_points(find_drawn_curve(candidate), PATH_POINTS // 2)
 
 
 def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> Bounds:
@@ -172,7 +173,7 @@ def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Predictio
     for each in snapshots:
         points += [each.goal_positions, *find_limits(each.obstacles, each.obstacles.radius_stddev)]
     paths = [find_drawn_curve(candidate) for each in snapshots for candidate in each]
-    points += [np.percentile(np.concatenate(paths), DRAWN_PERCENTILES, axis=0)] if paths else []
+    points += [np.percentile(np.concatenate(paths), (0.5, 99.5), axis=0)] if paths else []
     return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
 
 
@@ -184,16 +185,6 @@ def round_number(value: float) -> float | None:
 def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Return at most so many rows of `count`, evenly spread, the first and the last among them."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
-
-
-def _encode_obstacles(obstacles: Obstacles) -> list[list[str | int]]:
-    """Return obstacles: name, centre, radius and its standard deviation, then two vertices or more, relative to the centre."""
-    rows = np.column_stack([obstacles.centre, obstacles.radius, obstacles.radius_stddev])
-    polygons = [obstacles.vertices[row, : corners if corners > 1 else 0] for row, corners in enumerate(obstacles.corners)]
-    return [
-        [name, *_quantise(row, LENGTH), *_quantise(polygon.ravel(), LENGTH)]
-        for name, row, polygon in zip(obstacles.ids, rows, polygons, strict=True)
-    ]
 
 
 def _encode_ellipses(centres: Array, covariance: Array) -> list[list[int]]:

@@ -1,12 +1,17 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whole figures for print: a prediction, a scene, the movements of a recording, a moment of one of them."""
+"""Whole figures for print: a prediction, a scene, the movements of a recording, a moment of one of them; and their legends.
+
+A legend is below the axes, so that it covers nothing: the candidates with their classes in words, and the signs.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from textwrap import fill
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -14,27 +19,17 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
-from .draw import (
-    STYLE,
-    Bounds,
-    Span,
-    compute_bounds,
-    draw_candidates,
-    draw_hand,
-    draw_hand_now,
-    draw_movement,
-    draw_scene,
-    number_labels,
-    open_figure,
-    save_figure,
-)
-from .legend import draw_legend, measure_legend
+from . import draw
+from .draw import Bounds, Figure, Line2D, Span, compute_bounds, open_figure
 from .views import HandTrajectory, build_snapshot
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 WIDTH_IN = 6.4
+SIZE_PT, COLUMNS = 8.0, 70
+"""Size of the text, where there is room for it [pt], and characters in a line of a candidate."""
+LINE = 1.35
+"""Height of a line, in parts of the size of its text."""
+_PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
+"""Subplot and place of axes before a legend took a part of it."""
 
 
 def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array | None = None) -> None:
@@ -42,10 +37,10 @@ def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array |
 
     hand (s, 2): where it is now [m], if it is not drawn yet.
     """
-    draw_scene(axes, snapshot.obstacles, snapshot.goal_positions, bounds, names=snapshot.goal_names)
-    draw_candidates(axes, snapshot, number_labels(snapshot))
+    draw.draw_scene(axes, snapshot.obstacles, snapshot.goal_positions, bounds, names=snapshot.goal_names)
+    draw.draw_candidates(axes, snapshot, draw.number_labels(snapshot))
     if hand is not None and len(hand):
-        draw_hand_now(axes, hand)
+        draw.draw_hand_now(axes, hand)
     draw_legend(axes, None if snapshot.candidates_with_likelihood else 'no candidate could be solved')
 
 
@@ -70,7 +65,7 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
 
     snapshot = build_snapshot(prediction)
     hand, bounds = _frame_scene(snapshot)
-    with plt.rc_context(STYLE):
+    with plt.rc_context(draw.STYLE):
         if axes is None:
             axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, snapshot)), layout='constrained').subplots()
         draw_snapshot(axes, snapshot, bounds, hand)
@@ -82,7 +77,7 @@ def write_picture(file: Path | str, prediction: Prediction) -> None:
 
     Raises InputError if the suffix is not that of a picture format or the file cannot be written.
     """
-    save_figure(make_scene_figure(build_snapshot(prediction)), file)
+    draw.save_figure(make_scene_figure(build_snapshot(prediction)), file)
 
 
 def make_scene_figure(snapshot: Prediction) -> Figure:
@@ -99,10 +94,10 @@ def make_recording_figure(
     """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each movement."""
     with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
         axes = figure.subplots()
-        draw_scene(axes, obstacles, goals, bounds, named=False)
+        draw.draw_scene(axes, obstacles, goals, bounds, named=False)
         axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
         for number, span in enumerate(spans):
-            draw_movement(axes, hand.positions[hand.between(*span)], number)
+            draw.draw_movement(axes, hand.positions[hand.between(*span)], number)
     return figure
 
 
@@ -112,7 +107,7 @@ def make_moment_figure(hand: HandTrajectory, snapshot: Prediction, span: Span) -
     bounds = compute_bounds(snapshot.obstacles, snapshot.goal_positions, paths, during)
     with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
         axes = figure.subplots()
-        draw_hand(axes, hand, snapshot.stamp_ns, span)
+        draw.draw_hand(axes, hand, snapshot.stamp_ns, span)
         draw_snapshot(axes, snapshot, bounds)
     return figure
 
@@ -130,3 +125,59 @@ def _get_height(bounds: Bounds, snapshot: Prediction | None = None) -> float:
     if snapshot is None:
         return height
     return height + measure_legend(snapshot)
+
+
+def measure_legend(snapshot: Prediction) -> float:
+    """Return the height of the legend of a scene that is as wide as a page [in], with its signs except those of a moving hand."""
+    signs = 6 + any(not each.is_solved for each in snapshot.candidates_with_likelihood)
+    texts = [fill(draw.describe_in_legend(each, len(snapshot.goal_positions)), COLUMNS) for each in snapshot]
+    lines = sum(1 + text.count('\n') for text in texts) + -(-signs // 2)
+    return lines * LINE * SIZE_PT / 72.0 + 0.05
+
+
+def draw_legend(axes: Any, title: str | None = None) -> None:
+    """Write everything that is drawn on axes into a legend, in a part of their place.
+
+    The text is as small as the place needs. A second call replaces the legend of the first.
+    """
+    figure, name = axes.figure, f'legend {id(axes)}'
+    for earlier in [each for each in figure.axes if each.get_gid() == name]:
+        earlier.remove()
+    slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
+    width_in, height_in = figure.get_figwidth() * place.width, figure.get_figheight() * place.height
+    is_narrow = width_in < 3.5
+    columns, sign_columns = (40, 1) if is_narrow else (COLUMNS, 2)
+    named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    shares = {label: float(label.partition('%')[0][1:].strip().replace('-', '-1')) for label in named if '%  ' in label}
+    candidates = sorted(shares, key=lambda label: (-shares[label], label))
+    if any(isinstance(named[label], Line2D) and named[label].get_linestyle() == ':' for label in candidates):
+        named['dotted: not known to avoid as surely as wanted'] = Line2D([], [], color='0.35', linestyle=':', linewidth=2.0)
+    signs = [label for label in named if label not in candidates]
+    texts = [fill(label, columns, subsequent_indent=' ' * 10) for label in candidates]
+    lines = sum(1 + text.count('\n') for text in texts) + -(-len(signs) // sign_columns) + (title is not None)
+    size_pt = min(SIZE_PT, 72.0 * width_in / (0.62 * (columns + 5)))
+    wanted_in = min(lines * LINE * size_pt / 72.0 + 0.05, 0.5 * height_in)
+    size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (LINE * max(lines, 1)))
+    below = _take_place(axes, slot, place, height_in, wanted_in)
+    below.set(gid=name)
+    below.axis('off')
+    look = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
+    font, handles = {'family': 'monospace', 'size': size_pt}, [named[label] for label in candidates]
+    below.add_artist(below.legend(handles, texts, title=title, loc='upper left', prop=font, **look))
+    handles, font = [named[label] for label in signs], {'size': size_pt}
+    below.legend(handles, signs, loc='lower left', ncols=sign_columns, columnspacing=2.0, prop=font, **look)
+
+
+def _take_place(axes: Any, slot: Any, place: Any, height_in: float, wanted_in: float) -> Any:
+    """Return new axes of a height [in] below axes, which become so much smaller."""
+    figure = axes.figure
+    gap_in = 0.0 if figure.get_layout_engine() else 0.5  # of the labels below axes
+    parts = [max(height_in - wanted_in - gap_in, 0.2 * height_in), gap_in, wanted_in]
+    if slot is None:
+        bottom = place.y0 + place.height * (gap_in + wanted_in) / sum(parts)
+        axes.set_position((place.x0, bottom, place.width, place.y1 - bottom))
+        return figure.add_axes((place.x0, place.y0, place.width, place.height * wanted_in / sum(parts)))
+    parts = [each for each in parts if each]
+    rows = slot.subgridspec(len(parts), 1, height_ratios=parts, hspace=0.0)
+    axes.set_subplotspec(rows[0])
+    return figure.add_subplot(rows[-1])

@@ -27,14 +27,8 @@ WIDTH, HEIGHT = 72, 13
 """Size of the drawing [characters]; with the table it fits into 24 lines."""
 OBSTACLE, GOAL, HAND = '▒', '*', '@'
 LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   1 2 3 candidates, most likely first'
-REDRAW_S, LINE_S = 0.125, 1.0
-"""Seconds between two updates of the table on a terminal, and between two lines of text elsewhere."""
 ROWS = 4
 """Rows of the table: the default number of candidates, so that its height stays the same."""
-LISTED = 2
-"""Number of candidates in a line of text."""
-COLUMNS = {'candidate': 46, 'likelihood': 10, '': 5, 'cost': 6, 'eta': 5}
-"""Columns of the table and their widths [characters]."""
 Show = Callable[[float, Prediction, str, Array], None]
 """Function that shows a snapshot at a time [s], with a heading and the position of the hand (2,) [m]; it may be called often."""
 
@@ -45,20 +39,25 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
     console = console or Console()
     waiting = 'Waiting for the first prediction of the node ...'
     live = Live(waiting, console=console, auto_refresh=False) if console.is_terminal else None
-    next_update, bounds = -np.inf, None
+    next_update = -np.inf
+    bounds: Bounds | None = None
 
     def show(now: float, snapshot: Prediction, heading: str, hand: Array) -> None:
         nonlocal next_update, bounds
         if now < next_update:
             return
-        next_update = now + (LINE_S if live is None else REDRAW_S)
+        next_update = now + (1.0 if live is None else 0.125)
         if live is not None:
-            bounds = extend_bounds(snapshot, hand, bounds)
+            left, right, bottom, top = compute_bounds(snapshot.obstacles, snapshot.goal_positions, (), hand[None], margin=0.02)
+            if bounds is not None:  # with those before, the drawing rarely moves
+                left, right = min(left, bounds[0]), max(right, bounds[1])
+                bottom, top = min(bottom, bounds[2]), max(top, bounds[3])
+            bounds = left, right, bottom, top
             drawing = Text(draw_scene(snapshot, hand, bounds))
             live.update(Group(drawing, Text(LEGEND), _make_table(snapshot, heading)), refresh=True)
             return
         goals, shown = len(snapshot.goal_positions), snapshot.candidates_with_likelihood
-        listed = [f'{100 * each.likelihood:.0f} % {describe_candidate(each, goals)}' for each in shown[:LISTED]]
+        listed = [f'{100 * each.likelihood:.0f} % {describe_candidate(each, goals)}' for each in shown[:2]]
         line = f'{heading}   {"   ".join(listed) or "no solved candidate"}'
         console.print(line, highlight=False, soft_wrap=True, markup=False)
 
@@ -69,7 +68,7 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
 def _make_table(snapshot: Prediction, title: str) -> Table:
     table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
     table.caption = '* not known to keep the wanted eta: compromised, or estimated'
-    for name, width in COLUMNS.items():
+    for name, width in (('candidate', 46), ('likelihood', 10), ('', 5), ('cost', 6), ('eta', 5)):
         table.add_column(name, width=width, no_wrap=True, justify='right' if width < 10 else 'left')
     shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
     for each, ratio in list(zip(shown, compute_cost_ratios(shown), strict=True))[:ROWS]:
@@ -81,14 +80,6 @@ def _make_table(snapshot: Prediction, title: str) -> Table:
     return table
 
 
-def extend_bounds(snapshot: Prediction, hand: Array, before: Bounds | None) -> Bounds:
-    """Return limits [m] around obstacles, goals and hand (2,) [m], and around those before, so that the drawing rarely moves."""
-    left, right, bottom, top = compute_bounds(snapshot.obstacles, snapshot.goal_positions, (), hand[None], margin=0.02)
-    if before is None:
-        return left, right, bottom, top
-    return min(left, before[0]), max(right, before[1]), min(bottom, before[2]), max(top, before[3])
-
-
 def draw_scene(snapshot: Prediction, hand: Array, bounds: Bounds) -> str:
     """Return the drawing; hand (2,) [m]; bounds: left, right, bottom and top [m]."""
     left, right, bottom, top = bounds
@@ -98,16 +89,14 @@ def draw_scene(snapshot: Prediction, hand: Array, bounds: Bounds) -> str:
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         is_inside = (measure_offsets(points, snapshot.obstacles)[1] <= snapshot.obstacles.radius).any(axis=1)
         cells[is_inside.reshape(cells.shape)] = OBSTACLE
-    paths = [(_fill(find_drawn_curve(each)), f'{row}') for row, each in enumerate(snapshot.candidates_with_likelihood[:9], 1)]
-    for points, mark in [*reversed(paths), (snapshot.goal_positions, GOAL), (hand[None], HAND)]:
+    drawn: list[tuple[Array, str]] = [(hand[None], HAND), (snapshot.goal_positions, GOAL)]
+    for number, each in enumerate(snapshot.candidates_with_likelihood[:9], 1):
+        curve = find_drawn_curve(each)
+        rows = np.linspace(0.0, len(curve) - 1.0, 4 * WIDTH)  # so many points that a line has no gaps
+        drawn.append((np.column_stack([np.interp(rows, np.arange(len(curve)), axis) for axis in curve.T]), f'{number}'))
+    for points, mark in reversed(drawn):
         column = np.rint((points[:, 0] - left) / (right - left) * (WIDTH - 1)).astype(int)
         row = np.rint((top - points[:, 1]) / (top - bottom) * (HEIGHT - 1)).astype(int)
         is_visible = (column >= 0) & (column < WIDTH) & (row >= 0) & (row < HEIGHT)
         cells[row[is_visible], column[is_visible]] = mark
     return '\n'.join(''.join(line).rstrip() for line in cells)
-
-
-def _fill(points: Array) -> Array:
-    """Return more points along a line (m, 2) [m], so that it is drawn without gaps."""
-    rows = np.linspace(0.0, len(points) - 1.0, 4 * WIDTH)
-    return np.column_stack([np.interp(rows, np.arange(len(points)), axis) for axis in points.T])

@@ -20,15 +20,12 @@ from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.outputs import MARK, REPORT_FILES, check_page
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
-from .draw import Span, save_figure
+from .draw import save_figure
 from .encode import compute_recording_bounds, encode_report, round_number
 from .figures import make_recording_figure
 from .page import Table, render
-from .tracks import build_candidate_tracks
-from .views import NOTED, HandTrajectory, build_hand_trajectory, build_snapshot, is_late, list_unsolved
+from .views import NOTED, HandTrajectory, build_candidate_tracks, build_hand_trajectory, build_snapshot, is_late, list_unsolved
 
-LATE_SHARE = 0.05
-"""Share of the predictions that were not finished from which the page warns of a busy computer."""
 COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candidates not solved', 'counters of the node')
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
 
@@ -95,29 +92,22 @@ def write_report(
     page_file, numbers_file, overview_file = (directory / name for name in REPORT_FILES)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        pictures = _write_overview(overview_file, hand, snapshots, spans)
+        solved = [each for each in snapshots if each.candidates_with_likelihood]
+        if solved:
+            goals = np.unique(np.concatenate([each.goal_positions for each in solved]), axis=0)
+            bounds = compute_recording_bounds(hand, solved)
+            save_figure(make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds), overview_file)
         page_file.write_text(html, encoding='utf-8', errors='replace')
         numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
     except OSError as error:
         raise InputError('report directory', 'a directory that can be written', f'{directory}: {error.strerror}') from error
-    return [page_file, numbers_file, *pictures]
-
-
-def _write_overview(file: Path, hand: HandTrajectory, snapshots: Sequence[Prediction], spans: Sequence[Span]) -> list[Path]:
-    """Write the picture of all movements; return the file, nothing where no candidate was solved."""
-    solved = [each for each in snapshots if each.candidates_with_likelihood]
-    if not solved:
-        return []
-    goals = np.unique(np.concatenate([each.goal_positions for each in solved]), axis=0)
-    figure = make_recording_figure(hand, solved[0].obstacles, goals, spans, compute_recording_bounds(hand, solved))
-    save_figure(figure, file)
-    return [file]
+    return [page_file, numbers_file, *([overview_file] if solved else [])]
 
 
 def describe_late(snapshots: Sequence[Prediction]) -> str:
-    """Return for how many predictions the computer was too busy and what to change, '' where they were too few to matter."""
+    """Return for how many predictions the computer was too busy and what to change, '' where these are 5 % or less."""
     late = sum(map(is_late, snapshots))
-    if late <= LATE_SHARE * len(snapshots):
+    if late <= 0.05 * len(snapshots):
         return ''
     return (
         f'This computer was too busy for {late} of {len(snapshots)} predictions, which show paths that are not finished. '

@@ -1,19 +1,26 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Predictions and the measured hand for display, as plain arrays."""
+"""Predictions and the measured hand for display, and candidates over time.
+
+A track has the candidates of one class, and a slot, which gives its letter and colour.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.solution import LEFT, RIGHT, Status
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
+from foc_ros.ros.messages.decode_poses import decode_frame, decode_stamp
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STATUSES, UNKNOWN
 from foc_ros.ros.messages.ranking import find_drawn_curve, order_candidates
 
 COLOURS, SLOTS = 6, 12
@@ -22,12 +29,8 @@ NOTED, LIKELY = 0.01, 0.05
 """Likelihoods from which a candidate is worth mentioning, and from which its ellipses are drawn."""
 ONSET_SPEED, PAUSE_S, LEAST_M = 0.05, 0.15, 0.03
 """Speed [m/s] above which the hand counts as moving, longest pause within a movement, and its least extent."""
-ON_THE_WAY, USUAL = (0.15, 0.6), 1.5
-"""Parts of a movement between which a moment is worth seeing, and the size of its ellipses, at most, in parts of their median."""
 GRAZE_M = 1e-3
 """Depth [m] up to which a path within an obstacle counts as one along its boundary."""
-Sides = dict[str, int]
-"""Side (LEFT or RIGHT) of each obstacle by its id."""
 
 
 def build_snapshot(prediction: Prediction) -> Prediction:
@@ -36,20 +39,68 @@ def build_snapshot(prediction: Prediction) -> Prediction:
     The candidate that is called most likely comes first, and of the states only positions and velocities are kept: all of them
     would fill the memory with a long recording.
     """
-    shown = *order_candidates(prediction), *list_unsolved(prediction)
-    return replace(prediction, candidates=tuple(map(_keep_positions, shown)))
+    kept = []
+    for each in (*order_candidates(prediction), *list_unsolved(prediction)):
+        solution, motor = each.solution, each.solution.motor_covariance
+        solution = replace(
+            solution,
+            mean=solution.mean[:, :4],
+            covariance=solution.covariance[:, :2, :2],
+            motor_covariance=None if motor is None else motor[:, :2, :2],
+            control=solution.control[:0],
+        )
+        kept.append(replace(each, solution=solution, height=None))
+    return replace(prediction, candidates=tuple(kept))
 
 
-def _keep_positions(candidate: PredictedCandidate) -> PredictedCandidate:
-    solution, motor = candidate.solution, candidate.solution.motor_covariance
-    kept = replace(
-        solution,
-        mean=solution.mean[:, :4],
-        covariance=solution.covariance[:, :2, :2],
-        motor_covariance=None if motor is None else motor[:, :2, :2],
-        control=solution.control[:0],
+def read_snapshot(cloud: Any, likelihoods: Any, plane: str, obstacles: Obstacles, goals: Array) -> Prediction:
+    """Return the snapshot in a pair of messages of `~/prediction` and `~/likelihoods`: inverse of `messages.encode_prediction`.
+
+    obstacles and goals (g, 2) [m] are those at the stamp of the messages. Costs are relative to the least one.
+    """
+    rows = np.frombuffer(cloud.data, dtype=CLOUD_ROW) if len(cloud.data) else np.zeros(0, dtype=CLOUD_ROW)
+    columns = np.asarray(likelihoods.data, dtype=float).reshape(-1, len(LIKELIHOOD_COLUMNS))
+    labels = likelihoods.layout.dim[0].label.split(';') if len(columns) else []
+    shares = {UNKNOWN: 0.0 if labels else 1.0, OTHER: 0.0}
+    while labels and labels[-1] in shares:
+        shares[labels[-1]], labels, columns = float(columns[-1, 0]), labels[:-1], columns[:-1]
+    parts = (rows[rows['candidate'] == number] for number in range(len(labels)))
+    read = zip(labels, columns, parts, strict=True)
+    candidates = tuple(_read_candidate(label, obstacles.ids, values, part, plane) for label, values, part in read)
+    cleared = np.zeros(len(obstacles), dtype=bool)
+    if len(rows):
+        height = rows[next(axis for axis in 'xyz' if axis not in plane)]
+        cleared = (height.min() > obstacles.heights[:, 1]) | (height.max() < obstacles.heights[:, 0])
+    return Prediction(
+        decode_stamp(cloud.header),
+        decode_frame(cloud.header),
+        0.0,
+        candidates,
+        candidates[0].label if candidates else None,
+        obstacles=obstacles,
+        goal_positions=goals,
+        cleared=tuple(cleared.tolist()),
+        unknown=shares[UNKNOWN],
+        other=shares[OTHER],
     )
-    return replace(candidate, solution=kept, height=None)
+
+
+def _read_candidate(label: str, ids: Collection[str], values: Array, rows: Any, plane: str) -> PredictedCandidate:
+    x, y = plane[0], plane[1]
+    mean = _stack(rows, (x, y, f'v{x}', f'v{y}'))
+    pairs = x + x, plane, plane, y + y
+    total, motor = (_stack(rows, [prefix + pair for pair in pairs]).reshape(-1, 2, 2) for prefix in ('', 'motor_'))
+    likelihood, effort, cost_ratio, eta = values.tolist()
+    status, dt = STATUSES[int(rows['status'][0])], float(rows['t'][-1]) / max(len(rows) - 1, 1)
+    only_motor = None if np.array_equal(total, motor) else motor
+    solution = Solution(status, '', dt, mean, total, np.zeros((0, 2)), effort, {}, 0.0, 0.0, eta, motor_covariance=only_motor)
+    sides = parse_label(label, ids)[1]
+    candidate = Candidate(label, int(rows['goal'][0]), tuple(sides.items()), mean[:, :2], 0.0)
+    return PredictedCandidate(candidate, solution, sides, cost_ratio, likelihood, way=int(rows['way'][0]))
+
+
+def _stack(rows: Any, names: Sequence[str]) -> Array:
+    return np.stack([rows[name].astype(float) for name in names], axis=-1)
 
 
 def list_unsolved(prediction: Prediction) -> tuple[PredictedCandidate, ...]:
@@ -73,29 +124,31 @@ def count_likely_paths(snapshot: Prediction) -> float:
 def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -> int | None:
     """Return the row of the snapshot of a movement that is the most worth seeing, None where the movement has none.
 
-    It has the most likely paths of those on the way, once the filter of the hand has settled: its ellipses have the usual size.
+    It has the most likely paths of those on the way, once the filter of the hand has settled: its ellipses have at most 1.5 times
+    the usual size.
     """
     during = {row: each for row, each in enumerate(snapshots) if start_ns <= each.stamp_ns <= end_ns and each.most_likely}
     if not during:
         return None
     sizes = {row: np.linalg.eigvalsh(each.candidates[0].covariance[:, :2, :2]).max() for row, each in during.items()}
-    settled = [row for row, size in sizes.items() if size <= USUAL**2 * np.median(list(sizes.values()))]
-    begin, end = (start_ns + share * (end_ns - start_ns) for share in ON_THE_WAY)
+    settled = [row for row, size in sizes.items() if size <= 1.5**2 * np.median(list(sizes.values()))]
+    begin, end = (start_ns + share * (end_ns - start_ns) for share in (0.15, 0.6))
     on_the_way = [row for row in settled if begin <= during[row].stamp_ns <= end]
     return max(on_the_way or settled, key=lambda row: count_likely_paths(during[row]))
 
 
-def find_entered(snapshot: Prediction, candidate: PredictedCandidate) -> tuple[str, float]:
-    """Return the name of the first obstacle that a path leads through, and the share of the path at the deepest point.
+def describe_ghost(snapshot: Prediction, candidate: PredictedCandidate) -> tuple[str, float | None]:
+    """Return why a path is no proper prediction, and at which share of the path that is, None if nowhere in particular.
 
-    The name is empty if the path leads through no obstacle.
-
-    The obstacles have their mean sizes and move on at their velocities. The beginning of a path within an obstacle that the
-    hand is in does not count, nor its end within one that is its goal, nor do depths of less than GRAZE_M.
+    It could not be solved, or leads through an obstacle; otherwise the reason is ''. The obstacles have their mean sizes and move
+    on at their velocities. The beginning of a path within an obstacle that the hand is in does not count, nor its end within one
+    that is its goal, nor do depths of less than GRAZE_M.
     """
+    if not candidate.has_likelihood:
+        return candidate.status.value.replace('_', ' '), None
     curve, blocking = find_drawn_curve(candidate), snapshot.blocking_obstacles
     if not len(blocking) or not len(curve):
-        return '', 0.0
+        return '', None
     times = np.linspace(candidate.times[0], candidate.times[-1], len(curve))
     centres = blocking.centre + times[:, None, None] * blocking.velocity
     depths = blocking.radius - measure_offsets(curve, blocking, centres)[1]
@@ -103,21 +156,10 @@ def find_entered(snapshot: Prediction, candidate: PredictedCandidate) -> tuple[s
     between = np.maximum.accumulate(~is_inside, axis=0) & np.maximum.accumulate(~is_inside[::-1], axis=0)[::-1]
     entered = np.argwhere(is_inside & between)
     if not len(entered):
-        return '', 0.0
+        return '', None
     first = int(entered[0, 1])
     deepest = np.argmax(np.where(between[:, first], depths[:, first], -np.inf))
-    return blocking.ids[first], float(deepest / (len(curve) - 1))
-
-
-def describe_ghost(snapshot: Prediction, candidate: PredictedCandidate) -> tuple[str, float | None]:
-    """Return why a path is no proper prediction, and at which share of the path that is, None if nowhere in particular.
-
-    It could not be solved, or leads through an obstacle; otherwise the reason is ''.
-    """
-    if not candidate.has_likelihood:
-        return candidate.status.value.replace('_', ' '), None
-    name, share = find_entered(snapshot, candidate)
-    return (f'leads through obstacle {name}', share) if name else ('', None)
+    return f'leads through obstacle {blocking.ids[first]}', float(deepest / (len(curve) - 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +199,7 @@ class HandTrajectory(Record):
     def find_movements(self, onset_speed: float = ONSET_SPEED) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement.
 
-        During a movement the hand is faster than onset_speed [m/s], pauses shorter than PAUSE_S apart; it extends over more than
-        LEAST_M.
+        During it the hand is faster than onset_speed [m/s], pauses shorter than PAUSE_S apart; it extends over more than LEAST_M.
         """
         rows = np.flatnonzero(self.speed > onset_speed)
         if not len(rows):
@@ -180,7 +221,7 @@ def build_hand_trajectory(samples: Sequence[HandSample]) -> HandTrajectory:
     return HandTrajectory(stamps[is_newest], positions[is_newest])
 
 
-def parse_label(label: str, ids: Collection[str]) -> tuple[str, Sides]:
+def parse_label(label: str, ids: Collection[str]) -> tuple[str, dict[str, int]]:
     """Split a label into its goal and the sides it names; ids: of the obstacles of the scene, which may contain signs.
 
     An obstacle that is not among them may have any name without a sign.
@@ -189,3 +230,67 @@ def parse_label(label: str, ids: Collection[str]) -> tuple[str, Sides]:
     names = '|'.join([*(re.escape(name) for name in sorted(ids, key=len, reverse=True)), '[^+-]+'])
     found = re.findall(rf'([+-])({names})(?=[+-]|$)', rest)
     return goal, {name: LEFT if sign == '+' else RIGHT for sign, name in found}
+
+
+@dataclass(frozen=True)
+class CandidateTracks:
+    """Snapshots with their candidates associated over time: a track has the candidates of one class.
+
+    tracks: for each snapshot, the number of the track of each candidate, by label; slots: of the tracks with a letter and colour.
+    """
+
+    snapshots: Sequence[Prediction]
+    tracks: Sequence[Mapping[str, int]]
+    slots: Mapping[int, int]
+
+    def likelihoods(self) -> dict[int, tuple[int, Array]]:
+        """Return, for each track, its first row and its likelihoods from there on, NaN where it has no candidate."""
+        known: dict[int, dict[int, float]] = {}
+        for row, (snapshot, tracks) in enumerate(zip(self.snapshots, self.tracks, strict=True)):
+            for each in snapshot.candidates_with_likelihood:
+                known.setdefault(tracks[each.label], {})[row] = each.likelihood
+        return {
+            track: (min(rows), np.array([rows.get(row, np.nan) for row in range(min(rows), max(rows) + 1)]))
+            for track, rows in sorted(known.items())
+        }
+
+
+class Slots:
+    """Gives each class a slot of letter and colour, which it keeps also over an absence, unless another class needs it."""
+
+    def __init__(self) -> None:
+        self._owners: dict[int, int] = {}
+        self._used = [0] * SLOTS
+        self._turn = 0
+
+    def assign(self, ways: Sequence[int]) -> list[int | None]:
+        """Return the slots of the present classes, by their numbers; a class that finds none has None.
+
+        A slot whose colour (slot modulo COLOURS) is unused is preferred, then the one that has been free for longest.
+        """
+        self._turn += 1
+        slots = {way: slot for slot, way in self._owners.items() if way in ways}
+        for way in ways:
+            colours = {slot % COLOURS for slot in slots.values()}
+            free = [slot for slot in range(SLOTS) if slot not in slots.values()]
+            if way not in slots and free:
+                slots[way] = min(free, key=lambda slot: (slot % COLOURS in colours, self._used[slot], slot))
+                self._owners[slots[way]] = way
+        for slot in slots.values():
+            self._used[slot] = self._turn
+        return [slots.get(way) for way in ways]
+
+
+def build_candidate_tracks(snapshots: Sequence[Prediction]) -> CandidateTracks:
+    """Return the candidates of successive snapshots by track, and the letters and colours of the tracks.
+
+    A track lasts as long as its class has one letter. Tracks are numbered from 0 in order of their appearance.
+    """
+    given, numbers, tracks = Slots(), dict[tuple[int, int | None], int](), list[dict[str, int]]()
+    for snapshot in snapshots:
+        shown = snapshot.candidates_with_likelihood
+        ways = [each.way for each in shown]
+        keys = zip(ways, given.assign(ways), strict=True)
+        found = [numbers.setdefault(key, len(numbers)) for key in keys]
+        tracks.append({each.label: track for each, track in zip(shown, found, strict=True)})
+    return CandidateTracks(snapshots, tracks, {track: slot for (_, slot), track in numbers.items() if slot is not None})

@@ -10,19 +10,10 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+from rclpy import qos
 from rclpy.duration import Infinite
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import (
-    QoSCompatibility,
-    QoSDurabilityPolicy,
-    QoSHistoryPolicy,
-    QoSLivelinessPolicy,
-    QoSPolicyKind,
-    QoSProfile,
-    QoSReliabilityPolicy,
-    qos_check_compatible,
-)
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.time import Time
 
@@ -37,7 +28,7 @@ from .messages.plane import Transform, compute_rotation
 from .messages.types import MessageTypes, find_message_class
 from .transforms import TransformUnavailableError
 
-BEST_EFFORT, RELIABLE = QoSReliabilityPolicy.BEST_EFFORT, QoSReliabilityPolicy.RELIABLE
+BEST_EFFORT, RELIABLE = qos.ReliabilityPolicy.BEST_EFFORT, qos.ReliabilityPolicy.RELIABLE
 DEPTH = 10
 HAND_DEPTH = 200
 """Length of the queue of hand poses: 0.2 s at 1 kHz, during which a prediction may be computed."""
@@ -56,7 +47,7 @@ the hand. Best effort, which hears every publisher, where a later message makes 
 MOST_GOAL_TOPICS = 16
 """Number of goals with a topic of their own: each costs an endpoint in every participant. `~/likelihoods_by_name` has all."""
 OVERRIDABLE = QoSOverridingOptions(
-    (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
+    [getattr(qos.QoSPolicyKind, kind) for kind in ('HISTORY', 'DEPTH', 'RELIABILITY', 'DURABILITY')]
 )
 
 
@@ -72,22 +63,20 @@ def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dic
     """
     subscriptions, kinds, missing = {}, TYPES | {COMMAND: TWIST_TYPE}, find_missing_packages()
     for role, (reliability, depth) in INPUTS.items():
-        if role not in missing:
-            subscriptions[role] = node.create_subscription(
-                find_message_class(kinds[role]),
-                role,
-                partial(receive, role),
-                _build_qos(RELIABLE if _is_kept_by_publishers(node, role) else reliability, depth),
-                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-                qos_overriding_options=OVERRIDABLE,
-            )
+        if role in missing:
+            continue
+        name = f'qos_overrides.{node.resolve_topic_name(role)}.subscription.durability'
+        if node.has_parameter(name) and node.get_parameter(name).value == 'transient_local':
+            reliability = RELIABLE  # messages from before the subscription are sent again to such a one only
+        subscriptions[role] = node.create_subscription(
+            find_message_class(kinds[role]),
+            role,
+            partial(receive, role),
+            _build_qos(reliability, depth),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            qos_overriding_options=OVERRIDABLE,
+        )
     return subscriptions
-
-
-def _is_kept_by_publishers(node: Node, role: str) -> bool:
-    """Return whether a parameter asks for messages from before the subscription; only reliable ones are sent again."""
-    name = f'qos_overrides.{node.resolve_topic_name(role)}.subscription.durability'
-    return bool(node.has_parameter(name) and node.get_parameter(name).value == 'transient_local')
 
 
 def create_publisher(node: Node, name: str, kind: str) -> Any:
@@ -101,10 +90,10 @@ def create_publisher(node: Node, name: str, kind: str) -> Any:
     )
 
 
-def _build_qos(reliability: QoSReliabilityPolicy, depth: int) -> QoSProfile:
+def _build_qos(reliability: qos.ReliabilityPolicy, depth: int) -> qos.QoSProfile:
     """Return a new profile, because rclpy writes the overrides of a topic into its profile."""
-    volatile, keep_last = QoSDurabilityPolicy.VOLATILE, QoSHistoryPolicy.KEEP_LAST
-    return QoSProfile(reliability=reliability, durability=volatile, history=keep_last, depth=depth)
+    volatile, keep_last = qos.DurabilityPolicy.VOLATILE, qos.HistoryPolicy.KEEP_LAST
+    return qos.QoSProfile(reliability=reliability, durability=volatile, history=keep_last, depth=depth)
 
 
 def find_missing_packages() -> dict[str, str]:
@@ -145,18 +134,18 @@ def describe_incompatible_subscriptions(node: Node, publisher: Any) -> list[str]
     """Return a text for each present subscription of an output that cannot receive its messages."""
     topic, given = publisher.topic_name, publisher.qos_profile
     # as in the profiles of the graph: what the node leaves open would count as shorter than infinite, and fit every liveliness
-    rest = {'deadline': Infinite, 'liveliness': QoSLivelinessPolicy.AUTOMATIC, 'liveliness_lease_duration': Infinite}
-    offered = QoSProfile(reliability=given.reliability, durability=given.durability, depth=given.depth, **rest)
+    rest = {'deadline': Infinite, 'liveliness': qos.LivelinessPolicy.AUTOMATIC, 'liveliness_lease_duration': Infinite}
+    offered = qos.QoSProfile(reliability=given.reliability, durability=given.durability, depth=given.depth, **rest)
     pairs = [(each.node_name, offered, each.qos_profile) for each in node.get_subscriptions_info_by_topic(topic)]
     remedy = f'(see qos_overrides.{topic}.publisher)'
     return [f'{name} cannot hear {topic}, {reason} {remedy}' for name, reason in _find_incompatible(pairs)]
 
 
-def _find_incompatible(pairs: Iterable[tuple[str, QoSProfile, QoSProfile]]) -> Iterator[tuple[str, str]]:
+def _find_incompatible(pairs: Iterable[tuple[str, qos.QoSProfile, qos.QoSProfile]]) -> Iterator[tuple[str, str]]:
     """Yield name and reason of those names whose profile of the publisher does not fit that of the subscription."""
     for name, offered, wanted in pairs:
-        compatibility, reason = qos_check_compatible(offered, wanted)
-        if compatibility == QoSCompatibility.ERROR:
+        compatibility, reason = qos.qos_check_compatible(offered, wanted)
+        if compatibility == qos.QoSCompatibility.ERROR:
             yield name, f'incompatible QoS: {reason.removeprefix("ERROR: ").rstrip("; ")}'
 
 

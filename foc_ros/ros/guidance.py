@@ -40,13 +40,8 @@ from .messages.types import MessageTypes, RclpyTypes
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-REMEDY = 'allow it with `rtprio` in /etc/security/limits.d, or set guidance.realtime_priority to 0'
-LEAST_SLEEP = 0.1
-"""Part of the period that the thread sleeps after an update that was late: it must not keep a processor for itself."""
 ZEROS = 2
 """Number of outputs without any force that are published after the hand has been released."""
-END_S = 1.0
-"""Longest time to wait for the end of the thread [s]."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +118,7 @@ class GuidanceLoop:
         self._end.set()
         self._enabled.set()
         if self._thread is not None:
-            self._thread.join(END_S)
+            self._thread.join(1.0)
             self._thread = None
         self._state, self._zeros = GuidanceState(), ZEROS
 
@@ -155,7 +150,8 @@ class GuidanceLoop:
         ages = now_s - newest.hand_s, now_s - newest.prediction_s
         given = GuidanceInput(now_s, position, velocity, newest.prediction, *ages, is_released, acceleration)
         self.output, self._state = guide(newest.config, self._state, given)
-        self._zeros = self._zeros + 1 if _has_ended(self.output) else 0
+        has_ended = self.output.status is not GuidanceStatus.GUIDING and not self.output.force.any() and not self.output.authority
+        self._zeros = self._zeros + 1 if has_ended else 0
         if self._zeros <= ZEROS:
             self.place = newest.place or self.place
             if self.place is not None:
@@ -184,7 +180,7 @@ class GuidanceLoop:
                 self._state = GuidanceState()
                 self._report(error)
             period_s = 1.0 / self.newest.config.guidance.rate_hz
-            due_s = max(due_s + period_s, monotonic() + LEAST_SLEEP * period_s)
+            due_s = max(due_s + period_s, monotonic() + 0.1 * period_s)  # it must not keep a processor for itself
 
     def _set_priority(self, priority: int) -> None:
         """Give this thread a priority of SCHED_FIFO, 0 for an ordinary one; threads that it starts have an ordinary one."""
@@ -197,12 +193,9 @@ class GuidanceLoop:
             self._priority = priority
         except (OSError, AttributeError) as error:  # Python has these on Linux only
             if not self._has_warned:
-                self._warn(f'the real-time priority {priority} of guidance is not permitted ({error}): {REMEDY}')
+                remedy = 'allow it with `rtprio` in /etc/security/limits.d, or set guidance.realtime_priority to 0'
+                self._warn(f'the real-time priority {priority} of guidance is not permitted ({error}): {remedy}')
                 self._has_warned = True
-
-
-def _has_ended(output: GuidanceOutput) -> bool:
-    return output.status is not GuidanceStatus.GUIDING and not output.force.any() and not output.authority
 
 
 class GuidanceTopics:

@@ -1,23 +1,32 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The node's diagnostics: counts and times of what it did, all values that are published, and the checks that give the level."""
+"""The inputs by the node's clocks, and its diagnostics: counts and times of what it did, and the checks that give the level.
+
+The pipeline knows message stamps only, so that a replay needs no clock. Times named `_s` are of the steady clock [s], those named
+`clock_ns` are ROS time [ns].
+"""
 
 from __future__ import annotations
 
-from collections import Counter, deque
+import math
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.io.topics import HAND
+from foc_ros.core.config import Config
+from foc_ros.core.pipeline import SampleStatus
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import NANOSECONDS
+from foc_ros.io.topics import CLOUD, COLLISION, DETECTIONS, HAND, MARKERS
 
-from .freshness import Freshness
 from .intake import Intake
 from .messages.types import MessageTypes, make_header
 
+SOURCE_TOPICS = {'cloud': CLOUD, 'markers': MARKERS, COLLISION: COLLISION, DETECTIONS: DETECTIONS}
+"""Topic of every source of obstacles in the scene."""
 WINDOW = 1000
 """Number of predictions over which the percentiles are computed."""
 OK, WARN, ERROR = 0, 1, 2
@@ -25,16 +34,108 @@ OK, WARN, ERROR = 0, 1, 2
 HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'hand_skipped', 'predict_', 'predictions', 'transform_newest_')
 """Prefixes of the counts that are no fault by themselves; the reason why no prediction is made is reported as text."""
 FAULTS = ('predict_failed', 'predict_nothing_solved', 'predict_too_late')
+"""Counts that are a fault all the same."""
 DROPPED = 'hand_superseded'
 """Count of hand samples that were due and were replaced by a newer one before a prediction was made from them."""
-OVER_BUDGET_S = 0.002
-"""Time beyond `budget_s` after which a prediction is counted as over budget [s]."""
 BUSY_S = 0.5
 """Time that a prediction is computed after which the node is reported as busy [s]."""
 THROTTLE_S = 5.0
 """Shortest time between two log lines of one kind [s]."""
-REPORTED_NOTES = ('hand_inside', 'no_way')
-"""Notes of an incomplete prediction, each counted as `scene_` and its name."""
+
+
+@dataclass
+class Input:
+    """Messages of one input: how many were received, refused, and received before the last report.
+
+    And when the last one was received, used and refused, and why it was refused.
+    """
+
+    received: int = 0
+    refused: int = 0
+    reported: int = 0
+    received_s: float = -math.inf
+    used_s: float | None = None
+    refused_s: float = -math.inf
+    refusal: str = ''
+
+
+class Freshness:
+    """Ages of the inputs: the time since their last message, and the age of a hand pose by its stamp, if it has ROS time.
+
+    Attributes: inputs, by topic.
+    """
+
+    def __init__(self) -> None:
+        self.inputs: defaultdict[str, Input] = defaultdict(Input)
+        self._age_s = 0.0
+        self._has_ros_time = self._is_moving = False
+
+    def note(self, role: str, status: SampleStatus | None, now_s: float, refusal: str | None = None) -> Input:
+        """Count a message of an input, and return its counts; status: what became of it, None if it could not be decoded."""
+        entry = self.inputs[role]
+        entry.received, entry.received_s = entry.received + 1, now_s
+        if status is None or status.is_refused:
+            entry.refused, entry.refused_s, entry.refusal = entry.refused + 1, now_s, refusal or ''
+        elif status.is_taken:
+            entry.used_s = now_s
+        return entry
+
+    def note_pose(self, stamp_ns: int, clock_ns: int, timeout_s: float, *, is_restart: bool) -> None:
+        """Store the age of a hand pose by ROS time.
+
+        Ages count once a movement has begun with a pose that is not older or newer than the timeout. If a recording is played
+        with its own stamps and without `use_sim_time`, the age of its poses means nothing, and it is not checked.
+        """
+        self._age_s = (clock_ns - stamp_ns) / NANOSECONDS
+        if clock_ns and (is_restart or not self._is_moving):
+            self._has_ros_time = self._has_ros_time or abs(self._age_s) <= timeout_s
+            self._is_moving = True
+
+    def forget_clock(self) -> None:
+        """Forget whether the poses are stamped by ROS time."""
+        self._has_ros_time = self._is_moving = False
+
+    def used_s(self, role: str, now_s: float) -> float:
+        """Return when a message of an input was used last; now_s if none was."""
+        used_s = self.inputs[role].used_s
+        return now_s if used_s is None else used_s
+
+    def find_not_ready_reason(self, now_s: float, config: Config, sources: Iterable[str]) -> tuple[str, str] | None:
+        """Return why the clocks allow no prediction, as (kind, text); None if they allow it.
+
+        sources: the sources of obstacles. If one of them is silent, nothing is predicted: its obstacles may still be there.
+        """
+        hand, limit_s, age_s = self.inputs[HAND], config.estimator.hand_timeout_s, abs(self._age_s)
+        limit, silence_s = f'(estimator.hand_timeout_s is {limit_s:g})', now_s - self.used_s(HAND, now_s)
+        if 0.0 < limit_s < silence_s and now_s - hand.refused_s <= limit_s:
+            return 'hand_refused', f'no hand_pose could be used for {silence_s:.1f} s, the last: {hand.refusal}'
+        if 0.0 < limit_s < silence_s:
+            return 'hand_silent', f'hand_pose silent for {silence_s:.1f} s {limit}'
+        if self._has_ros_time and 0.0 < limit_s < age_s:
+            relation = 'older' if self._age_s > 0.0 else 'newer'
+            return 'hand_stale', f'the hand pose is {age_s:.3g} s {relation} than the time of the node {limit}'
+        for source in self.find_silent_sources(now_s, config, sources):
+            role = SOURCE_TOPICS[source]
+            silence_s, limit = now_s - self.used_s(role, now_s), f'(scene.timeout_s is {config.scene.timeout_s:g})'
+            return 'obstacles_silent', f'{role} silent for {silence_s:.1f} s {limit}'
+        return None
+
+    def find_silent_sources(self, now_s: float, config: Config, sources: Iterable[str]) -> list[str]:
+        """Return the sources of obstacles that have been silent for more than `scene.timeout_s`."""
+        limit_s = config.scene.timeout_s
+        return [each for each in sources if 0.0 < limit_s < now_s - self.used_s(SOURCE_TOPICS[each], now_s)]
+
+    def find_late_reason(self, stamp_ns: int, received_s: float, now_s: float, clock_ns: int, config: Config) -> str | None:
+        """Return why a prediction is not published now that it is computed, None if it is.
+
+        stamp_ns, received_s: stamp of its hand pose [ns], and when that arrived.
+        """
+        age_s, limit_s = now_s - received_s, config.estimator.hand_timeout_s
+        if self._has_ros_time:
+            age_s = max(age_s, (clock_ns - stamp_ns) / NANOSECONDS)
+        if not 0.0 < limit_s < age_s:
+            return None
+        return f'the last prediction took until its hand pose was {age_s:.3g} s old (estimator.hand_timeout_s is {limit_s:g})'
 
 
 class Health(NamedTuple):
@@ -70,15 +171,15 @@ class Monitor:
         self._reported_s = now_s
 
     def note_computed(self, prediction: Prediction, budget_s: float) -> None:
-        """Store how long a prediction was computed; budget_s: the time that it had, 0 for no limit."""
+        """Store how long a prediction was computed; budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit."""
         self._solve_ms.append(1e3 * prediction.solve_s)
-        self.counts['predict_over_budget'] += 0.0 < budget_s < prediction.solve_s - OVER_BUDGET_S
+        self.counts['predict_over_budget'] += 0.0 < budget_s < prediction.solve_s - 0.002
 
     def note_prediction(self, prediction: Prediction, start_s: float, now_s: float) -> None:
         """Count a prediction that was computed and published between two times."""
         self._prediction, self._predicted_s = prediction, now_s
         self.counts['predictions'] += 1
-        self.counts.update(f'scene_{name}' for name in REPORTED_NOTES if prediction.notes.get(name))
+        self.counts.update(f'scene_{name}' for name in ('hand_inside', 'no_way') if prediction.notes.get(name))
         self._cycle_ms.append(1e3 * (now_s - start_s))
 
     def note_late(self, reason: str) -> None:
@@ -101,16 +202,13 @@ class Monitor:
         recent = totals - self._reported
         hand, repeated = self._freshness.inputs[HAND], recent['hand_duplicate']
         poses = hand.received - hand.reported
-        checks = (
-            (not_ready_reason is not None, f'no prediction: {not_ready_reason}'),
-            (
-                2 * repeated >= poses > 0,
-                f'hand_pose: stamps repeat: {repeated} of {poses} poses have that of the pose before',
-            ),
-            (busy_s > BUSY_S, f'busy: a prediction has been computed for {busy_s:.1f} s'),
-            (recent['predict_too_late'] > 0, f'busy: {self._late}'),
-        )
-        reasons = [*unheard, *(text for is_found, text in checks if is_found)]
+        checks = {
+            f'no prediction: {not_ready_reason}': not_ready_reason is not None,
+            f'hand_pose: stamps repeat: {repeated} of {poses} poses have that of the pose before': 2 * repeated >= poses > 0,
+            f'busy: a prediction has been computed for {busy_s:.1f} s': busy_s > BUSY_S,
+            f'busy: {self._late}': recent['predict_too_late'] > 0,
+        }
+        reasons = [*unheard, *(text for text, is_found in checks.items() if is_found)]
         values = self._list_values(now_s, state, totals, recent)
         is_fresh = self._predicted_s is not None and now_s - self._predicted_s < BUSY_S
         if is_fresh and not recent['predict_over_budget'] and not recent['predict_too_late']:
@@ -134,6 +232,10 @@ class Monitor:
 
     def _list_values(self, now_s: float, state: str, totals: Counter[str], recent: Counter[str]) -> dict[str, str]:
         pipeline, seconds = self._intake.pipeline, max(now_s - self._reported_s, 1e-3)
+        pace, dispersion, movements = pipeline.learnt.pace, pipeline.learnt.dispersion, pipeline.learnt.movements
+        (arrival, factor), (now, later) = pace.find_best(pipeline.config.duration), dispersion.factors
+        durations = f'{pace.movements} movements ended, durations x {factor:.2f}, arrival {arrival}'
+        errors = f'{dispersion.errors} errors, standard deviations x {now:.2f} now, x {later:.2f} at the end'
         inputs = {}
         for role, entry in self._freshness.inputs.items():
             if entry.received:
@@ -146,7 +248,7 @@ class Monitor:
             'working frame': pipeline.frame_id if pipeline.frame_id is not None else 'not known yet',
             **{f'obstacles of {source}': str(len(part.obstacles)) for source, part in pipeline.scene.sources.items()},
             'goals': 'none yet' if pipeline.scene.goals is None else str(len(pipeline.scene.goals)),
-            'operator': _describe_learnt(pipeline),
+            'operator': f'{durations}; {errors}; {len(movements.learnt)} movements recorded, {movements.refused} refused',
             **inputs,
             'prediction rate [Hz]': f'{recent["predictions"] / seconds:.1f}',
             'prediction age [s]': 'none yet' if self._predicted_s is None else f'{now_s - self._predicted_s:.3f}',
@@ -160,35 +262,24 @@ class Monitor:
         }
 
 
-def _describe_learnt(pipeline: Pipeline) -> str:
-    """Return what was learnt of the operator and of the scene, and from how many movements and errors."""
-    pace, dispersion, movements = pipeline.learnt.pace, pipeline.learnt.dispersion, pipeline.learnt.movements
-    arrival, factor = pace.find_best(pipeline.config.duration)
-    durations = f'{pace.movements} movements ended, durations x {factor:.2f}, arrival {arrival}'
-    now, later = dispersion.factors
-    errors = f'{dispersion.errors} errors, standard deviations x {now:.2f} now, x {later:.2f} at the end'
-    return f'{durations}; {errors}; {len(movements.learnt)} movements recorded, {movements.refused} refused'
-
-
 def _describe_prediction(prediction: Prediction | None) -> dict[str, str]:
     if prediction is None:
         return {}
+    candidates = {}
+    for each in prediction.candidates:
+        solution, text = each.solution, each.solution.message
+        if each.has_likelihood:
+            text = f'likelihood {each.likelihood:.3f}, eta {solution.eta:.3f}, effort {solution.effort:.4g}'
+            text += f', answer of {each.age_s:.3g} s ago' if each.age_s else ''
+        separator = ', ' if each.has_likelihood else ': '
+        candidates[f'candidate {each.candidate.label}'] = f'{solution.status.value}{separator}{text}'
     return {
         'most likely': prediction.most_likely or 'none',
         'unknown': f'{prediction.unknown:.3f}',
         'other goal': f'{prediction.other:.3f}',
-        **{f'candidate {each.candidate.label}': _describe_candidate(each) for each in prediction.candidates},
+        **candidates,
         **{f'note {name}': str(count) for name, count in sorted(prediction.notes.items())},
     }
-
-
-def _describe_candidate(outcome: PredictedCandidate) -> str:
-    solution = outcome.solution
-    if not outcome.has_likelihood:
-        return f'{solution.status.value}: {solution.message}'
-    numbers = f'likelihood {outcome.likelihood:.3f}, eta {solution.eta:.3f}, effort {solution.effort:.4g}'
-    age = f', answer of {outcome.age_s:.3g} s ago' if outcome.age_s else ''
-    return f'{solution.status.value}, {numbers}{age}'
 
 
 def _describe_percentiles(milliseconds: deque[float]) -> str:

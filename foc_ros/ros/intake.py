@@ -58,7 +58,9 @@ class Intake:
         self._counts: Counter[str] = Counter()
         self._handlers: dict[str, Callable[[Any, Place], SampleStatus]] = {
             topics.HAND: self._take_hand,
-            topics.CLOUD: self._take_cloud,
+            topics.CLOUD: lambda message, place: self._set_obstacles(
+                'cloud', topics.CLOUD, decode_point_cloud(message, pipeline.config.plane, place)
+            ),
             topics.MARKERS: self._take_markers,
             topics.COLLISION: self._take_collision_object,
             topics.DETECTIONS: self._take_detections,
@@ -140,9 +142,6 @@ class Intake:
         """Pass the obstacles of a source to the pipeline, and count the parts of their message that were left out."""
         status = self.pipeline.set_obstacles(source, decoded.obstacles, decoded.stamp_ns, decoded.frame_id)
         return self._count_dropped(role, decoded.dropped, status)
-
-    def _take_cloud(self, message: Any, place: Place) -> SampleStatus:
-        return self._set_obstacles('cloud', topics.CLOUD, decode_point_cloud(message, self.pipeline.config.plane, place))
 
     def _take_detections(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config

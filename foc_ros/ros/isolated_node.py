@@ -23,14 +23,8 @@ from foc_ros.core.errors import FocError
 
 DOMAINS = range(1, 102)
 """Domains whose ports are below the ephemeral ports of Linux."""
-USED_PORTS, UNUSED_PORT = (0, *range(10, 30, 2)), 5
-"""Ports of a domain, from its first one: for the discovery of all participants and of each of the first ten, and one that DDS
-leaves free (specification of DDSI-RTPS, 9.6.1)."""
-STOP_S = 5.0
-"""Seconds after SIGTERM at which a node that is still running is killed."""
 _turns = count(37 * os.getpid())
 """The domains are taken in turn, and processes that start one after another begin far from each other."""
-_PR_SET_PDEATHSIG = 1
 _PRCTL = ctypes.CDLL(None).prctl if sys.platform == 'linux' else None
 """Loaded here: between fork and exec of a process with threads, a library must not be loaded."""
 
@@ -39,34 +33,21 @@ class NodeDiedError(FocError):
     """The node ended unexpectedly or did not connect."""
 
 
-def private_environment(domain: int, log_directory: Path) -> dict[str, str]:
-    """Return environment variables of a ROS graph in a domain on this host only, with its logs in a directory."""
-    removed = ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS', 'ROS_DISCOVERY_SERVER')
-    inherited = {name: value for name, value in os.environ.items() if name not in removed}
-    package = str(Path(foc_ros.__file__).parents[1])
-    return inherited | {
-        'ROS_DOMAIN_ID': str(domain),
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_LOG_DIR': str(log_directory),
-        'PYTHONPATH': os.pathsep.join(filter(None, [package, os.environ.get('PYTHONPATH')])),
-        'PYTHONUNBUFFERED': '1',
-    }
-
-
 @contextmanager
 def reserve_domain() -> Iterator[int]:
     """Yield a domain in which no other program of this host has a participant, and reserve it within the context.
 
-    The ports of its first participants have to be free. The reservation is a port of the domain that DDS does not use; it also
-    excludes a program that has chosen this domain and has not joined it yet.
+    The ports for the discovery of all participants and of each of the first ten have to be free (specification of DDSI-RTPS,
+    9.6.1). The reservation is a port of the domain that DDS does not use; it also excludes a program that has chosen this domain
+    and has not joined it yet.
     """
     for turn in islice(_turns, len(DOMAINS)):
         domain = DOMAINS[turn % len(DOMAINS)]
         base = 7400 + 250 * domain
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as reserved:
             try:
-                reserved.bind(('', base + UNUSED_PORT))
-                for port in USED_PORTS:
+                reserved.bind(('', base + 5))
+                for port in (0, *range(10, 30, 2)):
                     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
                         probe.bind(('', base + port))
             except OSError:
@@ -79,12 +60,18 @@ def reserve_domain() -> Iterator[int]:
 @contextmanager
 def isolated_graph() -> Iterator[tuple[int, Path]]:
     """Join a ROS graph of its own within the context, also with new processes; yield its domain and the folder for its logs."""
-    before = dict(os.environ)
+    before, package = dict(os.environ), str(Path(foc_ros.__file__).parents[1])
     with tempfile.TemporaryDirectory(prefix='foc_ros_graph_') as logs, reserve_domain() as domain:
-        environment = private_environment(domain, Path(logs))
         try:
-            os.environ.clear()
-            os.environ.update(environment)
+            for name in ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS', 'ROS_DISCOVERY_SERVER'):
+                os.environ.pop(name, None)
+            os.environ |= {
+                'ROS_DOMAIN_ID': str(domain),
+                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+                'ROS_LOG_DIR': logs,
+                'PYTHONPATH': os.pathsep.join(filter(None, [package, os.environ.get('PYTHONPATH')])),
+                'PYTHONUNBUFFERED': '1',
+            }
             yield domain, Path(logs)
         finally:
             os.environ.clear()
@@ -92,9 +79,7 @@ def isolated_graph() -> Iterator[tuple[int, Path]]:
 
 
 class NodeProcess:
-    """The node as a process that starts on entering the context and has ended on leaving it.
-
-    It also ends with the thread that started it.
+    """The node as a process that starts on entering the context, and has ended on leaving it or with the thread that started it.
 
     environment: variables of the process; log: file for its output; arguments: those of ROS. Attributes: pid; is_clean, whether
     it has ended, without an error.
@@ -113,7 +98,8 @@ class NodeProcess:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C does not reach the node: __exit__ ends it
-                preexec_fn=_end_with_parent,  # noqa: PLW1509 (one system call, without a lock)
+                # Linux ends the node (PR_SET_PDEATHSIG) if this process is killed and cannot do so: one call, without a lock
+                preexec_fn=_PRCTL and (lambda: _PRCTL(1, signal.SIGTERM)),  # noqa: PLW1509
             )
         self.pid, self.is_clean = self._process.pid, False
         return self
@@ -121,7 +107,7 @@ class NodeProcess:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._process.terminate()
         try:
-            self._process.wait(STOP_S)
+            self._process.wait(5.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -133,9 +119,3 @@ class NodeProcess:
         if code is not None:
             lines = self._log.read_text(encoding='utf-8', errors='replace').strip().splitlines()[-5:]
             raise NodeDiedError(f'the node ended with exit code {code}: {" | ".join(lines) or "it printed nothing"}')
-
-
-def _end_with_parent() -> None:
-    """Let Linux end the node if this process is killed and cannot do so."""
-    if _PRCTL is not None:
-        _PRCTL(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -17,14 +17,6 @@ from foc_ros.core.errors import FocError, list_messages, print_warnings
 
 from .parameters import check_parameter_files
 
-SPIN_S = 0.1
-"""Longest time between two checks of the stop flag [s]."""
-SWITCH_S = 0.0002
-"""Longest time for which the thread of the predictions keeps the others waiting for the interpreter [s]: an update of guidance
-gives the interpreter away several times."""
-END_S = 0.5
-"""Time after which a prediction that is still being computed does not delay the end of the process [s]."""
-
 
 class StopSignals:
     """Ends the process on SIGINT and SIGTERM: at once while it imports, and by :attr:`is_requested` after :meth:`defer`.
@@ -82,14 +74,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if 'initialize logging' in str(error):
             error.add_note('ROS_LOG_DIR names another directory for the log')
         return _reject(error)
-    sys.setswitchinterval(SWITCH_S)
+    # an update of guidance gives the interpreter away several times, and the thread of the predictions is to return it soon
+    sys.setswitchinterval(0.0002)
     gc.collect()
     gc.freeze()  # these objects stay alive: a full collection over them would delay a prediction by 80 ms
     executor = create_executor(context)
     executor.add_node(node)
     while not stop.is_requested and context.ok():
         try:
-            executor.spin_once(timeout_sec=SPIN_S)
+            executor.spin_once(timeout_sec=0.1)
             node.rest()
         except ExternalShutdownException:
             break
@@ -99,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     node.destroy_node()
     executor.shutdown()
     context.try_shutdown()
-    if node.is_busy_after(END_S):
+    if node.is_busy_after(0.5):
         os._exit(0)  # otherwise the interpreter waits for the computation
     return 0
 

@@ -11,11 +11,8 @@ is received or asked for meanwhile is done at once: after a reset, a release of 
 of the managed node, nothing that was computed before is published.
 
 It is a managed node. Once configured it subscribes and keeps the scene; it predicts only while it is active, from the first hand
-pose after its activation. With `autostart`, the default, it is active at once.
-
-A player whose messages must all be received waits until each of its publishers has a subscription
-(`Publisher.get_subscription_count()`) and each of its subscriptions a publisher, publishes the scene, and publishes the hand only
-when `/diagnostics` counts the obstacles and goals. Messages on the hand's best-effort topic before that may be lost.
+pose after its activation. With `autostart`, the default, it is active at once. `player` does what a player has to do whose
+messages must all be received.
 """
 
 from __future__ import annotations
@@ -38,9 +35,8 @@ from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
 
 from . import endpoints
-from .freshness import SOURCE_TOPICS, Freshness
 from .guidance import GuidanceTopics
-from .health import THROTTLE_S, Monitor
+from .health import SOURCE_TOPICS, THROTTLE_S, Freshness, Monitor
 from .intake import Arrival, Intake
 from .messages.encode_prediction import OUTPUTS, encode_outputs
 from .messages.types import RclpyTypes
@@ -49,8 +45,6 @@ from .parameters import AUTOSTART
 from .transforms import Transforms
 from .worker import Computation, Worker
 
-RETRY_S = 0.01
-"""Time between two checks of messages that are held until their transform is known [s]."""
 REST_S, LONGEST_REST_S = 0.004, 0.02
 """Shortest and longest time for which the poses of a fast hand gather before they are taken together [s]."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
@@ -65,7 +59,7 @@ class FocNode(LifecycleNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
-        self._live_parameters = LiveParameters(self, declare_parameters(self, Config()), self._reconfigure)
+        self._live_parameters = LiveParameters(self, declare_parameters(self), self._reconfigure)
         self._library = load_library(self._live_parameters.config.homotopy.library)
         self._types = RclpyTypes()
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
@@ -81,7 +75,7 @@ class FocNode(LifecycleNode):
         except ImportError:  # tf2 is optional
             self._tf = None
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._retries = self.create_timer(RETRY_S, self._take_held, clock=steady)
+        self._retries = self.create_timer(0.01, self._take_held, clock=steady)  # of messages that wait for their transforms
         self._worker = Worker(self, self._finish)
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)

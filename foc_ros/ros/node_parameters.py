@@ -20,11 +20,11 @@ from foc_ros.core.errors import FocError, ParameterError, collect, join_errors, 
 from .parameters import AUTOSTART, KNOWN, NODE_ONLY
 
 
-def declare_parameters(node: Any, config: Config) -> Config:
+def declare_parameters(node: Any) -> Config:
     """Declare every parameter and `autostart` on a node, and return the configuration with which it starts.
 
-    config: the defaults. The node must be created with `automatically_declare_parameters_from_overrides`: the values that it was
-    started with are checked together. Raises ParameterError, also for an unknown name, with a note for every further error.
+    The node must be created with `automatically_declare_parameters_from_overrides`: the values that it was started with are
+    checked together. Raises ParameterError, also for an unknown name, with a note for every further error.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix('').items()}
     errors: list[FocError] = []
@@ -36,7 +36,7 @@ def declare_parameters(node: Any, config: Config) -> Config:
     autostart = given.get(AUTOSTART, True)
     if not isinstance(autostart, bool):
         errors.append(ParameterError(AUTOSTART, 'true or false', repr(autostart)))
-    checked = collect(errors, replace_values, config, {name: value for name, value in given.items() if name in KNOWN})
+    checked = collect(errors, replace_values, Config(), {name: value for name, value in given.items() if name in KNOWN})
     if checked is None or errors:
         raise join_errors(errors)
     values = flatten(checked)
@@ -45,11 +45,6 @@ def declare_parameters(node: Any, config: Config) -> Config:
     rows.append((AUTOSTART, autostart, ParameterDescriptor(description=meaning, read_only=True)))
     node.declare_parameters('', rows, ignore_override=True)
     return checked
-
-
-def read_config(node: Any) -> Config:
-    """Return the configuration of a node's declared parameters."""
-    return replace_values(Config(), {name: node.get_parameter(name).value for name in KNOWN})
 
 
 def _build_descriptor(parameter: Parameter) -> ParameterDescriptor:
@@ -99,5 +94,5 @@ class LiveParameters:
 
     def _accept(self, changed: list[RosParameter]) -> None:
         if any(each.name in KNOWN for each in changed):
-            self.config = read_config(self._node)
+            self.config = replace_values(Config(), {name: self._node.get_parameter(name).value for name in KNOWN})
             self._apply(self.config)

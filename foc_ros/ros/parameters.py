@@ -13,20 +13,16 @@ from typing import Any
 
 import yaml
 
-from foc_ros.core.config import Config, Parameter, flatten, list_parameters, replace_values
+from foc_ros.core.config import Config, flatten, list_parameters, replace_values
 from foc_ros.core.errors import InputError, ParameterError, warn
 from foc_ros.io.documents import read_document
 
 NODE = '/foc'
 """Name of the node, with its namespace, unless it is started with another one."""
-_NAME = re.compile(r'(/(\*\*?|[A-Za-z_]\w*))+', re.ASCII)
-"""Names of nodes in a parameter file as rcl allows them."""
-_REMAP = re.compile(r'__(node|name|ns):=(\S+)')
 AUTOSTART = 'autostart'
 NODE_ONLY = ('use_sim_time', 'start_type_description_service', 'qos_overrides', AUTOSTART)
 """Parameters of the node alone, which may stand in the same file; the predictor does not use them."""
 KNOWN = {parameter.name: parameter for parameter in list_parameters()}
-_WIDTH = 100
 
 
 def load_parameter_file(path: Path | str) -> Config:
@@ -45,7 +41,8 @@ def check_parameter_files(arguments: Sequence[str]) -> None:
     ROS reads some of them in another way: of a key that is given twice it takes the last, and it skips a section that is not for
     the node without a word. The node itself checks the values that result from files and arguments.
     """
-    names = {'node': 'foc', 'ns': ''} | {key.replace('name', 'node'): value for key, value in _REMAP.findall(' '.join(arguments))}
+    given = re.findall(r'__(node|name|ns):=(\S+)', ' '.join(arguments))
+    names = {'node': 'foc', 'ns': ''} | {key.replace('name', 'node'): value for key, value in given}
     node = f'/{names["ns"].strip("/")}/{names["node"]}'.replace('//', '/')
     for option, path in pairwise(arguments):
         if option == '--params-file':
@@ -84,12 +81,12 @@ def _list_sections(group: Mapping[Any, object], path: str, name: str = '') -> It
     """Yield the sections of a parameter file, each with the name of its nodes, which may be nested."""
     for key, value in group.items():
         inner = name if key == 'ros__parameters' else f'{name.rstrip("/")}/{str(key).removeprefix("/" if not name else "")}'
-        if not _NAME.fullmatch(inner) and inner != '/':
+        if not re.fullmatch(r'(/(\*\*?|[A-Za-z_]\w*))+', inner, re.ASCII) and inner != '/':  # as rcl allows it
             expected = 'the name of a node, such as /foc, or /** for any number of its parts and /* for one'
             raise ParameterError(path, f'{expected}, above ros__parameters', inner or 'none')
         if not isinstance(value, Mapping) or (not value and inner != name):
             given = group if name else value
-            raise ParameterError(f'{path}: {name or inner}', 'ros__parameters with parameters below it', repr(given)[:_WIDTH])
+            raise ParameterError(f'{path}: {name or inner}', 'ros__parameters with parameters below it', repr(given)[:100])
         if inner == name:
             yield name, value
         else:
@@ -123,9 +120,16 @@ def dump_parameter_file(config: Config) -> str:
         if head != group:
             lines.append(f'    {head}:')
             group = head
-        indent = ' ' * (6 if head else 4)
+        bound, indent = parameter.bound, ' ' * (6 if head else 4)
+        parts = [f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning]
+        if bound.low is not None and bound.high is not None:
+            parts.append(f'{bound.low:g} to {bound.high:g}')
+        if choices := tuple(bound.choices):
+            parts.append(' | '.join(choices))
+        if bound.read_only:
+            parts.append('fixed once the node runs')
         value = yaml.safe_dump(values[parameter.name], default_flow_style=True).splitlines()[0]
-        lines += [f'{indent}# {_describe(parameter)}', f'{indent}{leaf}: {value}']
+        lines += [f'{indent}# {"; ".join(parts)}', f'{indent}{leaf}: {value}']
     return '\n'.join(lines) + '\n'
 
 
@@ -135,16 +139,3 @@ def write_parameter_file(option: str, file: Path, config: Config) -> None:
         file.write_text(dump_parameter_file(config), encoding='utf-8')
     except OSError as error:
         raise InputError(option, 'a file that can be written', f'{file}: {error.strerror}') from error
-
-
-def _describe(parameter: Parameter) -> str:
-    """Return the description, unit, and range or choices of a parameter in one line."""
-    bound, choices = parameter.bound, tuple(parameter.bound.choices)
-    parts = [f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning]
-    if bound.low is not None and bound.high is not None:
-        parts.append(f'{bound.low:g} to {bound.high:g}')
-    if choices:
-        parts.append(' | '.join(choices))
-    if bound.read_only:
-        parts.append('fixed once the node runs')
-    return '; '.join(parts)

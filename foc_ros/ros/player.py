@@ -23,8 +23,6 @@ from .messages.types import find_message_class
 
 CONNECT_S = 30.0
 """Timeout of the connection to the node, which starts in about one second."""
-RETRY_S = 0.2
-"""Seconds between two attempts to send the scene to the node."""
 QUIET_S, LAST_ANSWER_S = 0.5, 5.0
 """After the last input the player ends once nothing has arrived for QUIET_S, and at the latest after LAST_ANSWER_S."""
 DEPTH = 200
@@ -82,8 +80,7 @@ class Player:
         """Wait until all topics are connected and the other node is ready; return False if tick returns False before.
 
         The two ends of a topic discover each other at different times, and a message sent between is lost. So the first message
-        of every input except the hand is repeated until the node says that it has the scene. Raises NodeDiedError after
-        CONNECT_S.
+        of every input except the hand is repeated until the node has the scene. Raises NodeDiedError after CONNECT_S.
         """
         deadline = time.monotonic() + CONNECT_S
         first = {item.role: item for item in reversed(self._items) if item.role != topics.HAND}
@@ -92,7 +89,7 @@ class Player:
                 raise NodeDiedError(f'the node did not connect within {CONNECT_S:g} s: {", ".join(missing) or "no scene"}')
             for item in () if missing else first.values():
                 self._publishers[item.role].publish(bytes(item.raw))
-            self._spin(RETRY_S)
+            self._spin(0.2)
             if not self._tick():
                 return False
         return True

@@ -29,8 +29,6 @@ from .messages.decode_objects import ADD
 from .messages.decode_poses import Place, check_hand_pose, decode_frame, decode_stamp, stay
 from .messages.plane import NO_TRANSFORM, Transform
 
-MOST_HELD = 1000
-"""Largest number of messages of one input that are held: 1 s of a hand at 1 kHz."""
 KEPT_NS = 10 * NANOSECONDS
 """Time for which transforms are kept, that of tf2 [ns]; one that is older than that means that the recording starts again."""
 
@@ -74,7 +72,8 @@ class Transforms:
         queue, pipeline = self._held.get(role, ()), self._intake.pipeline
         while queue:
             message, received_s = queue[0]
-            is_overdue = now_s - received_s >= pipeline.config.frames.tolerance_s or len(queue) > MOST_HELD
+            # at most 1,000 are held: 1 s of a hand at 1 kHz
+            is_overdue = now_s - received_s >= pipeline.config.frames.tolerance_s or len(queue) > 1000
             try:
                 place, is_inexact = self._find_place(role, message, is_overdue)
                 arrival = Arrival(message, received_s, place, is_inexact=is_inexact)
@@ -168,10 +167,9 @@ class _Frame:
 
 
 class TransformTree:
-    """The frames of a recording, looked up as tf2 does, without ROS; a `TransformSource`.
+    """The frames of a recording, each with one parent, looked up as tf2 does, without ROS; a `TransformSource`.
 
-    A frame has one parent. Between the stamps of two messages the translation is interpolated linearly, the rotation along the
-    shortest arc.
+    Between two stamps the translation is interpolated linearly, the rotation along the shortest arc.
     """
 
     def __init__(self) -> None:

@@ -43,7 +43,13 @@ class Worker:
     def start(self, task: PredictionTask, received_s: float, start_s: float) -> None:
         """Begin to compute a task. The result of the task before must have been taken."""
         self.present = Computation(task, received_s, start_s, self._threads.submit(task.run))
-        self.present.result.add_done_callback(self._announce)
+
+        def announce(_: object) -> None:  # in the thread of the computation
+            executor = self._node.executor
+            if executor is not None and not self._is_stopped:
+                executor.create_task(self._notify)
+
+        self.present.result.add_done_callback(announce)
 
     def take(self) -> Computation | None:
         """Return the present computation and forget it, if it has ended; otherwise return None."""
@@ -62,9 +68,3 @@ class Worker:
         if self.present is not None:
             self.present.task.deadline.cancel()
         self._threads.shutdown(wait=False)  # a cancelled future that no thread has taken would never count as done
-
-    def _announce(self, _: object) -> None:
-        """Let the executor call `notify`; this happens in the thread of the computation."""
-        executor = self._node.executor
-        if executor is not None and not self._is_stopped:
-            executor.create_task(self._notify)

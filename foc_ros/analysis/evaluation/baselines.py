@@ -37,15 +37,6 @@ TIE = 1e-12
 PUBLISHED, REFITTED, PLAIN, UNIFORM, BOLTZMANN = 'foc', 'foc, held out', 'foc, plain rule', 'uniform', 'Boltzmann'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
-PLANNING_HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS = (
-    (0.0, 1.5, 2.5),
-    (0.0, 0.5, 1.0),
-    (1.0, 2.0, 3.0, 5.0),
-    (1.0, 4.0),
-)
-"""Values that are tried where near and far choices differ."""
-RATES = tuple(float(rate) for rate in np.geomspace(0.01, 100.0, 25))
-"""Inverse temperatures that are tried, in parts of one over the median effort to go."""
 BASELINES = Registry('baseline', {})
 
 
@@ -211,10 +202,8 @@ def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig
 
 def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
     """Return all parameters of the likelihood that are tried: one exponent for all choices, or near and far ones that differ."""
-    ahead = (
-        replace(make_ahead(published, horizon, seconds, beta), weaving=weaving)
-        for horizon, seconds, beta, weaving in product(PLANNING_HORIZONS_S, LOOKAHEADS_S, POWERS_AHEAD, WEAVINGS)
-    )
+    tried = product((0.0, 1.5, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 5.0), (1.0, 4.0))
+    ahead = (replace(make_ahead(published, *values), weaving=weaving) for *values, weaving in tried)
     return (*make_plain_rules((), published), *ahead)
 
 
@@ -229,10 +218,10 @@ def make_ahead(likelihood: LikelihoodConfig, horizon_s: float, lookahead_s: floa
 
 
 def make_boltzmann_rates(recordings: Sequence[ObservedRecording], _: LikelihoodConfig) -> tuple[float, ...]:
-    """Return the inverse temperatures [s^5/m^2] that are tried."""
+    """Return the inverse temperatures [s^5/m^2] that are tried, in parts of one over the median effort to go."""
     tables = [each.candidates for recording in recordings for each in recording.observations]
     effort = float(np.median([table.cost_to_go[table.has_likelihood].min() for table in tables]))
-    return tuple(rate / effort for rate in RATES)
+    return tuple(float(rate) / effort for rate in np.geomspace(0.01, 100.0, 25))
 
 
 def forecast_shares(

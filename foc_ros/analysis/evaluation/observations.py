@@ -26,9 +26,8 @@ from foc_ros.core.errors import FocError, RecordingError, warn
 from foc_ros.core.hand.duration import is_passing
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.plant.covariance import compute_duration_sensitivity
-from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.solution import Solution
-from foc_ros.core.types import NANOSECONDS, Array, HandState, Record
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record
 
 from .truth import TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
 
@@ -120,13 +119,11 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
         replayed = Replay(config)
     else:
         replayed.forget_scene()
-    stamps: list[int] = []
-    positions: list[Array] = []
+    samples: list[HandSample] = []
     made: list[tuple[Step, HandState, Config]] = []
     for step in replayed.steps(recording.items()):
         if step.sample is not None:
-            stamps.append(step.sample.stamp_ns)
-            positions.append(step.sample.position)
+            samples.append(step.sample)
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state, replayed.pipeline.adapted_config))
@@ -138,6 +135,7 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
         warn(losses)
     goals = made[-1][0].scene.goals
     assert goals is not None
+    stamps, positions = ([getattr(each, name) for each in samples] for name in ('stamp_ns', 'position'))
     path = RecordedPath(np.array(stamps), np.array(positions), goals, recording.goal)
     found = [make_observation(step, hand, path, adapted) for step, hand, adapted in made if hand.stamp_ns <= path.end_ns]
     if not found:
@@ -205,7 +203,10 @@ def _tabulate_candidates(
     predicted, passing = prediction.candidates, is_passing(config.duration)
     solutions = [each.solution for each in predicted]
     has_likelihood = np.array([each.has_likelihood for each in predicted])
-    sides = _tabulate_sides(predicted, obstacles)
+    sides = tabulate_sides(solutions, obstacles)
+    for row, each in zip(sides, predicted, strict=True):  # those of the label where a candidate could not be solved
+        known = {} if each.has_likelihood else dict(each.candidate.sides)
+        row[:] = [known.get(identity, side) for identity, side in zip(obstacles.ids, row, strict=True)]
     goal, grown = np.array([each.candidate.goal for each in predicted], dtype=np.intp), obstacles.grow(config.scene.hand_radius)
     named = [[identity in dict(each.candidate.sides) for identity in obstacles.ids] for each in predicted]
     return CandidateTable(
@@ -219,7 +220,13 @@ def _tabulate_candidates(
         time_s=np.array([each.times[-1] for each in solutions]),
         is_named=np.array(named, dtype=bool).reshape(len(predicted), len(obstacles)),
         sides=sides,
-        mean=np.array([interpolate_path(each) for each in solutions]),
+        mean=np.array(
+            [
+                # the cubic through positions and velocities
+                CubicHermiteSpline(each.times, each.path, each.mean[:, 2:4])(np.minimum(TIMES_S, each.times[-1]))
+                for each in solutions
+            ]
+        ),
         covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]),
         duration_sensitivity=np.array(
             [interpolate_steps(compute_duration_sensitivity(each, passing)[:, :2], each.dt) for each in solutions]
@@ -229,22 +236,7 @@ def _tabulate_candidates(
     )
 
 
-def interpolate_path(solution: Solution) -> Array:
-    """Return the mean positions (h, 2) [m] at `TIMES_S`, by the cubic through positions and velocities; at the end afterwards."""
-    path = CubicHermiteSpline(solution.times, solution.mean[:, :2], solution.mean[:, 2:4])
-    return np.asarray(path(np.minimum(TIMES_S, solution.times[-1])))
-
-
 def interpolate_steps(values: Array, dt: float) -> Array:
     """Return values (N + 1, ...) at steps of dt [s] at `TIMES_S` (h, ...), linear between steps; the last one afterwards."""
     times = dt * np.arange(len(values))
     return np.asarray(make_interp_spline(times, values, k=1)(np.minimum(TIMES_S, times[-1])))
-
-
-def _tabulate_sides(predicted: Sequence[PredictedCandidate], obstacles: Obstacles) -> Sides:
-    """Return the sides (k, n) of candidates: of the solved path, or of the label where it could not be solved."""
-    sides = tabulate_sides([each.solution for each in predicted], obstacles)
-    for row, each in zip(sides, predicted, strict=True):
-        named = {} if each.has_likelihood else dict(each.candidate.sides)
-        row[:] = [named.get(identity, side) for identity, side in zip(obstacles.ids, row, strict=True)]
-    return sides

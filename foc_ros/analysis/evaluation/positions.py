@@ -38,17 +38,11 @@ from .truth import HORIZONS, HORIZONS_S, TIMES_S
 
 LEVELS = (0.5, 0.9)
 """Probabilities of the ellipses and regions."""
-FIRST_SPEED = 1.0
-"""Standard deviation of the velocity at the first sample, for the Singer model [m/s]."""
 TIMES = np.array(TIMES_S)
 EXACT = 1e-18
 """Variance of a position that is known [m^2]: that of a nanometre."""
 RINGS, SPOKES = 25, 4
 """Rings of a Gaussian, and points of a ring. A region is exact at 50 and 90 %, because the border lies between two rings."""
-GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
-"""Angle from ring to ring [rad], so that no two have their points in the same directions."""
-NEGLIGIBLE = 1e-4
-"""Likelihood below which a candidate is left out."""
 Shares = dict[str, float | None]
 """A value for each horizon, by its name; None where every recording has ended before."""
 
@@ -67,14 +61,24 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
     predicted = {
         'most likely': [each.candidates.mean[row] for each, row in zip(observations, leading, strict=True)],
         'likelihood-weighted': [np.tensordot(each.candidates.mixture, each.candidates.mean, 1) for each in observations],
-        'constant velocity': [_continue_velocity(each) for each in observations],
-        'straight minimum jerk': [_continue_minimum_jerk(each) for each in observations],
+        'constant velocity': [
+            each.hand[:2] + TIMES[:, None] * (each.hand[2:4] if each.movement_age_s > 0.0 else np.zeros(2))
+            for each in observations
+        ],
+        'straight minimum jerk': [
+            compute_straight_positions(each, int(compute_straight_costs(each).argmin()), TIMES) for each in observations
+        ],
     }
     mixtures = [(each, each.candidates.mixture, covariance) for each, covariance in zip(observations, covariances, strict=True)]
     densities = np.array([compute_log_densities(*each) for each in mixtures])
     denser = np.array([compute_denser_shares(*each) for each in mixtures])
+    true, errors = np.array([each.truth.positions for each in observations]), {}
+    for name, each in predicted.items():
+        distance = np.hypot(*(np.array(each) - true).transpose(2, 0, 1))
+        mean = np.cumsum(distance, axis=1) / np.arange(1, len(TIMES) + 1)
+        errors[name] = {'average': average(mean[:, HORIZONS]), 'final': average(distance[:, HORIZONS])}
     return {
-        'displacement_m': {name: _compute_errors(observations, np.array(each)) for name, each in predicted.items()},
+        'displacement_m': errors,
         'nlpd': {'foc': average(-densities), 'Singer Kalman': average(score_singer(recordings))},
         'inside': {f'{level:g}': find_inside(observations, leading, covariances, level) for level in LEVELS},
         'inside_taken': {f'{level:g}': find_inside(observations, taken, covariances, level) for level in LEVELS},
@@ -86,14 +90,6 @@ def average(values: Array) -> Shares:
     """Return the mean of values at the horizons (m, 3) over predictions, by horizon; nan does not count."""
     columns = {f'{horizon:g}': column for horizon, column in zip(HORIZONS_S, values.T, strict=True)}
     return {name: float(np.nanmean(each)) if np.isfinite(each).any() else None for name, each in columns.items()}
-
-
-def _compute_errors(observations: Sequence[Observation], positions: Array) -> dict[str, Shares]:
-    """Return the errors of positions (m, h, 2) [m]."""
-    true = np.array([each.truth.positions for each in observations])
-    distance = np.hypot(*(positions - true).transpose(2, 0, 1))
-    mean = np.cumsum(distance, axis=1) / np.arange(1, len(TIMES) + 1)
-    return {'average': average(mean[:, HORIZONS]), 'final': average(distance[:, HORIZONS])}
 
 
 def find_inside(observations: Sequence[Observation], rows: Sequence[int], covariances: Sequence[Array], level: float) -> Shares:
@@ -134,7 +130,7 @@ def find_denser_share(weight: Array, mean: Array, covariance: Array, position: A
     weight (k,) of normal distributions with mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2], positive definite;
     position (h, 2) [m].
     """
-    counted = weight > NEGLIGIBLE
+    counted = weight > 1e-4
     weight, mean, covariance = weight[counted] / weight[counted].sum(), mean[counted], covariance[counted]
     points = mean + np.einsum('khij,mj->mkhi', np.linalg.cholesky(covariance), POINTS)
     level = log_mixture_density(weight, position[..., None, :, :] - mean, covariance)
@@ -155,9 +151,9 @@ def log_mixture_density(weight: Array, offset: Array, covariance: Array) -> Arra
 
 
 def _make_points() -> Array:
-    """Return points (m, 2) of equal weight that represent the standard normal distribution."""
-    radii = np.sqrt(-2.0 * np.log1p(-(np.arange(RINGS) + 0.5) / RINGS))
-    angles = GOLDEN * np.arange(RINGS)[:, None] + 2.0 * np.pi / SPOKES * np.arange(SPOKES)
+    """Return points (m, 2) of equal weight that represent the standard normal distribution, no two rings in equal directions."""
+    radii, golden_angle = np.sqrt(-2.0 * np.log1p(-(np.arange(RINGS) + 0.5) / RINGS)), np.pi * (3.0 - np.sqrt(5.0))
+    angles = golden_angle * np.arange(RINGS)[:, None] + 2.0 * np.pi / SPOKES * np.arange(SPOKES)
     return np.stack([radii[:, None] * np.cos(angles), radii[:, None] * np.sin(angles)], axis=-1).reshape(-1, 2)
 
 
@@ -184,15 +180,6 @@ def _find_taken(recordings: Sequence[ObservedRecording]) -> list[int]:
     return rows
 
 
-def _continue_velocity(observation: Observation) -> Array:
-    velocity = observation.hand[2:4] if observation.movement_age_s > 0.0 else np.zeros(2)
-    return np.asarray(observation.hand[:2] + TIMES[:, None] * velocity)
-
-
-def _continue_minimum_jerk(observation: Observation) -> Array:
-    return compute_straight_positions(observation, int(compute_straight_costs(observation).argmin()), TIMES)
-
-
 class SingerSetting(NamedTuple):
     """Standard deviations of the acceleration [m/s^2] and of a measured position [m], decay time of the acceleration [s]."""
 
@@ -216,7 +203,7 @@ def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array
     accelerations, noises, _ = np.array(SINGER_SETTINGS).T
     state, covariance = np.zeros((len(SINGER_SETTINGS), 3, 2)), np.zeros((len(SINGER_SETTINGS), 3, 3))
     state[:, 0], covariance[:, 0, 0] = positions[0], noises**2
-    covariance[:, 1, 1], covariance[:, 2, 2] = FIRST_SPEED**2, accelerations**2
+    covariance[:, 1, 1], covariance[:, 2, 2] = 1.0, accelerations**2  # a velocity of 1 m/s
     wanted, means, variances, last_ns = set(at_ns.tolist()), [], [], int(stamps_ns[0])
     ahead = [_discretise(float(each)) for each in ahead_s]
     for stamp_ns, position in zip(stamps_ns.tolist(), positions, strict=True):
@@ -258,17 +245,14 @@ def _discretise(dt: float) -> tuple[Array, Array]:
 
 def score_singer(recordings: Sequence[ObservedRecording]) -> Array:
     """Return the negative log-densities (m, 3) of the true positions [nat, metres], each with the setting best for the others."""
-    tables = [_tabulate_densities(each) for each in recordings]
+    tables = []
+    for recording in recordings:
+        path, observations = recording.path, recording.observations
+        stamps_ns = np.array([each.stamp_ns for each in observations])
+        mean, variance = forecast_singer(path.stamps_ns, path.positions, stamps_ns, np.array(HORIZONS_S))
+        true = np.array([each.truth.positions[HORIZONS] for each in observations])
+        squared = ((true[:, None] - mean) ** 2).sum(axis=-1)
+        tables.append(np.log(2.0 * np.pi * variance) + squared / (2.0 * variance))  # (m, s, 3), under each setting
     table = np.array([-np.nansum(each, axis=(0, 2)) for each in tables])
     chosen = choose_held_out(table, [each.name for each in recordings])
     return np.concatenate([each[:, setting] for each, setting in zip(tables, chosen, strict=True)])
-
-
-def _tabulate_densities(recording: ObservedRecording) -> Array:
-    """Return the negative log-densities of the true positions (m, s, 3) [nat, metres] under each setting."""
-    path, observations = recording.path, recording.observations
-    stamps_ns = np.array([each.stamp_ns for each in observations])
-    mean, variance = forecast_singer(path.stamps_ns, path.positions, stamps_ns, np.array(HORIZONS_S))
-    true = np.array([each.truth.positions[HORIZONS] for each in observations])
-    squared = ((true[:, None] - mean) ** 2).sum(axis=-1)
-    return np.asarray(np.log(2.0 * np.pi * variance) + squared / (2.0 * variance))

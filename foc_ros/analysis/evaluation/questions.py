@@ -72,30 +72,26 @@ def find_relevant_obstacles(recording: ObservedRecording) -> frozenset[str]:
 
 def ask(name: str, observation: Observation, relevant: frozenset[str]) -> Question | None:
     """Return a question about the relevant obstacles, None where fewer than two answers are possible or the truth is unknown."""
-    if name == GOAL:
-        return _ask_goal(observation)
     truth, candidates = observation.truth, observation.candidates
+    if name == GOAL:
+        count = len(observation.goals)
+        if truth.goal is None or count < 2:
+            return None
+        answers, given = tuple((goal,) for goal in range(count)), candidates.goal.astype(np.intp)
+        return Question(GOAL, np.zeros(0, dtype=np.intp), count, answers, given, np.ones(count, dtype=bool), truth.goal)
     is_relevant = np.array([identity in relevant for identity in observation.ids], dtype=bool)
     ahead = np.flatnonzero(truth.is_ahead & is_relevant)
     if name == GAP and len(ahead):
         ahead = ahead[observation.row[ahead] == observation.row[ahead].min()]
     indices: dict[Answer, int] = {}
-    given = [indices.setdefault(tuple(sides), len(indices)) for sides in candidates.sides[:, ahead].tolist()]
+    rows = [indices.setdefault(tuple(sides), len(indices)) for sides in candidates.sides[:, ahead].tolist()]
     true = indices.setdefault(tuple(truth.sides[ahead].tolist()), len(indices))
-    answers, row = np.array([*indices]), observation.row[ahead]
-    possible, is_possible = 1, np.ones(len(answers), dtype=bool)
+    listed, row = np.array([*indices]), observation.row[ahead]
+    possible, is_possible = 1, np.ones(len(listed), dtype=bool)
     for number in np.unique(row):
         gaps = np.unique(observation.gaps[number][:, ahead[row == number]], axis=0)
         possible *= len(gaps)
-        is_possible &= (answers[:, None, row == number] == gaps).all(axis=2).any(axis=1)
+        is_possible &= (listed[:, None, row == number] == gaps).all(axis=2).any(axis=1)
     if possible < 2:
         return None
-    return Question(name, ahead, possible, tuple(indices), np.array(given, dtype=np.intp), is_possible, true)
-
-
-def _ask_goal(observation: Observation) -> Question | None:
-    count, truth = len(observation.goals), observation.truth.goal
-    if truth is None or count < 2:
-        return None
-    answers, given = tuple((goal,) for goal in range(count)), observation.candidates.goal.astype(np.intp)
-    return Question(GOAL, np.zeros(0, dtype=np.intp), count, answers, given, np.ones(count, dtype=bool), truth)
+    return Question(name, ahead, possible, tuple(indices), np.array(rows, dtype=np.intp), is_possible, true)

@@ -27,22 +27,12 @@ from .scores import TENTHS, Scores, choose_held_out, compare_scores, compute_log
 
 FITTED_TO = {PATH_CLASS: PATH_CLASS, GAP: PATH_CLASS, GOAL: GOAL}
 """The question by whose answers the settings of a predictor are chosen, for each question that it is scored by."""
-LogLikelihoods = dict[tuple[str, str], Array]
-"""Log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor."""
-SUBJECTS = {PATH_CLASS: 'Homotopy classes', GAP: 'Next gaps', GOAL: 'Goals'}
 OURS = 'likelihood-weighted'
 """The predicted positions that are compared with those of the baselines."""
-COVERAGE_S, COVERAGE_LEVEL, TOLERANCE = '0.5', 0.9, 0.05
-"""Horizon and probability of the region that is judged, and the error of its share that counts as none."""
-ALIKE = 0.02
-"""Relative difference below which two errors of positions are alike."""
+COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
+"""Horizon and probability of the region that is judged."""
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, columns, rows."""
-GAIN_TITLES = {
-    PATH_CLASS: 'Homotopy class: log-likelihood above uniform [nat]',
-    GOAL: 'Goal: log-likelihood above uniform [nat]',
-}
-TOTALS = ('', 'gain', 'ECE', 'Brier', 'correct [%]', 'leads from [%]', 'leads for [s]')
 GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
 REGIONS = {
     'inside': 'ellipse of the most likely candidate',
@@ -61,6 +51,7 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
     """
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
+    # log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor
     tables = collect_all(_tabulate_log_likelihoods, items, 'compare')
     table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
     names = [each.name for each in recordings]
@@ -93,7 +84,7 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
     return answer | {'verdict': make_verdict(answer)}
 
 
-def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> LogLikelihoods:
+def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]) -> dict[tuple[str, str], Array]:
     recording, baselines = item
     questions = {name: ask_all(recording, name) for name in (PATH_CLASS, GOAL)}
     return {(name, each.name): compute_log_likelihoods(questions[name], each) for name in questions for each in baselines}
@@ -129,9 +120,8 @@ def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -
     else:
         return {}
     stated = {row.cells['recording']: row.cells for row in rows}
-    differences = {
-        each.name: compare(each.observations[0], stated[each.name]) if each.name in stated else 'no label' for each in recordings
-    }
+    found = ((each.name, each.observations[0], stated.get(each.name)) for each in recordings)
+    differences = {name: compare(first, cells) if cells else 'no label' for name, first, cells in found}
     return {name: words for name, words in differences.items() if words}
 
 
@@ -155,16 +145,29 @@ def _compare_sides(first: Observation, cells: Mapping[str, str]) -> str:
 def find_gaps(observation: Observation) -> list[int]:
     """Return the gap that the hand really took in each row still ahead, counted from low x."""
     truth, row = observation.truth, observation.row
-    left_is_low = observation.left[0] < 0.0
-    is_higher = (truth.sides == LEFT) != left_is_low
+    is_higher = (truth.sides == LEFT) != (observation.left[0] < 0.0)
     return [int(is_higher[(row == each) & truth.is_ahead].sum()) for each in np.unique(row[truth.is_ahead])]
 
 
 def make_verdict(answer: Mapping[str, Any]) -> list[str]:
-    """Return the sentences about an answer of `evaluate --json`."""
-    questions = [_judge_question(name, each) for name, each in answer['comparisons'].items()]
-    positions = answer['positions']
-    return [*questions, *_judge_positions(positions['displacement_m']), *_judge_region(positions['inside_all'])]
+    """Return the sentences about an answer of `evaluate --json`; two errors of positions are alike within 2 %."""
+    sentences = [_judge_question(name, each) for name, each in answer['comparisons'].items()]
+    errors = answer['positions']['displacement_m']
+    for horizon, ours in errors[OURS]['final'].items():
+        others = {name: each['final'][horizon] for name, each in errors.items() if name not in (OURS, 'most likely')}
+        judged = []
+        for name, each in others.items() if ours is not None else ():
+            word = 'like' if abs(ours - each) <= 0.02 * each else 'better than' if ours < each else 'worse than'
+            judged.append(f'{word} {name} ({1e3 * each:.0f} mm)')
+        if judged:
+            sentences.append(f'Positions {horizon} s ahead: {1e3 * ours:.0f} mm away on average, {", ".join(judged)}.')
+    share = answer['positions']['inside_all'][f'{COVERAGE_LEVEL:g}'][COVERAGE_S]
+    if share is not None:
+        is_right = abs(share - COVERAGE_LEVEL) <= 0.05
+        words = 'about right' if is_right else 'too narrow' if share < COVERAGE_LEVEL else 'too wide'
+        holds = f'holds {100 * share:.0f} % of the true positions {COVERAGE_S} s ahead, so it is {words}.'
+        sentences.append(f'Uncertainty: the region of {100 * COVERAGE_LEVEL:.0f} % {holds}')
+    return sentences
 
 
 def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
@@ -177,66 +180,46 @@ def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
         words = f'{baseline} ({factor * each["difference"]:+.2g} {unit}{where})'
         groups['better than' if low > 0.0 else 'worse than' if high < 0.0 else 'not distinguishable from'].append(words)
     judged = '; '.join(f'{verdict} {", ".join(each)}' for verdict, each in groups.items() if each)
-    return f'{SUBJECTS[name]}: {PUBLISHED} is {judged}.'
-
-
-def _judge_positions(errors: Mapping[str, Any]) -> list[str]:
-    """Return a sentence for each horizon with the final errors of the baselines beside ours."""
-    sentences = []
-    for horizon, ours in errors[OURS]['final'].items():
-        others = {name: each['final'][horizon] for name, each in errors.items() if name not in (OURS, 'most likely')}
-        if ours is not None:
-            judged = ', '.join(f'{_judge_error(ours, each)} {name} ({1e3 * each:.0f} mm)' for name, each in others.items())
-            sentences.append(f'Positions {horizon} s ahead: {1e3 * ours:.0f} mm away on average, {judged}.')
-    return sentences
-
-
-def _judge_error(ours: float, other: float) -> str:
-    if abs(ours - other) <= ALIKE * other:
-        return 'like'
-    return 'better than' if ours < other else 'worse than'
-
-
-def _judge_region(inside: Mapping[str, Any]) -> list[str]:
-    share = inside[f'{COVERAGE_LEVEL:g}'][COVERAGE_S]
-    if share is None:
-        return []
-    is_right = abs(share - COVERAGE_LEVEL) <= TOLERANCE
-    judged = 'about right' if is_right else 'too narrow' if share < COVERAGE_LEVEL else 'too wide'
-    return [
-        f'Uncertainty: the region of {100 * COVERAGE_LEVEL:.0f} % holds {100 * share:.0f} % of the true positions {COVERAGE_S} s '
-        f'ahead, so it is {judged}.'
-    ]
+    subject = {PATH_CLASS: 'Homotopy classes', GAP: 'Next gaps', GOAL: 'Goals'}[name]
+    return f'{subject}: {PUBLISHED} is {judged}.'
 
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
     """Yield the tables of an answer of `evaluate --json`."""
     questions = answer['questions']
     tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
-    for name, title in GAIN_TITLES.items():
+    for name, subject in ((PATH_CLASS, 'Homotopy class'), (GOAL, 'Goal')):
         if name in questions:
+            title = f'{subject}: log-likelihood above uniform [nat]'
             by_predictor = questions[name].items()
             lines = [_format_tenths(predictor, each, 'gain') for predictor, each in by_predictor]
             yield f'{title}, by tenths of the movement', tenths, lines
-            yield f'{title}, of all', TOTALS, [_format_totals(predictor, each) for predictor, each in by_predictor]
+            totals = ('', 'gain', 'ECE', 'Brier', 'correct [%]', 'leads from [%]', 'leads for [s]')
+            lines = []
+            for predictor, each in by_predictor:
+                numbers = [_number(each[score], 3) for score in ('gain', 'expected_calibration_error', 'brier')]
+                leads = _percent(each['leads_for_good_from']), _number(each['leads_for_good_before_s'], 2)
+                lines.append((predictor, *numbers, _percent(each['right']), *leads))
+            yield f'{title}, of all', totals, lines
     if GAP in questions:
         by_predictor = questions[GAP].items()
         yield GAP_TITLE, tenths, [_format_tenths(predictor, each, 'right') for predictor, each in by_predictor]
         halves: list[tuple[str, ...]] = [(predictor, _percent(each['right_from_half_way'])) for predictor, each in by_predictor]
         yield 'Gap in the next row', ('', 'correct in the second half [%]'), halves
     yield from _make_position_tables(answer['positions'])
-    yield '', ('', ''), list(_list_facts(answer))
+    facts = [
+        ('recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'),
+        ('predictions', str(answer['predictions'])),
+    ]
+    for question, settings in answer['settings'].items():
+        known = {name: setting for name, setting in settings.items() if setting is not None}
+        facts += [(f'{question}, best setting\n{name}', _format_setting(setting)) for name, setting in known.items()]
+    yield '', ('', ''), [*facts]
 
 
 def _format_tenths(predictor: str, scores: Mapping[str, Any], score: str) -> tuple[str, ...]:
     shown = [_percent(each[score], 0) if score == 'right' else _number(each[score], 2) for each in scores['by_tenth']]
     return (predictor, *shown)
-
-
-def _format_totals(predictor: str, scores: Mapping[str, Any]) -> tuple[str, ...]:
-    numbers = [_number(scores[name], 3) for name in ('gain', 'expected_calibration_error', 'brier')]
-    leads = _percent(scores['leads_for_good_from']), _number(scores['leads_for_good_before_s'], 2)
-    return (predictor, *numbers, _percent(scores['right']), *leads)
 
 
 def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:
@@ -255,15 +238,6 @@ def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:
         for level, by in positions[name].items()
     ]
     yield 'True positions inside [%]', ('', *(f'{each} s' for each in horizons)), inside
-
-
-def _list_facts(answer: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    yield 'recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'
-    yield 'predictions', str(answer['predictions'])
-    for question, by_predictor in answer['settings'].items():
-        for name, setting in by_predictor.items():
-            if setting is not None:
-                yield f'{question}, best setting\n{name}', _format_setting(setting)
 
 
 def _format_setting(setting: Any) -> str:

@@ -24,8 +24,6 @@ HORIZONS_S = (0.25, 0.5, 1.0)
 """Those of them that are reported."""
 HORIZONS = np.array([TIMES_S.index(horizon) for horizon in HORIZONS_S])
 """Their indices."""
-RESOLUTION = 0.02
-"""Travel is counted in steps of this share of the extent of the path, so that noise at rest adds none."""
 
 Bools = NDArray[np.bool_]
 Sides = NDArray[np.int8]
@@ -47,19 +45,15 @@ class RecordedPath:
             reached, end = find_reached_goal(positions, goals if goal is None else goals[[goal]])
             self.goal = reached if goal is None else goal
         self.end_ns = int(stamps_ns[end])
-        self.travelled = self._measure_travelled()
-        whole = self.travelled[end]
-        self.progress = np.minimum(self.travelled / whole, 1.0) if whole > 0.0 else np.zeros(len(positions))
-
-    def _measure_travelled(self) -> Array:
-        """Return the distance travelled up to each position (m,) [m], counted in steps of RESOLUTION."""
-        step, last = RESOLUTION * float(np.hypot(*np.ptp(self.positions, axis=0))), self.positions[0]
-        moved = np.zeros(len(self.positions))
-        for sample, position in enumerate(self.positions[1:], 1):
+        # travel is counted in steps of a share of the extent of the path, so that noise at rest adds none
+        step, last, moved = 0.02 * float(np.hypot(*np.ptp(positions, axis=0))), positions[0], np.zeros(len(positions))
+        for sample, position in enumerate(positions[1:], 1):
             distance = float(np.hypot(*(position - last)))
             if distance >= step:
                 moved[sample], last = distance, position
-        return np.cumsum(moved)
+        self.travelled = np.cumsum(moved)
+        whole = self.travelled[end]
+        self.progress = np.minimum(self.travelled / whole, 1.0) if whole > 0.0 else np.zeros(len(positions))
 
     def interpolate(self, stamp_ns: int, seconds: Array) -> Array:
         """Return the positions (h, 2) [m] some seconds (h,) after a stamp, nan beyond the end."""
@@ -139,33 +133,21 @@ def find_open_gaps(obstacles: Obstacles, row: Rows, direction: Array, hand_radiu
     A gap is open if it is wider than the hand, hand_radius [m]; the outer gaps of a row are those between it and the walls.
     """
     left = np.array([-direction[1], direction[0]])
-    distance = _measure_distances(obstacles)
-    found = []
+    corners = obstacles.centre[:, None] + obstacles.vertices  # two convex polygons that are apart are nearest at a vertex of one
+    nearest = measure_offsets(corners, obstacles)[1].reshape(*corners.shape[:2], len(obstacles)).min(axis=1)
+    distance = np.minimum(nearest, nearest.T) - obstacles.radius[:, None] - obstacles.radius
+    found, walls = [], np.flatnonzero(row == WALL)
     for number in range(int(row.max(initial=WALL)) + 1):
         members = np.flatnonzero(row == number)
         members = members[np.argsort(obstacles.centre[members] @ left, kind='stable')]
-        right_end, left_end = (
-            distance[member, _find_walls_beside(obstacles, row, member, outwards)].min(initial=np.inf)
-            for member, outwards in ((members[0], -left), (members[-1], left))
-        )
-        is_open = np.array([right_end, *distance[members[:-1], members[1:]], left_end]) > 2.0 * hand_radius
+        ends = []
+        for member, outwards in ((members[0], -left), (members[-1], left)):
+            # the walls whose nearest point is beside the obstacle, where the vector points, rather than ahead of it
+            towards = -measure_offsets(obstacles.centre[member], obstacles.take(walls))[0][0]
+            is_beside = towards @ outwards >= np.abs(towards @ [outwards[1], -outwards[0]])
+            ends.append(distance[member, walls[is_beside]].min(initial=np.inf))
+        is_open = np.array([ends[0], *distance[members[:-1], members[1:]], ends[1]]) > 2.0 * hand_radius
         sides = np.zeros((len(members) + 1, len(obstacles)), dtype=np.int8)
         sides[:, members] = np.where(np.tri(len(members) + 1, len(members), -1), LEFT, RIGHT)
         found.append(sides[is_open])
     return tuple(found)
-
-
-def _find_walls_beside(obstacles: Obstacles, row: Rows, member: int, outwards: Array) -> NDArray[np.intp]:
-    """Return those walls whose nearest point is beside an obstacle, where a unit vector (2,) points, rather than ahead of it."""
-    walls = np.flatnonzero(row == WALL)
-    towards = -measure_offsets(obstacles.centre[member], obstacles.take(walls))[0][0]
-    is_beside: Bools = towards @ outwards >= np.abs(towards @ [outwards[1], -outwards[0]])
-    return walls[is_beside]
-
-
-def _measure_distances(obstacles: Obstacles) -> Array:
-    """Return the distances (n, n) [m] between obstacles; two convex polygons that are apart are nearest at a vertex of one."""
-    corners = obstacles.centre[:, None] + obstacles.vertices
-    nearest = measure_offsets(corners, obstacles)[1].reshape(*corners.shape[:2], len(obstacles)).min(axis=1)
-    distance: Array = np.minimum(nearest, nearest.T) - obstacles.radius[:, None] - obstacles.radius
-    return distance

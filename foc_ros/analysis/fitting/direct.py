@@ -52,27 +52,16 @@ from . import Estimate, Findings, SettingTable, clip_to_bounds, list_settings
 
 MIN_SAMPLES = 10
 POSITION_STDDEV, JERK_DENSITY = 'estimator.position_stddev', 'estimator.jerk_density'
-POSITION_STDDEVS, JERK_DENSITIES = np.geomspace(1e-5, 0.1, 13), np.geomspace(1e-3, 1e4, 22)
-"""Deviations that are tried first [m], [m/s^2.5]; no tracker of hands is better than 10 um."""
-FINE = np.geomspace(0.46, 2.16, 25)
-"""Factors on the best of them that are tried then."""
 FADING = 'estimator.acceleration_time_s'
 FADING_TIMES_S = (0.0, *np.geomspace(0.01, 0.5, 60).tolist())
 """Times that are tried; 0: the acceleration lasts."""
 CONSTANTS = {model: {f'duration.{name}': power for name, power in powers.items()} for model, powers in MODEL_CONSTANTS.items()}
 """By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""
-DISTANCE_MODELS = ('fitts',)
-"""Models whose durations depend on the distance."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""
 FACTORS = tuple(2.0 ** (np.arange(-10, 11) / 4.0))
 """Factors on the given values, 0.18 to 5.7, among which the best is sought first."""
-MIN_TIME_S = 0.1
-"""Least time to the end of a sample that is used, because the end itself is known no better."""
 WAIT = 'duration.wait_s'
-
-Sample = tuple[HandState, Array, float]
-"""State of the hand, goal (2,) [m], time left [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,80 +126,72 @@ def tabulate_innovations(
     """
     settings = list_settings({POSITION_STDDEV: position_stddevs, JERK_DENSITY: jerk_densities})
     position, jerk = np.array([tuple(each.values()) for each in settings]).T ** 2
-    return SettingTable(np.array([_compute_log_likelihoods(each, given, position, jerk) for each in hands]), settings)
-
-
-def _compute_log_likelihoods(hand: RecordedHand, given: EstimatorConfig, position: Array, jerk: Array) -> Array:
-    """Return the log-likelihood of the positions under each setting of the variances (s,)."""
-    start = jerk[:, None, None] * compute_gramian(given.gap_s)
+    start, totals = jerk[:, None, None] * compute_gramian(given.gap_s), []
     start[:, 0] = start[:, :, 0] = 0.0
     start[:, 0, 0] = position
-    mean, covariance, total, last_ns = np.zeros((len(jerk), 3, 2)), start, np.zeros(len(jerk)), None
-    for stamp_ns, z, updated in zip(hand.stamps_ns.tolist(), hand.positions, hand.filter(given), strict=True):
-        if last_ns is None or updated.status is not SampleStatus.ACCEPTED:
-            mean, covariance = np.zeros_like(mean), start
-            mean[:, 0] = z
-        else:
-            dt = (stamp_ns - last_ns) / NANOSECONDS
-            A = compute_transition(dt)
-            mean, covariance = A @ mean, A @ covariance @ A.T + jerk[:, None, None] * compute_gramian(dt)
-            S, v = np.maximum(covariance[:, 0, 0], 0.0) + position, z - mean[:, 0]
-            total -= np.log(2.0 * np.pi * S) + (v**2).sum(axis=-1) / (2.0 * S)
-            gain = covariance[:, :, 0] / S[:, None]
-            mean = mean + gain[..., None] * v[:, None, :]
-            covariance = covariance - gain[..., None] * covariance[:, None, 0, :]
-        last_ns = stamp_ns
-    return total
+    for hand in hands:
+        mean, covariance, total, last_ns = np.zeros((len(jerk), 3, 2)), start, np.zeros(len(jerk)), None
+        for stamp_ns, z, updated in zip(hand.stamps_ns.tolist(), hand.positions, hand.filter(given), strict=True):
+            if last_ns is None or updated.status is not SampleStatus.ACCEPTED:
+                mean, covariance = np.zeros_like(mean), start
+                mean[:, 0] = z
+            else:
+                dt = (stamp_ns - last_ns) / NANOSECONDS
+                A = compute_transition(dt)
+                mean, covariance = A @ mean, A @ covariance @ A.T + jerk[:, None, None] * compute_gramian(dt)
+                S, v = np.maximum(covariance[:, 0, 0], 0.0) + position, z - mean[:, 0]
+                total -= np.log(2.0 * np.pi * S) + (v**2).sum(axis=-1) / (2.0 * S)
+                gain = covariance[:, :, 0] / S[:, None]
+                mean = mean + gain[..., None] * v[:, None, :]
+                covariance = covariance - gain[..., None] * covariance[:, None, 0, :]
+            last_ns = stamp_ns
+        totals.append(total)
+    return SettingTable(np.array(totals), settings)
 
 
 def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the deviations of the filter."""
     given = {POSITION_STDDEV: config.estimator.position_stddev, JERK_DENSITY: config.estimator.jerk_density}
-    ranges = dict(zip(given, (POSITION_STDDEVS, JERK_DENSITIES), strict=True))
-    coarse = tabulate_innovations(hands, config.estimator, *([given[name], *ranges[name]] for name in given))
+    # no tracker of hands is better than 10 um
+    tried = {POSITION_STDDEV: np.geomspace(1e-5, 0.1, 13), JERK_DENSITY: np.geomspace(1e-3, 1e4, 22)}
+    coarse = tabulate_innovations(hands, config.estimator, *([given[name], *tried[name]] for name in given))
     columns, undetermined = coarse.determine(given)
-    best = coarse.settings[coarse.find_best(columns)]
-    finer = {
-        name: [given[name], *(() if name in undetermined else np.clip(best[name] * FINE, ranges[name][0], ranges[name][-1]))]
-        for name in given
-    }
+    best, finer = coarse.settings[coarse.find_best(columns)], {name: [value] for name, value in given.items()}
+    for name in finer.keys() - undetermined:
+        finer[name] += np.clip(best[name] * np.geomspace(0.46, 2.16, 25), tried[name][0], tried[name][-1]).tolist()
     fine, how = tabulate_innovations(hands, config.estimator, *finer.values()), 'innovations of the filter'
     return SettingTable(np.hstack([coarse.values, fine.values]), coarse.settings + fine.settings).estimate(given, how)[0]
 
 
 def fit_fading(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the time in which an acceleration fades."""
-    errors = [each for hand in hands if (each := _compute_fading_errors(hand, config)) is not None]
+    errors, fading = [], np.array(FADING_TIMES_S[1:])
+    for hand in hands:
+        states, times = [each.state for each in hand.filter(config.estimator)], hand.times
+        is_moving, mean = np.array([state.onset_ns is not None for state in states]), np.array([state.mean for state in states])
+        own = []  # of the mean velocity until each horizon, for each of FADING_TIMES_S [m/s]
+        for horizon in HORIZONS_S:
+            known = is_moving & (times + horizon <= times[-1])
+            later = np.column_stack([np.interp(times[known] + horizon, times, axis) for axis in hand.positions.T])
+            gained = (later - mean[known, :2]) / horizon - mean[known, 2:4]
+            share = np.append(horizon / 2.0, fading * (1.0 - fading / horizon * (1.0 - np.exp(-horizon / fading))))
+            own.append(np.hypot(*(gained - share[:, None, None] * mean[known, 4:]).transpose(2, 0, 1)).T)
+        together = np.concatenate(own)
+        errors += [together.mean(axis=0)] if len(together) else []
     if not errors:
         return Findings(undetermined={FADING: f'no movement lasts for {min(HORIZONS_S):g} s'})
     table = SettingTable.from_errors(np.array(errors), [{FADING: time_s} for time_s in FADING_TIMES_S])
     return table.estimate({FADING: config.estimator.acceleration_time_s}, 'velocities after accelerations')[0]
 
 
-def _compute_fading_errors(hand: RecordedHand, config: Config) -> Array | None:
-    """Return the mean error of a recording for each of `FADING_TIMES_S` [m/s]; None where nothing can be compared."""
-    states, times = [each.state for each in hand.filter(config.estimator)], hand.times
-    is_moving = np.array([state.onset_ns is not None for state in states])
-    mean, fading = np.array([state.mean for state in states]), np.array(FADING_TIMES_S[1:])
-    errors = []
-    for horizon in HORIZONS_S:
-        known = is_moving & (times + horizon <= times[-1])
-        later = np.column_stack([np.interp(times[known] + horizon, times, axis) for axis in hand.positions.T])
-        gained = (later - mean[known, :2]) / horizon - mean[known, 2:4]
-        share = np.append(horizon / 2.0, fading * (1.0 - fading / horizon * (1.0 - np.exp(-horizon / fading))))
-        errors.append(np.hypot(*(gained - share[:, None, None] * mean[known, 4:]).transpose(2, 0, 1)).T)
-    together = np.concatenate(errors)
-    return together.mean(axis=0) if len(together) else None
-
-
-def find_samples(hand: RecordedHand, config: Config) -> list[Sample]:
-    """Return the samples in movement of a recording that covered the distance to a goal; none of another one."""
+def find_samples(hand: RecordedHand, config: Config) -> list[tuple[HandState, Array, float]]:
+    """Return states, goal (2,) [m] and times left [s] of a movement that covered the distance to a goal; none of another one."""
     path = hand.path
     if path.goal is None or not has_covered_distance(hand.positions, hand.goals[path.goal]):
         return []
     states, goal = [each.state for each in hand.filter(config.estimator)], hand.goals[path.goal]
     left = [(state, goal, (path.end_ns - state.stamp_ns) / NANOSECONDS) for state in states if state.onset_ns is not None]
-    return [each for each in left if each[2] > MIN_TIME_S]
+    return [each for each in left if each[2] > 0.1]  # [s]: the end itself is known no better
 
 
 def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
@@ -268,28 +249,28 @@ def _find_best_factor(errors: Array) -> float:
 
 
 def fit_other_models(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
-    """Return the configuration with each other model of duration that depends on distance, its constants fitted."""
-    others = [replace_values(config, {'duration.model': model}) for model in DISTANCE_MODELS if model != config.duration.model]
-    return [replace_values(each, fit_duration(hands, each).values) for each in others]
+    """Return the configuration with Fitts' law, by which durations depend on distances, and its fitted constants."""
+    if config.duration.model == 'fitts':
+        return []
+    other = replace_values(config, {'duration.model': 'fitts'})
+    return [replace_values(other, fit_duration(hands, other).values)]
 
 
 def fit_wait(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the mean time that a hand waits."""
-    waits = np.array([mean for each in hands if (mean := _compute_mean_wait(each, config)) is not None])
-    if not len(waits):
+    means = []
+    for hand in hands:
+        waits, onset_ns = list[float](), None  # from the samples at rest to the movement that follows, until the goal is reached
+        for state in [each.state for each in reversed(hand.filter(config.estimator))]:
+            if state.stamp_ns > hand.path.end_ns:
+                continue
+            if state.onset_ns is not None:
+                onset_ns = state.onset_ns
+            elif onset_ns is not None:
+                waits.append((onset_ns - state.stamp_ns) / NANOSECONDS)
+        means += [np.mean(waits)] if waits else []
+    if not means:
         return Findings(undetermined={WAIT: 'no hand waits before a movement'})
-    value, resampled = clip_to_bounds(WAIT, float(np.mean(waits))), resample(lambda rows: waits[rows].mean(), len(waits))
+    value, table = clip_to_bounds(WAIT, float(np.mean(means))), np.array(means)
+    resampled = resample(lambda rows: table[rows].mean(), len(table))
     return Findings({WAIT: Estimate.from_resamples(WAIT, value, resampled, 'time until movements begin')})
-
-
-def _compute_mean_wait(hand: RecordedHand, config: Config) -> float | None:
-    """Return the mean time [s] from the samples at rest to the movement that follows, until the goal is reached."""
-    waits, onset_ns = list[float](), None
-    for state in [each.state for each in reversed(hand.filter(config.estimator))]:
-        if state.stamp_ns > hand.path.end_ns:
-            continue
-        if state.onset_ns is not None:
-            onset_ns = state.onset_ns
-        elif onset_ns is not None:
-            waits.append((onset_ns - state.stamp_ns) / NANOSECONDS)
-    return float(np.mean(waits)) if waits else None

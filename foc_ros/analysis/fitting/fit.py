@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.baselines import Forecast, published_shares
+from foc_ros.analysis.evaluation.baselines import Forecast
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.positions import compute_position_scores
 from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
@@ -34,15 +34,6 @@ PREDICTIONS = 10
 """About as many predictions are made in each recording, because neighbours say the same."""
 UNSCALED: dict[str, object] = {'covariance.near': 1.0, 'covariance.far': 1.0}
 """A fit sets both factors to 1, because it fits the covariances that they multiply."""
-BY_EXAMPLE = 'examples/plan_recovery'
-"""Where tau and lambda of strategy `fixed` are fitted."""
-WORSE_SHARE, WORSE_M = 0.05, 0.001
-"""Growth of an error of positions above which it is worse: a share of it, and a length [m]."""
-WORSE_COVERAGE = 0.01
-"""Fall of the share of true positions in the region of 90 % that is told."""
-SMALLER_IS_BETTER = ('error_m', 'nlpd')
-"""Measures that begin with one of these are better if they are smaller."""
-CHANGES = ('better', 'worse')
 COMPARISON_TITLES = {
     'class_gain': ('log-likelihood of the answer taken, above uniform [nat]', 1.0, 3),
     'gap_right': ('next gap correct [%]', 100.0, 1),
@@ -59,16 +50,15 @@ SCORE_TITLES = {
     'inside_90': 'true positions in the 90 % ellipse of the likeliest candidate at 0.5 s',
     'inside_all_90': 'true positions in the 90 % region of all candidates at 0.5 s',
 }
-Comparison = Mapping[str, Mapping[str, float | None]]
 Rows = list[tuple[str, ...]]
 
 
 @dataclass
 class Fit:
-    """The state of a fit.
+    """The state of a fit: the configuration with what was found so far.
 
-    config: with what was found so far; found; recordings: how many are used; failed recordings with reasons; scores as plain
-    values; comparison: of the given parameters with the fitted ones.
+    recordings: how many are used; failed recordings with reasons; scores as plain values; comparison: of given and fitted
+    parameters.
     """
 
     config: Config
@@ -97,7 +87,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     for step in (fit_estimator, fit_fading, fit_duration, fit_wait):
         fit.take(step(hands, fit.config))
     if config.foc.strategy == 'fixed':
-        fit.found.warnings.append(f'foc.tau, foc.lam: kept as they are; {BY_EXAMPLE} finds them from movements')
+        fit.found.warnings.append('foc.tau, foc.lam: kept as they are; examples/plan_recovery finds them from movements')
     duration_s = float(np.median([each.times[-1] for each in hands]))
     rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
     thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
@@ -171,10 +161,10 @@ def _measure(recordings: Sequence[ObservedRecording]) -> dict[str, float | None]
     gains, gaps = [], []
     for recording in recordings:
         for observation, question in ask_main(recording):
-            forecast = Forecast.from_shares(published_shares(observation), question)
+            forecast = Forecast.from_shares(observation.candidates.likelihood, question)
             gains.append(np.log(forecast.true_probability(question)) + np.log(question.possible))
         for observation, question in ask_all(recording, GAP):
-            gaps.append(Forecast.from_shares(published_shares(observation), question).correctness(question))
+            gaps.append(Forecast.from_shares(observation.candidates.likelihood, question).correctness(question))
     positions = compute_position_scores(recordings)
     return {
         'class_gain': float(np.mean(gains)) if gains else None,
@@ -185,27 +175,27 @@ def _measure(recordings: Sequence[ObservedRecording]) -> dict[str, float | None]
     }
 
 
-def find_worse_positions(comparison: Comparison) -> list[str]:
-    """Return a sentence for each horizon at which the positions become worse."""
+def find_worse_positions(comparison: Mapping[str, Mapping[str, float | None]]) -> list[str]:
+    """Return a sentence for each horizon at which the positions become worse, by 5 % and 1 mm."""
     sentences = []
     for name, each in comparison.items():
         before, after = each['before'], each['after']
         if not name.startswith('error_m') or before is None or after is None:
             continue
-        if after > before * (1.0 + WORSE_SHARE) + WORSE_M:
+        if after > 1.05 * before + 0.001:
             horizon, change = name.split()[1], f'from {1e3 * before:.0f} to {1e3 * after:.0f} mm'
             sentences.append(f'predicted positions {horizon} s ahead become worse with the fitted parameters: {change}')
     return sentences
 
 
 def find_lower_coverage(fit: Fit) -> list[str]:
-    """Return a sentence where the coverage falls: of held-out predictions if there are any, else of all."""
+    """Return a sentence where the coverage falls by 1 %: of held-out predictions if there are any, else of all."""
     shares = fit.scores.get('inside_all_90', {})
     changes = {'of recordings held out ': (shares.get('as given'), shares.get('without the recording'))}
     if 'inside_90' in fit.comparison:
         changes[''] = (fit.comparison['inside_90']['before'], fit.comparison['inside_90']['after'])
     for kind, (before, after) in changes.items():
-        if before is not None and after is not None and after < before - WORSE_COVERAGE:
+        if before is not None and after is not None and after < before - 0.01:
             held = f'the region of {100 * COVERAGE_LEVEL:.0f} % holds fewer true positions {kind}0.5 s ahead'
             return [f'{held} with the fitted parameters: {100 * after:.0f} % instead of {100 * before:.0f} %']
     return []
@@ -253,40 +243,34 @@ def format_comparison(answer: Mapping[str, Any]) -> Rows:
         if before is None or after is None:
             continue
         shown = [f'{factor * value:.{digits}f}' for value in (before, after)]
-        rows.append((words, *shown, '' if shown[0] == shown[1] else 'better' if _is_better(name, before, after) else 'worse'))
+        if name == 'inside_90':
+            is_better = abs(after - COVERAGE_LEVEL) < abs(before - COVERAGE_LEVEL)
+        else:
+            is_better = after < before if name.startswith(('error_m', 'nlpd')) else after > before
+        rows.append((words, *shown, '' if shown[0] == shown[1] else 'better' if is_better else 'worse'))
     return rows
-
-
-def _is_better(name: str, before: float, after: float) -> bool:
-    if name == 'inside_90':
-        return abs(after - COVERAGE_LEVEL) < abs(before - COVERAGE_LEVEL)
-    return after < before if name.startswith(SMALLER_IS_BETTER) else after > before
 
 
 def make_verdict(answer: Mapping[str, Any]) -> list[str]:
     """Return sentences that say what a fit makes better, and what worse."""
-    rows = format_comparison(answer)
-    found = {
-        change: [f'{words} {before} to {after}' for words, before, after, each in rows if each == change] for change in CHANGES
-    }
+    found: dict[str, list[str]] = {'better': [], 'worse': []}
+    for words, before, after, change in format_comparison(answer):
+        if change:
+            found[change].append(f'{words} {before} to {after}')
     judged = [f'{change.capitalize()} with the fitted parameters: {"; ".join(each)}.' for change, each in found.items() if each]
     return judged or ['The fitted parameters change no measure.']
-
-
-def _format_scores(answer: Mapping[str, Any]) -> Rows:
-    """Return the rows of the scores in an answer of `fit --json`."""
-    return [
-        (SCORE_TITLES[score], setting, '-' if value is None else f'{value:.3f}')
-        for score, values in answer['scores'].items()
-        for setting, value in values.items()
-    ]
 
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], Rows]]:
     """Yield title, columns and rows of the tables of an answer of `fit --json`."""
     yield 'Before and after', ('with the same recordings', 'before', 'after', ''), format_comparison(answer)
     yield 'Parameters', ('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer)
-    yield 'Scores', ('score', 'setting', 'value'), _format_scores(answer)
+    scores: Rows = [
+        (SCORE_TITLES[score], setting, '-' if value is None else f'{value:.3f}')
+        for score, values in answer['scores'].items()
+        for setting, value in values.items()
+    ]
+    yield 'Scores', ('score', 'setting', 'value'), scores
 
 
 def make_sentences(answer: Mapping[str, Any]) -> list[str]:

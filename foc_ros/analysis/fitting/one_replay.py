@@ -44,23 +44,19 @@ LIKELIHOODS = {
     'likelihood.weaving': (0.0, 1.0, 2.0, 4.0, 8.0),
 }
 """Values that are tried, and the given ones; of the exponent also without a planning horizon."""
-MISSED = 0.1
-"""Share of predictions without the true class among their candidates above which there is a warning."""
-PROCESS_NOISE, ENDPOINT_STDDEV, SPREAD = 'foc.process_noise', 'foc.endpoint_stddev', 'duration.spread'
+PROCESS_NOISES = (0.0, *np.geomspace(0.01, 100.0, 33).tolist())
 WIDENINGS = {
-    PROCESS_NOISE: (0.0, *np.geomspace(0.01, 100.0, 33).tolist()),
-    ENDPOINT_STDDEV: (0.0, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3, 32e-3, 48e-3, 72e-3, 0.11, 0.16),
-    SPREAD: (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.9),
+    'foc.process_noise': PROCESS_NOISES,
+    'foc.endpoint_stddev': (0.0, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3, 32e-3, 48e-3, 72e-3, 0.11, 0.16),
+    'duration.spread': (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.9),
 }
 """Values that are tried, and the given ones: process noises [m/s^2.5] from far below the jerk density of the filter to that of a
 hand in free motion; scatter of the end [m], of which Fitts' law expects 48 mm for a target of 0.2 m."""
 NO_WIDENING: Setting = dict.fromkeys(WIDENINGS, 0.0)
-FEW_WIDENINGS = tuple(product((0.0, *WIDENINGS[PROCESS_NOISE][1::4]), (0.0, 3e-3, 8e-3, 24e-3, 72e-3), (0.0, 0.2, 0.4)))
+FEW_WIDENINGS = tuple(product((0.0, *PROCESS_NOISES[1::4]), (0.0, 3e-3, 8e-3, 24e-3, 72e-3), (0.0, 0.2, 0.4)))
 """Widenings whose best is good enough to compare predictions that differ in other parameters."""
 COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
 """Time ahead and probability of the ellipses and regions whose coverage is reported."""
-FURTHEST = -30.0
-"""Least log-density that counts [nat], so that one unexpected position does not rule the rest."""
 
 
 def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> tuple[Findings, dict[str, Any]]:
@@ -73,15 +69,19 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> t
     if not any(questions):
         reason = 'no recording has an obstacle to pass on one of two sides, or a second goal'
         return Findings(undetermined=dict.fromkeys(LIKELIHOODS, reason)), {}
-    given = {name: float(getattr(config.likelihood, name.partition('.')[2])) for name in LIKELIHOODS}
-    settings = _list_likelihoods(given)
+    before = flatten(config)
+    given = {name: float(before[name]) for name in LIKELIHOODS}
+    ahead = list_settings({name: (given[name], *tried) for name, tried in LIKELIHOODS.items()})
+    betas = dict.fromkeys(each['likelihood.beta'] for each in ahead)
+    plain = [{**given, 'likelihood.beta': beta, 'likelihood.planning_horizon_s': WHOLE_WAY_S} for beta in betas]
+    settings = (*ahead, *plain)
     rules = [replace_values(config, each).likelihood for each in settings]
     rule = Baseline('foc', partial(forecast_shares, power_rule_shares), tuple(rules))
     rows = collect_all(partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], 'likelihood')
     table = SettingTable(np.array(rows), settings)
     found, columns = table.estimate(given, 'likelihood of the classes taken')
     missed = float(np.mean([question.truth not in question.given for each in questions for _, question in each]))
-    if missed > MISSED:
+    if missed > 0.1:
         words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
         found.warnings.append(f'likelihood.beta: in {100 * missed:.0f} % of the predictions {words}')
     uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
@@ -93,14 +93,6 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> t
         if len(set(taken)) > 1:
             scores['without its way'] = table.score(table.choose_held_out(columns, taken))
     return found, {'ways': scores}
-
-
-def _list_likelihoods(given: Setting) -> tuple[Setting, ...]:
-    """Return the settings of the likelihood that are tried, the given one first."""
-    ahead = list_settings({name: (given[name], *tried) for name, tried in LIKELIHOODS.items()})
-    betas = dict.fromkeys(each['likelihood.beta'] for each in ahead)
-    plain = [{**given, 'likelihood.beta': beta, 'likelihood.planning_horizon_s': WHOLE_WAY_S} for beta in betas]
-    return (*ahead, *plain)
 
 
 def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
@@ -145,24 +137,20 @@ def compute_mean_densities(
     if observation.movement_age_s == 0.0 or not shares.any() or np.isnan(observation.truth.positions[HORIZONS[0], 0]):
         return None
     densities = compute_log_densities(observation, shares, widen_covariances(observation, widenings, config))
-    return np.asarray(np.nanmean(np.maximum(densities, FURTHEST), axis=1))
+    return np.asarray(np.nanmean(np.maximum(densities, -30.0), axis=1))  # one unexpected position does not rule the rest
 
 
 def widen_covariances(observation: Observation, widenings: Iterable[Sequence[float]], config: Config) -> Array:
     """Return the covariance (q, k, h, 2, 2) [m^2] of the candidates' positions at `TIMES_S` with each widening."""
     candidates, late, squares = observation.candidates, observation.candidates.duration_sensitivity, np.array(widenings) ** 2
-    unit = np.array([_compute_unit_variances(float(time_s), config) for time_s in candidates.time_s])
-    both = np.tensordot(squares[:, :2], unit, (1, 1))
+    unit = []  # variances by process noise and by scatter of the end, of 1 each, (k, 2, h)
+    for time_s in candidates.time_s.tolist():
+        kind = time_s / config.foc.steps, config.foc.steps, is_passing(config.duration)
+        jerk, end = triple_integrator_process_covariance(*kind), triple_integrator_goal_map(*kind) ** 2
+        unit.append([interpolate_steps(each[:, 0, 0], kind[0]) for each in (jerk, end)])
+    both = np.tensordot(squares[:, :2], np.array(unit), (1, 1))
     spread = np.multiply.outer(squares[:, 2], late[..., :, None] * late[..., None, :])
     return np.asarray(candidates.covariance + both[..., None, None] * np.eye(2) + spread)
-
-
-def _compute_unit_variances(time_s: float, config: Config) -> Array:
-    """Return the variance of a position at `TIMES_S` by process noise and by scatter of the end, of 1 each, (2, h)."""
-    steps = config.foc.steps
-    kind = time_s / steps, steps, is_passing(config.duration)
-    jerk, end = triple_integrator_process_covariance(*kind), triple_integrator_goal_map(*kind) ** 2
-    return np.array([interpolate_steps(each[:, 0, 0], kind[0]) for each in (jerk, end)])
 
 
 def compute_coverage(

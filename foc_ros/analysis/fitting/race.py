@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from foc_ros.analysis.evaluation.baselines import Forecast, power_rule_shares
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.observations import observe
 from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
 from foc_ros.analysis.intervals import SEED, resample
 from foc_ros.analysis.parallel import collect
@@ -40,25 +40,20 @@ NOISES, DURATIONS = (0.06, 0.25, 2.0), (0.7, 1.4, 2.0)
 ETAS = (0.7, 0.5, 0.95)
 FIRST = 6
 """Recordings that all settings predict."""
-FINALISTS = 4
-"""Settings that predict all recordings, unless they are plainly worse."""
 MAX_RECORDINGS = 48
 """Recordings in which settings are compared; more make no difference that counts."""
 PLAINLY_WORSE = 3.0
 """Standard errors by which a setting behind the best is plainly worse."""
-ALIKE = 1.0
-"""Standard errors within which settings are alike in classes, so that positions decide (Breiman et al. 1984)."""
 CONFIDENT = 0.95
 """Probability with which a setting is better than the given one, and share of the resamples with which a choice is sure."""
-WORSE_NAT = 0.05
-"""Loss of log-density of the true positions above which there is a warning."""
 Key = tuple[str, int]
 """A prediction: recording and stamp [ns]."""
 
 
 def make_noise_settings(config: Config) -> list[Config]:
     """Return the configuration, and it with other noise."""
-    return [config, *(_scale(config, {'foc.noise_x': 1.0, 'foc.noise_y': 1.0}, factor) for factor in NOISES)]
+    powers = {'foc.noise_x': 1.0, 'foc.noise_y': 1.0}
+    return [config, *(_scale(config, powers, factor) for factor in NOISES)]
 
 
 def make_eta_settings(config: Config, may_be_lower: bool) -> list[Config]:
@@ -120,14 +115,10 @@ class Replays:
 
 
 def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> tuple[int, ReplayScores]:
-    number, recording, config, thinned = item
+    """Score the predictions of one setting in a recording; return its number and the scores."""
+    number, given, config, thinned = item
     config = replace_values(config, thinned)
-    return number, score_observations(observe(recording, replace_values(config, NO_WIDENING)), config)
-
-
-def score_observations(recording: ObservedRecording, config: Config) -> ReplayScores:
-    """Score the predictions of one setting in a recording."""
-    found = ReplayScores()
+    recording, found = observe(given, replace_values(config, NO_WIDENING)), ReplayScores()
     gaps = {observation.stamp_ns: question for observation, question in ask_all(recording, GAP)}
     for observation, question in ask_main(recording):
         questions = [question, *([gaps[observation.stamp_ns]] if observation.stamp_ns in gaps else [])]
@@ -139,7 +130,7 @@ def score_observations(recording: ObservedRecording, config: Config) -> ReplaySc
         densities = compute_mean_densities(observation, observation.candidates.mixture, config, FEW_WIDENINGS)
         if densities is not None:
             found.positions[recording.name, observation.stamp_ns] = densities
-    return found
+    return number, found
 
 
 def compare_settings(settings: Sequence[Sequence[ReplayScores]], names: Sequence[str]) -> Array:
@@ -179,7 +170,7 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> 
         best = finalists.index(given)
     found = _describe_choice(finalists[best], settings, [finalists[each] for each in winners])
     positions = first_scores[1].mean(axis=1)
-    if (loss := float(positions[0] - positions[settings.index(finalists[best])])) > WORSE_NAT:
+    if (loss := float(positions[0] - positions[settings.index(finalists[best])])) > 0.05:
         found.warnings.append(
             f'{kind}: the setting that explains the classes best predicts positions worse: the mean log-density of the true ones '
             f'falls by {loss:.2g} nat'
@@ -189,12 +180,8 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> 
 
 def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequence[Config]) -> Findings:
     """Return what a chosen setting says of the parameters in which the settings differ; winners: the best of each resample."""
-    tried, drawn, after, found = (
-        [flatten(each) for each in settings],
-        [flatten(each) for each in winners],
-        flatten(chosen),
-        Findings(),
-    )
+    tried, drawn = [flatten(each) for each in settings], [flatten(each) for each in winners]
+    after, found = flatten(chosen), Findings()
     others = {name for model, names in CONSTANTS.items() for name in names if model != after['duration.model']}
     for name, value in after.items():
         before = tried[0][name]
@@ -221,7 +208,7 @@ def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[
     first_scores = scores = replays.score(left, names[:count], f'{kind} {len(left)}')
     while count < len(names) and len(left) > 1:
         is_behind = find_behind(scores, PLAINLY_WORSE)
-        kept = {index for index in rank(scores)[: max(-(-len(left) // 2), FINALISTS)] if not is_behind[index]}
+        kept = {index for index in rank(scores)[: max(-(-len(left) // 2), 4)] if not is_behind[index]}
         if left[0] == settings[0] and not is_behind[0]:
             kept.add(0)
         left, count = [left[index] for index in sorted(kept)], 2 * count
@@ -235,9 +222,12 @@ def sample_names(names: Sequence[str]) -> list[str]:
 
 
 def rank(scores: Array) -> list[int]:
-    """Return the settings from the best to the worst: those alike in classes by positions, then the others by classes."""
+    """Return the settings from the best to the worst: those alike in classes by positions, then the others by classes.
+
+    Alike are those within one standard error (Breiman et al. 1984).
+    """
     classes, positions = scores.mean(axis=2)
-    is_behind = find_behind(scores, ALIKE)
+    is_behind = find_behind(scores, 1.0)
     order: list[int] = np.lexsort((-classes, np.where(is_behind, 0.0, -positions), is_behind)).tolist()
     return order
 

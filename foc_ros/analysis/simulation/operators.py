@@ -26,24 +26,9 @@ from foc_ros.ros.intake import Intake
 
 DT = 0.005
 """Time step of the simulation [s]."""
-MEAN_SPEED = 0.25
-"""Mean speed of a movement [m/s]."""
 CLEARANCE_M = (0.003, 0.01)
 """Range of the distance that an operator plans to keep from an obstacle."""
-FREE_M = 0.001
-"""Distance that an intended path keeps from every obstacle as the operator sees it."""
-MOST_VIA_POINTS = 5
-PREFERS_SHORTER = 0.75
-"""Probability that an operator passes an obstacle on the shorter side."""
-OBSTACLES = 6
-GAP_M = 0.03
-"""Smallest gap between two obstacles, and between an obstacle and the start or a goal."""
-SEEN_STDDEV_M = 0.005
-"""Standard deviation of the place at which an operator sees an obstacle, along each axis."""
-CHANGE_AT = (0.3, 0.5)
-"""Part of the movement at which an operator changes the way."""
 MOST_DRAWS = 200
-FEWEST_SAMPLES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,15 +66,21 @@ def plan_path(
 ) -> IntendedPath | None:
     """Return an intended path to a goal among obstacles as the operator sees them; None if no few via points lead there.
 
-    A via point is set beside the obstacle that the path comes nearest to, until the path is free. moving: velocity [m/s] and
-    acceleration [m/s^2] at the start, (2,) each; at rest if not given.
+    Via points, at most four, are set beside the obstacle that the path comes nearest to, until the path is free by 1 mm. moving:
+    velocity [m/s] and acceleration [m/s^2] at the start, (2,) each; at rest if not given.
     """
-    points = [start, goal]
-    for _ in range(MOST_VIA_POINTS):
-        path = _time_path(np.array(points), moving or (np.zeros(2), np.zeros(2)))
+    points, s = [start, goal], np.linspace(0.0, 1.0, 201)
+    for _ in range(5):
+        # the times are those of a straight minimum-jerk movement of the same length at 0.25 m/s
+        lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        shares = lengths / lengths[-1]
+        if moving is None:  # else it has begun: the first half of the profile is past
+            shares = np.interp(shares, 10 * s**3 - 15 * s**4 + 6 * s**5, s)
+        times = shares * max(lengths[-1] / 0.25, 0.4)
+        path = interpolate_minimum_jerk(np.array(points), times, moving or (np.zeros(2), np.zeros(2)))
         offsets, distances = measure_offsets(path.position, seen)
         heights = distances - seen.radius
-        if not len(seen) or heights.min() >= FREE_M:
+        if not len(seen) or heights.min() >= 0.001:
             return path
         step, row = np.unravel_index(heights.argmin(), heights.shape)
         points = _add_via_point(rng, points, path.position[step], offsets[step, row], float(seen.extent[row]), seen.centre[row])
@@ -99,25 +90,15 @@ def plan_path(
 def _add_via_point(
     rng: np.random.Generator, points: list[Array], near: Array, offset: Array, extent: float, centre: Array
 ) -> list[Array]:
-    """Return the points with one more beside an obstacle, on the shorter side with the probability `PREFERS_SHORTER`."""
+    """Return the points with one more beside an obstacle, on the shorter side with a probability of 3/4."""
     along = points[-1] - points[0]
     left = np.array([-along[1], along[0]]) / np.hypot(*along)
     side = 1.0 if offset @ left > 0.0 else -1.0
-    if rng.random() > PREFERS_SHORTER:
+    if rng.random() > 0.75:
         side = -side
     via = centre + side * (extent + rng.uniform(*CLEARANCE_M)) * left
     others = [each for each in points[1:-1] if np.hypot(*(each - near)) > extent + CLEARANCE_M[1]]
     return [points[0], *sorted([*others, via], key=lambda each: float(each @ along)), points[-1]]
-
-
-def _time_path(points: Array, moving: tuple[Array, Array]) -> IntendedPath:
-    """Return a path through points whose times are those of a straight minimum-jerk movement of the same length."""
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    s = np.linspace(0.0, 1.0, 201)
-    shares = np.interp(lengths / lengths[-1], 10 * s**3 - 15 * s**4 + 6 * s**5, s)
-    if moving[0].any():  # it has begun: the first half of the profile is past
-        shares = lengths / lengths[-1]
-    return interpolate_minimum_jerk(points, shares * max(lengths[-1] / MEAN_SPEED, 0.4), moving)
 
 
 @dataclass(frozen=True)
@@ -168,41 +149,29 @@ def draw_task(operator: str, rng: np.random.Generator) -> Task:
     """Draw the scene and the intention of an operator other than `HUMAN_PATHS`."""
     for _ in range(MOST_DRAWS):
         goals = np.array([[0.30, -0.09], [0.33, 0.0], [0.30, 0.09]]) + rng.normal(0.0, 0.01, (3, 2))
-        obstacles = _draw_obstacles(rng, goals)
-        seen = replace(obstacles, centre=obstacles.centre + rng.normal(0.0, SEEN_STDDEV_M, obstacles.centre.shape))
+        obstacles, kept = make_obstacles(), np.concatenate([np.zeros((1, 2)), goals])
+        while len(obstacles) < 6:  # posts between the start and the goals, with gaps of at least 3 cm between all of them
+            centre, radius = np.array([rng.uniform(0.07, 0.25), rng.uniform(-0.1, 0.1)]), rng.uniform(0.012, 0.025)
+            distances = np.hypot(*(kept - centre).T)
+            if len(obstacles):
+                distances = np.append(distances, measure_offsets(centre, obstacles)[1][0] - obstacles.radius)
+            if distances.min() >= radius + 0.03:
+                obstacles = make_obstacles([*obstacles.centre, centre], [*obstacles.radius, radius], 0.001)
+        # the operator sees each obstacle at a place with a standard deviation of 5 mm
+        seen = replace(obstacles, centre=obstacles.centre + rng.normal(0.0, 0.005, obstacles.centre.shape))
         row = int(rng.integers(len(goals)))
         path = plan_path(rng, np.zeros(2), goals[row], seen)
         if path is not None and operator == CHANGES_WAY:
             row = int((row + rng.integers(1, len(goals))) % len(goals))
-            path = _change_way(rng, path, goals[row], seen)
+            step = round(rng.uniform(0.3, 0.5) * len(path.position))
+            rest = plan_path(rng, path.position[step], goals[row], seen, (path.velocity[step], path.acceleration[step]))
+            path = None if rest is None else path.join(step, rest)
         if path is None:
             continue
         if operator == UNANNOUNCED_GOAL:
             return Task(ARMS[operator], obstacles, np.delete(goals, row, axis=0), goals[row], -1, path)
         return Task(ARMS[operator], obstacles, goals, goals[row], row, path)
     raise FocError(f'no scene in {MOST_DRAWS} draws has a path for the operator {operator}')
-
-
-def _draw_obstacles(rng: np.random.Generator, goals: Array) -> Obstacles:
-    """Return posts between the start and the goals, with gaps between them."""
-    posts = make_obstacles()
-    kept = np.concatenate([np.zeros((1, 2)), goals])
-    while len(posts) < OBSTACLES:
-        centre, radius = np.array([rng.uniform(0.07, 0.25), rng.uniform(-0.1, 0.1)]), rng.uniform(0.012, 0.025)
-        distances = np.hypot(*(kept - centre).T)
-        if len(posts):
-            distances = np.append(distances, measure_offsets(centre, posts)[1][0] - posts.radius)
-        if distances.min() >= radius + GAP_M:
-            posts = make_obstacles([*posts.centre, centre], [*posts.radius, radius], 0.001)
-    return posts
-
-
-def _change_way(rng: np.random.Generator, path: IntendedPath, goal: Array, seen: Obstacles) -> IntendedPath | None:
-    """Return a path that becomes one to another goal half-way."""
-    step = round(rng.uniform(*CHANGE_AT) * len(path.position))
-    moving = path.velocity[step], path.acceleration[step]
-    rest = plan_path(rng, path.position[step], goal, seen, moving)
-    return None if rest is None else path.join(step, rest)
 
 
 class SimulatedArm:
@@ -264,7 +233,7 @@ def read_task(recording: Recording, config: Config) -> Task | None:
         return None
     scene = intake.pipeline.scene
     stamps, rows = np.unique([each.stamp_ns for each in samples], return_index=True)
-    if len(rows) < FEWEST_SAMPLES or scene.goals is None or not len(scene.goals):
+    if len(rows) < 8 or scene.goals is None or not len(scene.goals):
         return None
     times = (stamps - stamps[0]) / NANOSECONDS
     spline = make_interp_spline(times, np.array([samples[row].position for row in rows]), k=5)

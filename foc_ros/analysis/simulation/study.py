@@ -28,22 +28,8 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
-POSE_STEPS = 2
-"""Time steps between two measured poses: 100 Hz."""
-SOURCE = 'simulation'
-MEASURED_STDDEV_M = 0.0003
-"""Standard deviation of a measured position, along each axis."""
-ARRIVED_M, STOPPED = 0.01, 0.05
-"""Distance from the goal [m] and speed [m/s] at which a movement is complete."""
-EXTRA_S = 1.5
-"""Time beyond that of the intended movement after which a trial ends."""
-WRONG_S = 0.1
-"""Time for which the likeliest way has to be a wrong one for a trial to count in the harm of wrong ways [s]."""
-RESAMPLES = 2000
 HARMS = {'wrong_way_s': 'completion_s', 'wrong_way_effort': 'effort'}
 """What an operator needs more than alone where the likeliest way was wrong, nan elsewhere, and the measure that it is of."""
-SHOWN_TRIALS = 3
-"""Number of trials of each operator that are kept with their paths."""
 COLUMNS = {
     'collision_rate': ('collisions [%]', 100.0, 1),
     'completion_s': ('time [s]', 1.0, 2),
@@ -65,12 +51,12 @@ class Assistance:
         self.task, self.config, self.is_wrong = task, config, False
         self.pipeline = Pipeline(config)
         self.pipeline.set_goals(task.goals, '')
-        self.pipeline.set_obstacles(SOURCE, task.obstacles, None, '')
+        self.pipeline.set_obstacles('simulation', task.obstacles, None, '')
         self._force = np.zeros(2)
 
     def update(self, step: int, measured: Array) -> Array:
         """Return the force (2,) [N] at a time step from the measured position (2,) [m]."""
-        if step % POSE_STEPS == 0:
+        if step % 2 == 0:  # poses are measured at 100 Hz
             self.pipeline.add_hand_sample(HandSample(round((1.0 + step * DT) * NANOSECONDS), measured))
         assert self.pipeline.hand_state is not None
         target = self.compute_force(step, *self.pipeline.hand_state.mean.reshape(3, 2))
@@ -99,23 +85,21 @@ class FocAssistance(Assistance):
         if self.pipeline.is_due:
             self._newest, self.is_wrong = self._next, self._is_next_wrong
             self._next = self.pipeline.predict()
-            self._is_next_wrong = self._next is not None and is_wrong_way(self._next, self.task, step)
+            self._is_next_wrong = self._next is not None and self._is_wrong_way(self._next, step)
         age_s = 0.0 if self._newest is None else t - self._newest.t
         given = GuidanceInput(t, position, velocity, self._newest, 0.0, age_s, acceleration=acceleration)
         output, self._state = guide(self.config, self._state, given)
         return output.force
 
-
-def is_wrong_way(prediction: Prediction, task: Task, step: int) -> bool:
-    """Return whether the likeliest candidate leads to another goal, or passes an obstacle on another side, than intended."""
-    likeliest = next((each for each in prediction.candidates_with_likelihood if each.label == prediction.most_likely), None)
-    if likeliest is None:
+    def _is_wrong_way(self, prediction: Prediction, step: int) -> bool:
+        """Return whether the likeliest candidate leads to another goal, or passes an obstacle on another side, than intended."""
+        path, goal = self.task.path.position, self.task.goal_row
+        rest = np.ascontiguousarray(path[min(step, len(path) - 2) :])
+        for each in prediction.candidates_with_likelihood:
+            if each.label == prediction.most_likely:
+                intended = find_path_sides(rest, self.task.obstacles)
+                return each.candidate.goal != goal or any(intended.get(name, side) != side for name, side in each.sides.items())
         return False
-    if likeliest.candidate.goal != task.goal_row:
-        return True
-    rest = task.path.position[min(step, len(task.path.position) - 2) :]
-    intended = find_path_sides(np.ascontiguousarray(rest), task.obstacles)
-    return any(intended.get(name, side) != side for name, side in likeliest.sides.items())
 
 
 Rules = Mapping[str, type[Assistance]]
@@ -155,8 +139,8 @@ class Trial(Record):
 
 
 def count_steps(task: Task) -> int:
-    """Return the largest number of time steps of a trial."""
-    return len(task.path.position) + round(EXTRA_S / DT)
+    """Return the largest number of time steps of a trial, which ends 1.5 s after the intended movement."""
+    return len(task.path.position) + round(1.5 / DT)
 
 
 def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: Array) -> Trial:
@@ -164,10 +148,10 @@ def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: A
     arm, rule = SimulatedArm(task.arm, task.path, noise[:, 0]), assistance(task, config)
     rows = []
     for step in range(count_steps(task)):
-        force = rule.update(step, arm.position + MEASURED_STDDEV_M * noise[step, 1])
+        force = rule.update(step, arm.position + 3e-4 * noise[step, 1])  # the standard deviation of a tracker [m]
         arm.move(force)
         rows.append((*arm.position, *force, *arm.force, float(rule.is_wrong)))
-        if np.hypot(*(arm.position - task.goal)) < ARRIVED_M and np.hypot(*arm.velocity) < STOPPED:
+        if np.hypot(*(arm.position - task.goal)) < 0.01 and np.hypot(*arm.velocity) < 0.05:  # [m], [m/s]
             break
     table = np.array(rows)
     return Trial(table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6])
@@ -248,10 +232,10 @@ def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
     trials = {rule: run_trial(task, rules[rule], config, noise) for rule in pair.assistance}
     measures = {rule: measure_trial(trial, task, config.guidance.f_max) for rule, trial in trials.items()}
     for rule, row in measures.items():
-        is_wrong = DT * trials[rule].is_wrong.sum() >= WRONG_S
+        is_wrong = DT * trials[rule].is_wrong.sum() >= 0.1
         for harm, name in HARMS.items():
             row[harm] = row[name] - measures[NONE][name] if is_wrong else np.nan
-    is_shown = pair.number < SHOWN_TRIALS
+    is_shown = pair.number < 3
     return PairResult(pair.operator, measures, task if is_shown else None, trials if is_shown else {})
 
 
@@ -280,7 +264,7 @@ def estimate_mean(values: Array, seed: int) -> tuple[float | None, list[float] |
     finite = values[np.isfinite(values)]
     if not len(finite):
         return None, None
-    return float(finite.mean()), compute_mean_interval(finite, np.arange(len(finite)), seed, RESAMPLES)
+    return float(finite.mean()), compute_mean_interval(finite, np.arange(len(finite)), seed, resamples=2000)
 
 
 def make_tables(cells: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
@@ -288,11 +272,8 @@ def make_tables(cells: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, tuple
     for operator in dict.fromkeys(cell['operator'] for cell in cells):
         rows = [cell for cell in cells if cell['operator'] == operator]
         title = f'{operator}: mean of {rows[0]["trials"]} paired trials, and bootstrap interval of 95 %'
-        yield title, ('', *(heading for heading, _, _ in COLUMNS.values())), [_format_row(cell) for cell in rows]
-
-
-def _format_row(cell: Mapping[str, Any]) -> tuple[str, ...]:
-    return (cell['assistance'], *(_format(cell, name) for name in COLUMNS))
+        lines = [(cell['assistance'], *(_format(cell, name) for name in COLUMNS)) for cell in rows]
+        yield title, ('', *(heading for heading, _, _ in COLUMNS.values())), lines
 
 
 def _format(cell: Mapping[str, Any], name: str) -> str:

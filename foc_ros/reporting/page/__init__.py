@@ -33,13 +33,8 @@ POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; sc
 """Content security policy of every page: a browser shows what the page holds and fetches nothing."""
 
 
-def read_part(name: str) -> str:
-    """Return the text of a file of this folder."""
-    return (FOLDER / name).read_text(encoding='utf-8')
-
-
 _TEMPLATES = Environment(autoescape=True, undefined=StrictUndefined, loader=FileSystemLoader(FOLDER), trim_blocks=True)
-_TEMPLATES.globals.update(policy=POLICY, mark=MARK, source=read_part)
+_TEMPLATES.globals.update(policy=POLICY, mark=MARK, source=lambda name: (FOLDER / name).read_text(encoding='utf-8'))
 _TEMPLATES.policies['json.dumps_kwargs'] = {'allow_nan': False, 'separators': (',', ':')}
 
 
@@ -66,7 +61,7 @@ class Section:
 def write_page(
     directory: Path, name: str, title: str, sections: Sequence[Section], warnings: Sequence[str], config: Config | None
 ) -> None:
-    """Write a page with warnings on top, and what made it below: program, date, machine, parameters.
+    """Write a page with warnings on top, and what made it below: program, date, machine, and parameters unlike their defaults.
 
     The folder is made if necessary. A page that foc_ros has made is replaced. Raises InputError where that cannot be done, or
     another file has its name.
@@ -74,20 +69,18 @@ def write_page(
     check_replaceable('--report', directory / name)
     system = f'{platform.system()} on {platform.machine()} with {os.cpu_count()} processors, Python {platform.python_version()}'
     made = f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; {system}.'
-    changed = None if config is None else list_changed(config)
+    changed = None
+    if config is not None:
+        standard = flatten(Config())
+        changed = {name: value for name, value in flatten(config).items() if value != standard[name]}
+        # of a file only its name
+        changed = {name: Path(value).name if isinstance(value, str) else f'{value}' for name, value in changed.items()}
     page = render('study.html', title=title, sections=sections, warnings=warnings, made=made, changed=changed)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         (directory / name).write_text(page, encoding='utf-8', errors='replace')
     except OSError as error:
         raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
-
-
-def list_changed(config: Config) -> dict[str, str]:
-    """Return the parameters that do not have their defaults; of a file only its name."""
-    standard = flatten(Config())
-    changed = {name: value for name, value in flatten(config).items() if value != standard[name]}
-    return {name: Path(value).name if isinstance(value, str) else f'{value}' for name, value in changed.items()}
 
 
 def make_picture(figure: Any, caption: str) -> Picture:

@@ -87,20 +87,27 @@ class MarkerTable:
             newest_ns = max(newest_ns, stamp_ns)
             if marker.action not in (ADD, DELETE, DELETE_ALL):
                 raise MessageError(f'{name}.action', 'ADD (0), DELETE (2) or DELETEALL (3)', marker.action)
-            reason = _find_reason_to_drop(marker) if marker.action == ADD else None
-            if reason is not None:
+            reason = ''
+            if marker.action == ADD and marker.type not in (BOX, SPHERE, CYLINDER):
+                reason = 'not_a_shape'
+            elif marker.action == ADD and not _is_finite(marker.pose, marker.scale, is_turned=marker.type == BOX):
+                reason = 'not_finite'
+            if reason:
                 dropped[reason] += 1
             if marker.action == DELETE_ALL:
                 held = {other: kept for other, kept in held.items() if key[0] not in ('', other[0])}
             elif marker.action == DELETE or reason == 'not_a_shape':
                 held.pop(key, None)
-            elif reason is None:
+            elif not reason:
                 given, transform = place(marker.header)
                 if held and given != frame_id:
                     raise MessageError(f'{name}.header.frame_id', f"'{frame_id}', as the other markers", f"'{given}'")
                 frame_id = given
                 outline = _outline_marker(marker, name, plane, transform)
-                held[key] = outline, radius_stddev, _find_expiry(marker, name, stamp_ns or now_ns)
+                start_ns, lifetime_ns = stamp_ns or now_ns, int(marker.lifetime.sec) * NANOSECONDS + int(marker.lifetime.nanosec)
+                if lifetime_ns < 0:
+                    raise MessageError(f'{name}.lifetime', 'at least 0 s (0: no end)', f'{lifetime_ns / NANOSECONDS:g} s')
+                held[key] = outline, radius_stddev, start_ns + lifetime_ns if lifetime_ns and start_ns else math.inf
         if len(held) > MAX_ROWS:
             raise MessageError('markers', f'at most {MAX_ROWS} obstacles held at a time', len(held))
         return MarkerTable(MappingProxyType(held), frame_id, newest_ns, MappingProxyType(dropped))
@@ -121,12 +128,6 @@ class MarkerTable:
         return {key: marker for key, marker in self.markers.items() if now_ns < marker[2]}
 
 
-def _find_reason_to_drop(marker: Any) -> str | None:
-    if marker.type not in (BOX, SPHERE, CYLINDER):
-        return 'not_a_shape'
-    return None if _is_finite(marker.pose, marker.scale, is_turned=marker.type == BOX) else 'not_finite'
-
-
 def _outline_marker(marker: Any, name: str, plane: str, transform: Transform) -> Outline:
     position, size = transform.apply(_read(marker.pose.position)), _read(marker.scale)
     check_coordinates(f'{name}.pose.position', position.tolist())
@@ -138,13 +139,6 @@ def _outline_marker(marker: Any, name: str, plane: str, transform: Transform) ->
     if marker.type == SPHERE:
         return Outline(centre, POINT, float(max(size)) / 2.0, UNKNOWN_HEIGHTS)
     return Outline(centre, POINT, float(max(size[:2])) / 2.0, make_heights(height, size[2]))
-
-
-def _find_expiry(marker: Any, name: str, start_ns: int) -> float:
-    lifetime_ns = int(marker.lifetime.sec) * NANOSECONDS + int(marker.lifetime.nanosec)
-    if lifetime_ns < 0:
-        raise MessageError(f'{name}.lifetime', 'at least 0 s (0: no end)', f'{lifetime_ns / NANOSECONDS:g} s')
-    return start_ns + lifetime_ns if lifetime_ns and start_ns else math.inf
 
 
 @dataclass(frozen=True)

@@ -22,14 +22,9 @@ from .plane import NO_TRANSFORM, Transform, lift, make_heights, project
 
 REQUIRED = ('x', 'y', 'z', 'radius')
 COLUMNS = (*REQUIRED, 'radius_stddev', 'vx', 'vy', 'vz', 'size_x', 'size_y', 'yaw', 'size_z')
-BOX = COLUMNS[8:11]
-"""Columns of which any makes the rows boxes: full lengths along its own axes [m] and its angle to the plane's first axis."""
 IDENTITY = 'id'
 MAX_ROWS = 20_000
 """Largest number of obstacles in one message, or kept from markers."""
-
-MOST_TILT = 1e-3
-"""Sine of the largest angle between the task plane and the sizes of boxes after a transform."""
 
 _LOWEST = np.array([[0.0 if name.startswith(('radius', 'size')) else -MAX_COORDINATE] for name in COLUMNS])
 _DTYPES = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}
@@ -67,10 +62,8 @@ def decode_point_cloud(message: Any, plane: str, place: Place = stay) -> Decoded
     if transform is not NO_TRANSFORM:
         _transform(columns, table.dtype.names or (), transform, plane)
     is_finite = np.logical_and.reduce(np.isfinite(columns))
-    _check_bounds(columns, is_finite)
-    is_box = not set(BOX).isdisjoint(table.dtype.names or ())
-    if is_box:
-        _check_extent(columns, is_finite)
+    is_box = not {'size_x', 'size_y', 'yaw'}.isdisjoint(table.dtype.names or ())
+    _check_numbers(columns, is_finite, is_box)
     rows = np.flatnonzero(is_finite)
     identities = table[IDENTITY] if IDENTITY in (table.dtype.names or ()) else np.arange(len(table))
     latest = dict(zip(identities[rows].tolist(), rows.tolist(), strict=True))
@@ -144,7 +137,7 @@ def _transform(columns: Array, names: tuple[str, ...], transform: Transform, pla
     rotation, sizes = transform.rotation, [name for name in ('size_x', 'size_y', 'size_z') if name in names]
     if sizes:
         tilt = float(np.abs(project((rotation @ lift(np.eye(2), 0.0, plane).T).T, plane)[1]).max())
-        if tilt > MOST_TILT:
+        if tilt > 1e-3:
             wanted = 'boxes that the transform leaves in the task plane'
             raise MessageError(f'fields[{sizes[0]}]', wanted, f'a tilt of {tilt:.3g}')
     with np.errstate(invalid='ignore', over='ignore'):  # rows that are not finite are dropped
@@ -158,16 +151,14 @@ def _transform(columns: Array, names: tuple[str, ...], transform: Transform, pla
         columns[5:8] = rotation @ columns[5:8]
 
 
-def _check_bounds(columns: Array, is_finite: NDArray[np.bool_]) -> None:
+def _check_numbers(columns: Array, is_finite: NDArray[np.bool_], is_box: bool) -> None:
+    """Raise MessageError for a number out of its bounds, and where boxes are possible, for a row without any extent."""
     is_wrong = ((columns < _LOWEST) | (columns > MAX_COORDINATE)) & is_finite
     if is_wrong.any():
         column, row = np.argwhere(is_wrong)[0]
         name, value = COLUMNS[column], columns[column, row]
         unit = 'm/s' if name.startswith('v') else 'rad' if name == 'yaw' else 'm'
         raise MessageError(f'{name}[{row}]', f'a number in [{_LOWEST[column, 0]:g}, {MAX_COORDINATE:g}] {unit}', f'{value:g}')
-
-
-def _check_extent(columns: Array, is_finite: NDArray[np.bool_]) -> None:
     is_empty = (columns[[COLUMNS.index(name) for name in ('radius', 'size_x', 'size_y')]] == 0.0).all(axis=0) & is_finite
-    for row in np.flatnonzero(is_empty)[:1]:
+    for row in np.flatnonzero(is_empty & is_box)[:1]:
         raise MessageError(f'radius[{row}]', 'a number > 0 m where size_x and size_y are 0', 0)

@@ -19,9 +19,6 @@ MAX_COORDINATE = 1e4
 """Largest coordinate of a hand, a goal or an obstacle [m]; a larger one has a wrong unit."""
 
 MAX_GOALS = 256
-NORM_ERROR = 0.1
-"""Difference from 1 of the norm of a rotation that is one, rounded or not normalised."""
-
 
 Place = Callable[[Any], tuple[str, Transform]]
 """Function from a std_msgs/Header to the frame in which its message is used, and the transform to there."""
@@ -35,8 +32,7 @@ def stay(header: Any) -> tuple[str, Transform]:
 def decode_hand_sample(message: Any, plane: str, place: Place = stay) -> HandSample:
     """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
 
-    Raises LostHandError for a pose without data, and MessageError for a coordinate beyond MAX_COORDINATE and for a stamp of 0,
-    which means "not set".
+    Raises LostHandError for a pose without data, MessageError for a coordinate beyond MAX_COORDINATE and a stamp that is not set.
     """
     check_hand_pose(message.pose)
     stamp_ns = decode_stamp(message.header)
@@ -58,7 +54,7 @@ def check_hand_pose(pose: Any) -> None:
         if not math.isfinite(value):
             raise LostHandError(f'pose.position.{axis}', 'a finite number [m]', value)
     norm = math.hypot(turn.x, turn.y, turn.z, turn.w)
-    if not any(place) and not abs(norm - 1.0) < NORM_ERROR:
+    if not any(place) and not abs(norm - 1.0) < 0.1:
         raise LostHandError(
             'pose', 'a position, or an orientation of norm 1', f'0 and norm {norm:g}: the tracker has lost the hand'
         )

@@ -17,10 +17,6 @@ from .plane import lift, project
 from .types import MessageTypes, make_header, make_marker
 
 ARROW, SPHERE = 0, 2
-METRES_PER_NEWTON = 0.02
-ARROW_SCALE = (0.004, 0.008, 0.0)
-"""Diameters of the shaft and the head of the arrow [m]."""
-REFERENCE_DIAMETER = 0.008
 COLOUR = (0.0, 0.62, 0.45, 0.9)
 
 
@@ -69,28 +65,25 @@ def blend_twist(output: GuidanceOutput, command: Any, plane: str, types: Message
 
 
 def encode_guidance_markers(output: GuidanceOutput, place: Place, types: MessageTypes) -> list[Any]:
-    """Encode the force as an arrow from the hand, and the reference as a sphere."""
+    """Encode the force as an arrow from the hand, of 2 cm for each newton, and the reference as a sphere of 8 mm."""
     start = lift(output.position, place.height, place.plane)
-    end = start + METRES_PER_NEWTON * lift(output.force, 0.0, place.plane)
+    end = start + 0.02 * lift(output.force, 0.0, place.plane)
     reference = encode_reference(output, place, types)
     shared = {'header': reference.header, 'lifetime': types.make('builtin_interfaces/msg/Duration', sec=1)}
     points = [types.fill('geometry_msgs/msg/Point', each.tolist()) for each in (start, end)]
     arrow = {'pose': encode_pose(types, (0.0, 0.0, 0.0)), 'points': points}
     return [
-        make_marker(types, 'guidance', 0, ARROW, COLOUR, ARROW_SCALE, **arrow, **shared),
-        make_marker(types, 'guidance', 1, SPHERE, COLOUR, 3 * (REFERENCE_DIAMETER,), pose=reference.pose, **shared),
+        make_marker(types, 'guidance', 0, ARROW, COLOUR, (0.004, 0.008, 0.0), **arrow, **shared),
+        make_marker(types, 'guidance', 1, SPHERE, COLOUR, (0.008, 0.008, 0.008), pose=reference.pose, **shared),
     ]
 
 
-WRENCH, REFERENCE, STIFFNESS, TWIST = (f'guidance/{name}' for name in ('wrench', 'reference', 'stiffness', 'twist'))
-TWIST_TYPE = 'geometry_msgs/msg/TwistStamped'
-Encoder = Callable[[GuidanceOutput, Place, MessageTypes], Any]
-GUIDANCE_OUTPUTS: dict[str, tuple[str, Encoder]] = {
-    WRENCH: ('geometry_msgs/msg/WrenchStamped', encode_wrench),
-    REFERENCE: ('geometry_msgs/msg/PoseStamped', encode_reference),
-    STIFFNESS: ('std_msgs/msg/Float64MultiArray', encode_stiffness),
+TWIST, TWIST_TYPE = 'guidance/twist', 'geometry_msgs/msg/TwistStamped'
+GUIDANCE_OUTPUTS: dict[str, tuple[str, Callable[[GuidanceOutput, Place, MessageTypes], Any]]] = {
+    'guidance/wrench': ('geometry_msgs/msg/WrenchStamped', encode_wrench),
+    'guidance/reference': ('geometry_msgs/msg/PoseStamped', encode_reference),
+    'guidance/stiffness': ('std_msgs/msg/Float64MultiArray', encode_stiffness),
 }
 """Message type and encoder of every output of each update, by the name of its topic below the node's name."""
-UNSTAMPED = 'guidance/wrench_unstamped'
-LIVE_OUTPUTS = GUIDANCE_OUTPUTS | {UNSTAMPED: ('geometry_msgs/msg/Wrench', encode_force)}
+LIVE_OUTPUTS = GUIDANCE_OUTPUTS | {'guidance/wrench_unstamped': ('geometry_msgs/msg/Wrench', encode_force)}
 """The same with what only a node publishes, if the parameter `guidance.unstamped` says so: a bag has no use for it."""

@@ -21,17 +21,12 @@ CLOUD_ROW = np.dtype([(name, '<i4' if name == 'id' else '<f4') for name in _NAME
 """One circle of the `obstacles` table [m], and its id."""
 BOX_ROW = np.dtype([*CLOUD_ROW.descr, *((name, '<f4') for name in _BOX_NAMES)])
 """One obstacle of a table with boxes: circles have the sizes 0."""
-CUBE, GREY = 1, (0.45, 0.45, 0.5, 0.9)
 
 
 def encode_pose(types: MessageTypes, position: Iterable[float]) -> Any:
     """Encode a geometry_msgs/Pose without rotation."""
-    return types.fill('geometry_msgs/msg/Pose', (types.fill('geometry_msgs/msg/Point', position), _no_rotation(types)))
-
-
-@lru_cache(maxsize=8)
-def _no_rotation(types: MessageTypes) -> Any:
-    return types.fill('geometry_msgs/msg/Quaternion', (0.0, 0.0, 0.0, 1.0))
+    no_rotation = types.make('geometry_msgs/msg/Quaternion', w=1.0)
+    return types.fill('geometry_msgs/msg/Pose', (types.fill('geometry_msgs/msg/Point', position), no_rotation))
 
 
 def encode_hand_pose(types: MessageTypes, stamp_ns: int, frame_id: str, position: Iterable[float]) -> Any:
@@ -61,9 +56,9 @@ def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Se
 
 def encode_boxes(types: MessageTypes, stamp_ns: int, frame_id: str, boxes: Mapping[str, Sequence[float]]) -> Any:
     """Encode boxes by name, x, y, z of the centre and full lengths along these axes [m], as a MarkerArray of cubes."""
-    header = make_header(types, stamp_ns, frame_id)
+    header, cube, grey = make_header(types, stamp_ns, frame_id), 1, (0.45, 0.45, 0.5, 0.9)
     markers = [
-        make_marker(types, name, 0, CUBE, GREY, box[3:], header=header, pose=encode_pose(types, box[:3]))
+        make_marker(types, name, 0, cube, grey, box[3:], header=header, pose=encode_pose(types, box[:3]))
         for name, box in boxes.items()
     ]
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
@@ -83,7 +78,7 @@ def encode_table(types: MessageTypes, cloud_header: Any, table: np.ndarray[Any, 
         header=cloud_header,
         height=1,
         width=len(table),
-        fields=_encode_columns(types, table.dtype),
+        fields=_encode_columns(types, table.dtype),  # all clouds of one kind share them
         point_step=table.dtype.itemsize,
         row_step=table.nbytes,
         data=table.tobytes(),
@@ -93,6 +88,5 @@ def encode_table(types: MessageTypes, cloud_header: Any, table: np.ndarray[Any, 
 
 @lru_cache(maxsize=8)
 def _encode_columns(types: MessageTypes, columns: np.dtype[np.void]) -> list[Any]:
-    """Return the PointFields of a table; cached, because all clouds of one kind share them."""
     fields = (columns.fields or {}).items()
     return [types.fill('sensor_msgs/msg/PointField', (name, at, _DATATYPES[kind.str], 1)) for name, (kind, at, *_) in fields]

@@ -15,12 +15,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
@@ -32,24 +31,18 @@ from .ranking import describe_candidate, find_drawn_curve, order_candidates
 from .types import MessageTypes, make_header, make_marker
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
-DELETE_ALL = 3
+"""Types of markers."""
 LIFETIME_S = 1.0
 ELLIPSES = 6
 """Number of ellipses along each path."""
 MAX_DRAWN = 128
 """Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
-ARC_POINTS = 32
-"""Points on a full circle of an outline."""
 THICKNESS, TEXT_HEIGHT = 0.002, 0.008
-LABELLED = 0.01
-"""Least likelihood of a candidate with a label: those of less likely ones would cover the others."""
 MOTOR, TOTAL = 'motor_noise', 'total_uncertainty'
 """Namespaces of the two ellipses."""
 ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
 """Opacity as a share of that of the path, and thickness [m]: the inner ellipse stands out of the outer one."""
 LEGEND = 'ellipses of one standard deviation; inner: motor noise, which eta is about; outer: total uncertainty'
-LEGEND_BELOW_M = 0.05
-"""Distance of the legend from the hand, along the second axis of the plane."""
 
 Colour = tuple[float, float, float, float]
 GREY: Colour = (0.55, 0.55, 0.55, 0.5)
@@ -62,7 +55,7 @@ def encode_markers(prediction: Prediction, plane: str, types: MessageTypes) -> A
     """Encode the MarkerArray; unsolved candidates are grey and labelled with the reason."""
     encoder = _MarkerEncoder(prediction, plane, types)
     unsolved = [outcome for outcome in prediction.candidates if not outcome.has_likelihood]
-    markers = [encoder.encode('', 0, 0, action=DELETE_ALL)]
+    markers = [encoder.encode('', 0, 0, action=3)]  # DELETEALL
     for index, outcome in enumerate([*order_candidates(prediction), *unsolved]):
         markers.extend(encoder.encode_candidate(index, outcome))
     markers.extend(encoder.encode_legend())
@@ -99,7 +92,7 @@ class _MarkerEncoder:
         points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[*map(self._encode_point, points)])
-        if outcome.has_likelihood and likelihood < LABELLED:
+        if outcome.has_likelihood and likelihood < 0.01:  # its label would cover those of the others
             return
         label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goal_positions))}) {text}'
         yield self.encode('label', index, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
@@ -107,7 +100,7 @@ class _MarkerEncoder:
     def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
         """Yield ellipses of one standard deviation about the mean, spread over the path."""
         path = outcome.solution.path
-        steps = _spread_steps(len(path))
+        steps = np.unique(np.linspace(0, len(path) - 1, ELLIPSES + 1).round().astype(np.intp)[1:])
         covariance = outcome.motor_covariance if name == MOTOR else outcome.covariance
         variances, axes = np.linalg.eigh(covariance[steps, :2, :2])
         diameters = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
@@ -124,13 +117,17 @@ class _MarkerEncoder:
     def encode_legend(self) -> Iterator[Any]:
         """Yield the legend of the ellipses, below the hand, if any are drawn, and the shares that no candidate has."""
         for outcome in self.prediction.candidates_with_likelihood[:1]:
-            (place,) = self._lift(outcome.solution.path[:1] - [0.0, LEGEND_BELOW_M])
+            (place,) = self._lift(outcome.solution.path[:1] - [0.0, 0.05])
             shares = (self.prediction.unknown, 'unknown'), (self.prediction.other, 'another goal')
             text = '\n'.join([LEGEND, *(f'{100 * share:.0f} % {name}' for share, name in shares if share > 0.0)])
             yield self.encode('legend', 0, TEXT, (*GREY[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
 
     def encode_obstacles(self) -> Iterator[Any]:
-        near = self._find_nearest(self.prediction.obstacles)
+        near = self.prediction.obstacles
+        if len(near) > MAX_DRAWN and self.prediction.candidates:
+            distances = measure_offsets(self.prediction.candidates[0].candidate.guess[0], near)[1][0] - near.radius
+            near = near.take(np.argsort(distances, kind='stable'))
+        near = near.take(list(range(min(len(near), MAX_DRAWN))))
         for name, growths, colour in (
             ('obstacle', np.zeros(len(near)), OBSTACLE),
             ('obstacle_deviation', near.radius_stddev, DEVIATION),
@@ -144,16 +141,9 @@ class _MarkerEncoder:
         if obstacles.corners[row] == 1:
             diameter = 2 * (float(obstacles.radius[row]) + growth)
             return self.encode(name, row, CYLINDER, colour, (diameter, diameter, 10 * THICKNESS), centre)
-        outline = self._lift(trace_obstacle(obstacles, row, growth, ARC_POINTS))
+        outline = self._lift(trace_obstacle(obstacles, row, growth, 32))
         corners = [corner for before, after in pairwise(outline) for corner in (centre, before, after)]
         return self.encode(name, row, TRIANGLES, colour, points=[*map(self._encode_point, corners)])
-
-    def _find_nearest(self, obstacles: Obstacles) -> Obstacles:
-        if len(obstacles) <= MAX_DRAWN or not self.prediction.candidates:
-            return obstacles.take(list(range(min(len(obstacles), MAX_DRAWN))))
-        hand = self.prediction.candidates[0].candidate.guess[0]
-        distances = measure_offsets(hand, obstacles)[1][0] - obstacles.radius
-        return obstacles.take(np.argsort(distances, kind='stable')[:MAX_DRAWN])
 
     def encode(
         self,
@@ -166,7 +156,9 @@ class _MarkerEncoder:
         angle: float = 0.0,
         **rest: Any,
     ) -> Any:
-        turn = _compute_rotation(angle, self.plane) if kind == CYLINDER else (0.0, 0.0, 0.0, 1.0)
+        x, y, z, w = _PLANE_ROTATION[self.plane if kind == CYLINDER else 'xy']  # a cylinder stands on the plane
+        sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
+        turn = x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine, w * cosine - z * sine
         orientation = self.types.fill('geometry_msgs/msg/Quaternion', turn)
         pose = self.types.make('geometry_msgs/msg/Pose', position=self._encode_point(centre), orientation=orientation)
         return make_marker(self.types, name, identity, kind, colour, scale, pose=pose, **self._shared_fields, **rest)
@@ -188,22 +180,9 @@ class _MarkerEncoder:
         return self.types.make('geometry_msgs/msg/Point', x=x, y=y, z=z)
 
 
-@lru_cache(maxsize=4)
-def _spread_steps(samples: int) -> NDArray[np.intp]:
-    """Return the indices of up to ELLIPSES samples, evenly spread, with the last and without the first."""
-    return np.unique(np.linspace(0, samples - 1, ELLIPSES + 1).round().astype(np.intp)[1:])
-
-
 _PLANE_ROTATION = {
     'xy': (0.0, 0.0, 0.0, 1.0),
     'xz': (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)),
     'yz': (0.5, 0.5, 0.5, 0.5),
 }
 """Quaternion (x, y, z, w) that rotates the x and y axes onto the axes of the plane."""
-
-
-def _compute_rotation(angle: float, plane: str) -> tuple[float, float, float, float]:
-    """Return the quaternion of a cylinder that stands on the plane, its x axis at an angle [rad] to the plane's first axis."""
-    x, y, z, w = _PLANE_ROTATION[plane]
-    sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
-    return x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine, w * cosine - z * sine

@@ -27,10 +27,9 @@ from .types import MessageTypes, make_header
 
 _PAIRS = ('xx', 'xy', 'xz', 'yy', 'yz', 'zz')
 _MOTOR = 'motor_'
-_FLOATS = ('x', 'y', 'z', 't', 'vx', 'vy', 'vz', *_PAIRS)
 CLOUD_ROW = np.dtype(
     [
-        *((name, '<f4') for name in _FLOATS),
+        *((name, '<f4') for name in ('x', 'y', 'z', 't', 'vx', 'vy', 'vz', *_PAIRS)),
         ('candidate', '<u4'),
         ('likelihood', '<f4'),
         ('compromised', '<u4'),
@@ -68,29 +67,27 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
     mean = np.concatenate([solution.mean for solution in solutions])
     for place, axis in enumerate(plane):
         rows[axis], rows['v' + axis] = mean[:, place], mean[:, 2 + place]
-    _fill_heights(rows, prediction, next(axis for axis in 'xyz' if axis not in plane))
+    normal = next(axis for axis in 'xyz' if axis not in plane)  # its covariances with the axes of the plane are zero
+    rows[normal] = prediction.height
+    heights = [outcome.height for outcome in outcomes if outcome.height is not None]
+    if heights:
+        rows[normal], rows['v' + normal] = np.concatenate([each.mean[:, :2] for each in heights]).T
+        rows[2 * normal] = np.concatenate([each.covariance[:, 0, 0] for each in heights])
+        rows[_MOTOR + 2 * normal] = np.concatenate([each.motor_covariance[:, 0, 0] for each in heights])
     for prefix, name in (('', 'covariance'), (_MOTOR, 'motor_covariance')):
         covariance = np.concatenate([getattr(outcome, name)[:, :2, :2] for outcome in outcomes])
         rows[prefix + 2 * plane[0]], rows[prefix + 2 * plane[1]] = covariance[:, 0, 0], covariance[:, 1, 1]
         rows[prefix + plane] = covariance[:, 0, 1]
     rows['t'] = np.concatenate([solution.times for solution in solutions])
-    rows['candidate'] = np.repeat(np.arange(len(outcomes)), lengths)
-    rows['likelihood'] = np.repeat([outcome.likelihood for outcome in outcomes], lengths)
-    rows['goal'] = np.repeat([outcome.candidate.goal for outcome in outcomes], lengths)
-    rows['way'] = np.repeat([outcome.way for outcome in outcomes], lengths)
-    rows['compromised'] = np.repeat([not outcome.is_solved for outcome in outcomes], lengths)
-    rows['status'] = np.repeat([STATUSES.index(outcome.solution.status) for outcome in outcomes], lengths)
+    facts = [
+        (rank, each.likelihood, each.candidate.goal, each.way, not each.is_solved, STATUSES.index(each.solution.status))
+        for rank, each in enumerate(outcomes)
+    ]
+    for name, values in zip(
+        ('candidate', 'likelihood', 'goal', 'way', 'compromised', 'status'), zip(*facts, strict=True), strict=True
+    ):
+        rows[name] = np.repeat(values, lengths)
     return rows
-
-
-def _fill_heights(rows: NDArray[np.void], prediction: Prediction, normal: str) -> None:
-    """Fill in the columns of the normal of the plane; its covariances with the axes of the plane are zero."""
-    rows[normal] = prediction.height
-    heights = [outcome.height for outcome in order_candidates(prediction) if outcome.height is not None]
-    if heights:
-        rows[normal], rows['v' + normal] = np.concatenate([each.mean[:, :2] for each in heights]).T
-        rows[2 * normal] = np.concatenate([each.covariance[:, 0, 0] for each in heights])
-        rows[_MOTOR + 2 * normal] = np.concatenate([each.motor_covariance[:, 0, 0] for each in heights])
 
 
 def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
@@ -156,13 +153,12 @@ def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     return types.fill('nav_msgs/msg/Path', (make_header(types, stamp_ns, frame_id), poses))
 
 
-Encoder = Callable[[Prediction, str, MessageTypes], Any]
-OUTPUTS: dict[str, tuple[str, Encoder]] = {
+OUTPUTS: dict[str, tuple[str, Callable[[Prediction, str, MessageTypes], Any]]] = {
     'prediction': ('sensor_msgs/msg/PointCloud2', encode_prediction_cloud),
-    'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda prediction, _, types: encode_likelihoods(prediction, types)),
+    'likelihoods': ('std_msgs/msg/Float64MultiArray', lambda given, _, types: encode_likelihoods(given, types)),
     'likelihoods_by_name': (
         'diagnostic_msgs/msg/DiagnosticArray',
-        lambda prediction, _, types: encode_likelihoods_by_name(prediction, types),
+        lambda given, _, types: encode_likelihoods_by_name(given, types),
     ),
     'path': ('nav_msgs/msg/Path', encode_path),
     'markers': ('visualization_msgs/msg/MarkerArray', encode_markers),

@@ -19,8 +19,6 @@ from foc_ros.core.types import Array
 
 _AXES = {'xy': (slice(0, 2), 2), 'xz': (slice(0, 3, 2), 1), 'yz': (slice(1, 3), 0)}
 """The two axes of each plane as a slice, and its normal."""
-CORNERS = np.array([*product((-1.0, 1.0), repeat=3)])
-"""Corners (8, 3) of a box, in halves of its size."""
 
 
 def project(points: ArrayLike, plane: str) -> tuple[Array, Array]:
@@ -71,7 +69,8 @@ def project_box(centre: ArrayLike, size: ArrayLike, rotation: Array, plane: str)
     The outline, the convex hull of the projections of the eight corners, is given by its middle (2,) and its vertices (v, 2) from
     there, anticlockwise [m]. centre (3,), size (3,) of full lengths [m]; rotation (3, 3): of the box.
     """
-    corners = np.asarray(centre, dtype=float) + CORNERS * np.asarray(size, dtype=float) / 2.0 @ rotation.T
+    signs = np.array([*product((-1.0, 1.0), repeat=3)])
+    corners = np.asarray(centre, dtype=float) + signs * np.asarray(size, dtype=float) / 2.0 @ rotation.T
     places, heights = project(corners, plane)
     return *make_hull_polygon(places), make_heights((heights.min() + heights.max()) / 2.0, np.ptp(heights))
 

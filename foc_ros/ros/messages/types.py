@@ -11,6 +11,7 @@ from __future__ import annotations
 import array
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -32,7 +33,7 @@ class MessageTypes(ABC):
     """The message classes of one library."""
 
     def __init__(self) -> None:
-        self._layouts: dict[str, _Layout] = {}
+        self._find_layout = cache(self._describe)
 
     def make(self, name: str, /, **values: Any) -> Any:
         """Create a message of type `name`, such as 'std_msgs/msg/Header'; fields that are not given have their defaults.
@@ -40,7 +41,7 @@ class MessageTypes(ABC):
         Messages may share the values of their fields, so they must not be changed. rosbags knows no defaults but zero: give a
         Quaternion its w. Raises TypeError for a field that the type does not have.
         """
-        layout = self._layouts.get(name) or self._keep_layout(name)
+        layout = self._find_layout(name)
         if unknown := values.keys() - layout.converters.keys():
             raise TypeError(f'{name} has no field {", ".join(sorted(unknown))}')
         given = {field: layout.converters[field](value) for field, value in values.items()}
@@ -48,22 +49,17 @@ class MessageTypes(ABC):
 
     def fill(self, name: str, values: Iterable[Any]) -> Any:
         """Create a message from the values of all its fields in their order, such as a Point from x, y and z."""
-        layout = self._layouts.get(name) or self._keep_layout(name)
-        return self.make(name, **dict(zip(layout.converters, values, strict=True)))
-
-    def _keep_layout(self, name: str) -> _Layout:
-        layout = self._layouts[name] = self._find_layout(name)
-        return layout
+        return self.make(name, **dict(zip(self._find_layout(name).converters, values, strict=True)))
 
     @abstractmethod
-    def _find_layout(self, name: str) -> _Layout:
+    def _describe(self, name: str) -> _Layout:
         """Return the layout of a message type."""
 
 
 class RclpyTypes(MessageTypes):
     """The message classes of rclpy, each imported when it is first used."""
 
-    def _find_layout(self, name: str) -> _Layout:
+    def _describe(self, name: str) -> _Layout:
         message_class = find_message_class(name)
         blank = message_class()
         names = message_class.get_fields_and_field_types()
@@ -77,7 +73,7 @@ class RosbagsTypes(MessageTypes):
         super().__init__()
         self.typestore = typestore
 
-    def _find_layout(self, name: str) -> _Layout:
+    def _describe(self, name: str) -> _Layout:
         defaults = {field: self._find_default(kind) for field, kind in self.typestore.fielddefs[name][1]}
         converters = {field: _find_converter(value) for field, value in defaults.items()}
         return _Layout(self.typestore.types[name], converters, defaults)
@@ -115,15 +111,11 @@ def _find_converter(default: Any) -> Callable[[Any], Any]:
     return type(default) if isinstance(default, (float, int, str, list)) else lambda value: value
 
 
-def make_stamp(types: MessageTypes, stamp_ns: int) -> Any:
-    """Return a builtin_interfaces/Time of nanoseconds; beyond its 32 bits, the seconds are the first or last possible."""
-    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-    return types.fill('builtin_interfaces/msg/Time', (min(max(seconds, -(2**31)), 2**31 - 1), nanoseconds))
-
-
 def make_header(types: MessageTypes, stamp_ns: int, frame_id: str) -> Any:
-    """Return a std_msgs/Header."""
-    return types.fill('std_msgs/msg/Header', (make_stamp(types, stamp_ns), frame_id))
+    """Return a std_msgs/Header; beyond 32 bits, the seconds of the stamp are the first or last possible."""
+    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+    stamp = types.fill('builtin_interfaces/msg/Time', (min(max(seconds, -(2**31)), 2**31 - 1), nanoseconds))
+    return types.fill('std_msgs/msg/Header', (stamp, frame_id))
 
 
 def make_marker(

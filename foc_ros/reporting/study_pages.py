@@ -1,0 +1,302 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The pages about many recordings or trials: an evaluation, a fit, the closed-loop study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from foc_ros.analysis.evaluation import report as evaluation
+from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED, UNIFORM
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
+from foc_ros.analysis.evaluation.scores import TENTHS
+from foc_ros.analysis.fitting import fit as fitting
+from foc_ros.analysis.recordings import Recording
+from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.simulation import FOC, NONE, study
+from foc_ros.analysis.simulation.operators import Task
+from foc_ros.core.config import Config
+from foc_ros.core.errors import FocError
+from foc_ros.core.types import NANOSECONDS
+from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE
+
+from .draw import draw_scene, get_class_style
+from .figures import make_moment_figure
+from .page import Section, explain_tables, make_chart, make_picture, write_page
+from .report import ReportCollector
+from .views import build_hand_trajectory, choose_moment
+
+FEW = 20
+"""Number of recordings or trials below which a page warns."""
+AHEAD_S, LEVEL = '0.5', '0.9'
+"""The time ahead [s] and the probability of a region that the summary of an evaluation is about."""
+NAT = 'the unit of a natural logarithm of a probability. 0.69 nat more mean twice the probability for what really happened.'
+EVALUATION_WORDS = {
+    'nat': NAT,
+    'above uniform': 'compared with a guess that finds all answers equally likely. 0 is no better than this; more is better.',
+    'tenths': 'the first column is about the beginning of the movement, when little is known, the last one about its end.',
+    'gain': 'the log-likelihood above uniform [nat], averaged over the whole movement.',
+    'ECE': 'the expected calibration error: how far the stated probabilities are from the shares that come true. 0 is best.',
+    'Brier': 'the mean squared error of the probabilities. 0 is best.',
+    'correct': 'how often the likeliest answer is the true one.',
+    'leads from': 'the part of the movement from which on the true answer stays the likeliest one. Less is better.',
+    'average': 'the distance of the predicted from the true position, over all times until then.',
+    'final': 'this distance at that time alone.',
+    'Negative log-density': 'how improbable the true position was. Less is better: both a wrong place and a wrong width count.',
+    'inside': 'how often the true position is in the region that should hold this share of them. The share itself is best.',
+    'held out': 'each recording is scored with the settings that fit the others best, so that none has been learnt by heart.',
+    'best setting': 'the one that fits all recordings best.',
+}
+FIT_WORDS = {
+    'nat': NAT,
+    'above uniform': 'compared with a guess that finds all answers equally likely. 0 is no better than this guess.',
+    'log-likelihood': 'the logarithm of the probability of what the hand really did. More is better.',
+    'log-density': 'how probable the true positions were. More is better; of a negative log-density less is better.',
+    'region of 90 %': 'should hold 90 % of the true positions.',
+    '90 % ellipse': 'should hold 90 % of the true positions, if the hand takes the likeliest path.',
+    'held out': 'scored on recordings that were left out of the fit, so that it cannot have learnt them by heart.',
+    '95 %': 'the interval within which the value would come out from other recordings of this kind; wide means: not well known.',
+}
+SIMULATION_WORDS = {
+    'collisions': 'trials in which the hand entered an obstacle.',
+    'time': 'from the beginning of the movement to the arrival.',
+    'clearance': 'the least distance from an obstacle; negative within one.',
+    'effort': 'the integral of the square of the force of the operator.',
+    'opposing impulse': 'force of the guidance against the direction in which the operator wants to go, added up over time.',
+    'mean opposing force': 'the same on average, in parts of the greatest force of the guidance.',
+    'wrong way': 'where the operator takes another path than predicted: how much more it costs than without guidance.',
+    'bootstrap interval': 'the mean would be in it in 95 of 100 such studies. Two rules whose intervals overlap may be alike.',
+}
+"""What the words in headings, columns and rows of each page mean."""
+
+
+def write_evaluation(
+    directory: Path,
+    title: str,
+    answer: Mapping[str, Any],
+    recordings: Mapping[str, Recording] | None = None,
+    config: Config | None = None,
+) -> None:
+    """Write the page; answer: as of `evaluate --json`, of recordings. Raises InputError where that cannot be done."""
+    counts = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
+    gain = 'mean log-likelihood of the true {} above a uniform guess.'
+    captions = {
+        PATH_CLASS: f'Homotopy class through the obstacles still ahead: {gain.format("class")}',
+        GOAL: f'Goal: {gain.format("goal")}',
+        GAP: 'Gap in the next row: how often the likeliest gap is the true one.',
+    }
+    pictures = []
+    for name, caption in captions.items():
+        if name in answer['questions']:
+            reliability = f'{name}: how often the likeliest answer is true, over its probability, {counts}.'
+            for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
+                pictures.append(make_chart((6.4, 4.6), words, draw, name, answer['questions'][name]))
+    sections = [
+        Section('In short', summarise_evaluation(answer)),
+        *draw_example(recordings, config),
+        Section(pictures=pictures),
+        Section('Compared with simpler predictors', answer['verdict']),
+        *explain_tables(evaluation.make_tables(answer), EVALUATION_WORDS),
+    ]
+    failed = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
+    warnings = [*warn_of_few(answer['recordings'], 'recordings'), *failed]
+    write_page(directory, EVALUATION_PAGE, f'Evaluation: {title}', sections, warnings, config)
+
+
+def summarise_evaluation(answer: Mapping[str, Any]) -> list[str]:
+    """Return the main results of `evaluate --json` in plain words."""
+    sentences = [f'{answer["recordings"]} recordings were predicted, at {answer["predictions"]} moments on the way.']
+    questions = {PATH_CLASS: 'path past the obstacles', GOAL: 'goal', GAP: 'gap in the next row of obstacles'}
+    for name, asked in questions.items():
+        if name in answer['questions']:
+            ours, guess = (answer['questions'][name][each] for each in (PUBLISHED, UNIFORM))
+            chances = [100.0 * np.exp(each['log_likelihood']) for each in (ours, guess)]
+            sentences.append(
+                f'The likeliest {asked} was the one that the hand took in {100.0 * ours["right"]:.0f} % of them. The true '
+                f'one had a probability of {chances[0]:.0f} % (geometric mean); a guess among equals gives it {chances[1]:.0f} %.'
+            )
+    positions = answer['positions']
+    error_m, share = positions['displacement_m'][evaluation.OURS]['final'][AHEAD_S], positions['inside_all'][LEVEL][AHEAD_S]
+    if error_m is not None:
+        sentences.append(f'{AHEAD_S} s ahead, the predicted position was {1e3 * error_m:.0f} mm from the true one on average.')
+    if share is not None:
+        level = 100.0 * float(LEVEL)
+        sentences.append(f'The region that should hold {level:.0f} % of the true positions then held {100.0 * share:.0f} %.')
+    return sentences
+
+
+def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:
+    score = 'right' if name == GAP else 'gain'
+    for predictor, scores in by_predictor.items():
+        if predictor != UNIFORM:
+            heights = [each[score] if each[score] is not None else float('nan') for each in scores['by_tenth']]
+            is_ours = predictor in (PUBLISHED, REFITTED)
+            look = {'linewidth': 2.5} if is_ours else {'linewidth': 1.0, 'linestyle': '--'}
+            axes.plot(range(1, TENTHS + 1), heights, marker='.', label=predictor, **look)
+    axes.set(xlabel='tenth of the distance', xticks=range(1, TENTHS + 1))
+    axes.set_ylabel(evaluation.GAP_TITLE.split(':')[0] if name == GAP else 'log-likelihood above uniform [nat]')
+    axes.axhline(0.0, color='0.4', linewidth=0.8)
+
+
+def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> None:
+    axes.plot([0.0, 1.0], [0.0, 1.0], color='0.4', linewidth=0.8)
+    for predictor in (PUBLISHED, REFITTED, BOLTZMANN):
+        bins = [each for each in by_predictor[predictor]['reliability'] if each['count']]
+        shares = np.array([each['right'] for each in bins])
+        errors = np.abs(np.array([each['interval'] for each in bins]).reshape(-1, 2).T - shares)
+        look = {'marker': 'o', 'markersize': 4, 'capsize': 2, 'label': predictor}
+        (line, *_) = axes.errorbar([each['confidence'] for each in bins], shares, errors, **look)
+        for each in bins if predictor == PUBLISHED else ():
+            place = {'xy': (each['confidence'], each['right']), 'xytext': (5, -9), 'textcoords': 'offset points'}
+            axes.annotate(str(each['count']), **place, fontsize=7, color=line.get_color())
+    axes.set(xlabel='probability of the likeliest answer', ylabel='share of true answers', aspect='equal')
+
+
+def write_fit(
+    directory: Path,
+    title: str,
+    answer: Mapping[str, Any],
+    recordings: Mapping[str, Recording] | None = None,
+    config: Config | None = None,
+) -> None:
+    """Write the page; answer: as of `fit --json`, of recordings, with the fitted configuration.
+
+    Raises InputError where that cannot be done.
+    """
+    count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
+    commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
+    fitted = f'{len(answer["parameters"])} parameters were fitted to {count} recordings.'
+    caption = 'Fitted values as multiples of the given ones, with 95 % intervals by bootstrap over recordings; '
+    caption += 'the line is the given value.'
+    drawn = {name: each for name, each in answer['parameters'].items() if each['given'] > 0.0 and each['value'] > 0.0}
+    pictures = [make_chart((6.4, 0.9 + 0.34 * len(drawn)), caption, _draw_multiples, drawn)] if drawn else []
+    sections = [
+        Section('In short', [fitted, *fitting.make_verdict(answer)]),
+        *draw_example(recordings, config),
+        Section(pictures=pictures),
+        *explain_tables(fitting.make_tables(answer), FIT_WORDS),
+        Section('Run the node with these parameters', rows=commands),
+    ]
+    warnings = [*warn_of_few(count, 'recordings'), *answer['warnings'], *failed]
+    write_page(directory, FIT_PAGE, f'Fit: {title}', sections, warnings, config)
+
+
+def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
+    colour, _ = get_class_style(0)
+    for row, each in enumerate(drawn.values()):
+        ends = [end / each['given'] for end in each['interval'] if end is not None and end > 0.0]
+        axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
+        axes.plot(each['value'] / each['given'], row, marker='o', color=colour)
+    axes.axvline(1.0, color='0.4', linewidth=1.0)
+    axes.set_yticks(range(len(drawn)), list(drawn))
+    axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
+    for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+        set_format('{x:g}')
+    axes.tick_params(axis='x', which='minor', labelsize=7)
+
+
+def write_simulation(
+    directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[study.PairResult], config: Config | None = None
+) -> None:
+    """Write the page; cells: of `simulate --json`. Raises InputError where that cannot be done."""
+    words = 'mean over the paired trials, with its bootstrap interval of 95 %.'
+    measures = [
+        make_chart((6.4, 4.2), f'{study.COLUMNS[name][0]}: {words}', _draw_measure, cells, name)
+        for name in ('collision_rate', 'completion_s', 'opposing_impulse')
+    ]
+    words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
+    trials = [
+        make_chart((6.4, 4.2), f'Operator {each.operator}. {words}', _draw_trial, each.task, each.trials)
+        for each in results
+        if each.task
+    ]
+    sections = [
+        Section('In short', summarise_simulation(cells), measures),
+        *explain_tables(study.make_tables(cells), SIMULATION_WORDS),
+        Section('Single trials', pictures=trials),
+    ]
+    warnings = warn_of_few(min(cell['trials'] for cell in cells), 'trials of each operator') if cells else []
+    write_page(directory, SIMULATION_PAGE, 'Closed-loop study of guidance', sections, warnings, config)
+
+
+def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return for each operator what guidance changes, in plain words."""
+    measures = {'collision_rate': 'collisions in {:.0f} % of the trials', 'completion_s': '{:.2f} s for a movement'}
+    sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
+    for operator in dict.fromkeys(cell['operator'] for cell in cells):
+        by_rule = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}
+        told = [
+            ' and '.join(
+                words.format(study.COLUMNS[name][1] * by_rule[rule][name])
+                for name, words in measures.items()
+                if by_rule[rule][name] is not None
+            )
+            + f' {"with" if rule == FOC else "without"} guidance'
+            for rule in (FOC, NONE)
+            if rule in by_rule
+        ]
+        sentences.append(f'{operator.replace("_", " ").capitalize()}: {"; ".join(told)}.')
+    return sentences
+
+
+def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
+    """Draw the mean of a measure with its interval for every operator and rule."""
+    operators, rules = (list(dict.fromkeys(cell[key] for cell in cells)) for key in ('operator', 'assistance'))
+    heading, factor, _ = study.COLUMNS[name]
+    for number, rule in enumerate(rules):
+        drawn = [cell for cell in cells if cell['assistance'] == rule and cell[name] is not None]
+        at = [operators.index(cell['operator']) + 0.14 * (number - (len(rules) - 1) / 2) for cell in drawn]
+        means = factor * np.array([cell[name] for cell in drawn])
+        bounds = factor * np.array([cell[f'{name}_interval'] for cell in drawn]).reshape(-1, 2)
+        errors = np.maximum(np.abs(bounds.T - means), 0.0)
+        axes.errorbar(at, means, errors, fmt='o', markersize=4, capsize=2, color=get_class_style(number)[0], label=rule)
+    axes.set_xticks(range(len(operators)), [name.replace('_', '\n') for name in operators])
+    axes.set(ylabel=heading, xlim=(-0.5, len(operators) - 0.5))
+    axes.set_ylim(bottom=0.0)
+
+
+def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> None:
+    everything = np.concatenate([task.path.position, task.goals, *(each.position for each in trials.values())])
+    (left, low), (right, high) = (everything.min(axis=0) - 0.04).tolist(), (everything.max(axis=0) + 0.04).tolist()
+    draw_scene(axes, task.obstacles, task.goals, (left, right, low, high))
+    axes.plot(*task.path.position.T, color='black', linestyle='--', linewidth=1.0, label='intended')
+    for number, (rule, trial) in enumerate(trials.items()):
+        look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
+        axes.plot(*trial.position.T, label=rule, **look)
+        touching = trial.position[trial.find_collisions(task)]
+        axes.plot(*touching.T, linestyle='', marker='x', markersize=4, color=look['color'])
+        if rule == FOC:
+            rows = np.linspace(0, len(trial.position) - 1, 24).astype(int)
+            options = {'angles': 'xy', 'scale_units': 'xy', 'scale': 60.0, 'width': 0.004, 'color': look['color']}  # [N/m]
+            axes.quiver(*trial.position[rows].T, *trial.assistance[rows].T, zorder=6, **options)
+
+
+def warn_of_few(count: int, what: str) -> list[str]:
+    """Return a warning where recordings or trials are few."""
+    words = f'Few {what} ({count}): intervals are wide, and differences may be chance. {FEW} or more tell more.'
+    return [words] if count < FEW else []
+
+
+def draw_example(recordings: Mapping[str, Recording] | None, config: Config | None) -> list[Section]:
+    """Return a section with a moment of the first recording that can be replayed, nothing if there is none."""
+    for name, recording in (recordings or {}).items():
+        collected = ReportCollector()
+        try:
+            for step in Replay(config or Config()).steps(islice(recording.items(), 3_000)):
+                collected.add(step)
+        except FocError:
+            continue  # the page lists what cannot be read
+        hand = build_hand_trajectory(collected.samples)
+        for span in hand.find_movements():
+            row = choose_moment(collected.snapshots, *span)
+            if row is not None:
+                snapshot = collected.snapshots[row]
+                words = f'{name}, {(snapshot.stamp_ns - span[0]) / NANOSECONDS:.2f} s after the hand began to move.'
+                picture = make_picture(make_moment_figure(hand, snapshot, span), words)
+                return [Section('One recording with its prediction', pictures=[picture])]
+    return []
