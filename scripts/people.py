@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from page import ROOT, SHARED, format_table, write_blocks
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, published_shares
+from foc_ros.analysis.evaluation.baselines import Baseline, forecast_published
 from foc_ros.analysis.evaluation.observations import ObservedRecording, observe_in_order
 from foc_ros.analysis.evaluation.positions import compute_position_scores
 from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask_all
@@ -49,7 +49,7 @@ OTHER_SCORES = {'area_under_curve_half_way': 2, 'calibration_error': 3, 'loss': 
 """Scores of the share of another goal, with their digits."""
 POINTS = np.arange(1, 10)
 """Tenths of the way at which goals are asked for."""
-PUBLISHED = Baseline('published', partial(forecast_shares, published_shares), (None,))
+PUBLISHED = Baseline('published', forecast_published, (None,))
 
 
 def is_held_out(name: str) -> bool:
