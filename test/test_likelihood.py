@@ -115,11 +115,11 @@ def test_gaps_keep_their_weight_and_share_it_evenly() -> None:
     assert p[1] == pytest.approx(p[2])
 
 
-def test_goals_of_one_way_are_compared_in_full_and_its_weight_is_their_number() -> None:
+def test_goals_of_one_way_are_compared_in_full_and_share_its_weight_however_many_they_are() -> None:
     decisions = Decisions(np.zeros(5, dtype=np.intp), np.array([0, 0, 1, 1, 2]), np.zeros(5, dtype=np.intp))
     p = compute_likelihoods(FIVE_COSTS, CONFIG, decisions=decisions)
     assert p[0] / p[1] == pytest.approx((FIVE_COSTS[1] / FIVE_COSTS[0]) ** CONFIG.beta)
-    np.testing.assert_allclose(np.bincount(decisions.way, p), [0.4, 0.4, 0.2])
+    np.testing.assert_allclose(np.bincount(decisions.way, p), np.full(3, 1.0 / 3.0))
 
 
 def test_weaving_costs_a_factor() -> None:

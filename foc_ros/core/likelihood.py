@@ -27,11 +27,11 @@ h, S_W(h) = {W': tau_WW' > h}, are not yet distinguished from W, so that each ge
 A choice that lies tau ahead is therefore made with the exponent beta exp(-tau / lookahead_s): by the ratio of costs when it is
 near, evenly when it is far. With a `lookahead_s` of 0, h is infinite.
 
-These p'_i give the probabilities of the gaps of the next row. All classes beyond this row are equally likely, but for the goals
-of one way. With |G| classes that take the same gap in the next row as class i, and |W| of the same way through all rows, which
-differ in their goals,
+These p'_i give the probabilities of the gaps of the next row. All ways beyond this row are equally likely, however many goals
+they lead to. With the classes G that take the same gap in the next row as class i, on n ways through all rows, and those W of its
+own way, which differ in their goals,
 
-    p'_i <- (sum_{j in G} p'_j) |W| / |G|  p_i / sum_{j in W} p_j.
+    p'_i <- (sum_{j in G} p'_j) / n  p_i / sum_{j in W} p_j.
 
 Where no row is ahead, W and G are the classes that lead to the same goal, and all is decided as near.
 
@@ -124,8 +124,8 @@ def compute_likelihoods(
     if config.lookahead_s > 0.0 and branch_times is not None:
         near = _weigh_by_lookahead(logs, branch_times, config.lookahead_s)
     if decisions is not None:
-        beyond = _share_weights(np.zeros(len(logs)), logs, decisions.way)
-        near = _share_weights(near - woven, beyond - woven, decisions.next_gap)
+        beyond = logs - woven - _sum_weights(logs, decisions.way)
+        near = beyond + _sum_weights(near - woven, decisions.next_gap) - _sum_weights(beyond, decisions.next_gap)
     mixed: Array = (1.0 - share) * planned + share * normalise_logs(near)
     return mixed
 
@@ -187,13 +187,12 @@ def normalise_logs(logs: Array) -> Array:
     return weights
 
 
-def _share_weights(between: Array, within: Array, group: NDArray[np.intp]) -> Array:
-    """Return logarithms (k,) that give each group its weight by `between`, and share it among its classes by `within`."""
-    weights = np.full((2, int(group.max()) + 1), -np.inf)
-    np.logaddexp.at(weights[0], group, between)
-    np.logaddexp.at(weights[1], group, within)
-    shared: Array = within + (weights[0] - weights[1])[group]
-    return shared
+def _sum_weights(logs: Array, group: NDArray[np.intp]) -> Array:
+    """Return for each class the logarithm (k,) of the sum of the weights exp(logs) of its group."""
+    sums = np.full(int(group.max()) + 1, -np.inf)
+    np.logaddexp.at(sums, group, logs)
+    summed: Array = sums[group]
+    return summed
 
 
 def _weigh_by_lookahead(logs: Array, branch_times: BranchTimes, lookahead_s: float) -> Array:
