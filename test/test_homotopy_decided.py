@@ -77,6 +77,18 @@ def test_long_detours_are_seen_and_not_followed_but_of_each_goal_the_shortest_wa
     assert before.label in [one.label for one in near.candidates], 'a class that was followed stays a little longer'
 
 
+def test_a_way_that_is_followed_to_one_goal_is_followed_unless_its_own_goal_has_no_candidate():
+    obstacles, goals = make_obstacles([[0.1, 0.0]], 0.03), [[0.3, 0.01], [0.3, -0.01]]
+    whole, few, one = (find(obstacles, goals=goals, k=count) for count in (4, 2, 1))
+    assert [len(each.candidates) for each in (whole, few, one)] == [4, 2, 2] and not whole.unfollowed
+    assert {each.label for each in few.candidates} == {'goal0:+0', 'goal1:-0'} and not few.unfollowed
+    three = find(obstacles, goals=[*goals, [0.3, 0.012]], k=3)
+    assert {each.label for each in three.candidates} == {'goal0:+0', 'goal1:-0', 'goal2:+0'} and not three.unfollowed
+    beside = find(obstacles, goals=[[0.3, 0.01], [0.3, 0.02]], k=2)
+    assert {each.label for each in beside.candidates} == {'goal0:+0', 'goal1:+0'}
+    assert {each.label for each in beside.unfollowed} == {'goal0:-0', 'goal1:-0'}
+
+
 def test_the_guess_begins_at_the_present_speed_and_ends_at_rest():
     found = find(NOTHING, velocity=(0.3, 0.0), steps=100)
     speed = np.hypot(*np.diff(found.candidates[0].guess, axis=0).T) * 100

@@ -85,7 +85,7 @@ def test_goals_that_are_not_followed_are_unknown() -> None:
     assert found.unknown == pytest.approx(16.0 / 80.0, abs=0.02) and total(found) == pytest.approx(1.0)
 
 
-def test_the_cost_of_a_class_that_is_not_followed_is_told_by_one_with_the_same_sides_though_to_another_goal() -> None:
+def test_the_cost_of_a_class_that_is_not_followed_is_the_largest_that_candidates_lead_to_expect() -> None:
     right, left = outcome('goal0:+1', cost=1.0), outcome('goal1:-1', bend=-0.1, cost=50.0, safety_factor=1.0)
     left = replace(left, candidate=replace(left.candidate, goal=1))
     unfollowed = replace(left.candidate, label='goal0:-1', goal=0, length=1.1 * left.candidate.length)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -111,23 +112,21 @@ def compute_detour_effort(length: float, distance: float) -> float:
     return straight + DETOUR * max(length**2 - straight, 0.0)
 
 
-def find_similar(candidate: Candidate, solved: Sequence[PredictedCandidate]) -> tuple[PredictedCandidate, float]:
-    """Return the solved candidate by which the effort of another class is estimated, and the ratio of both efforts.
+def find_similar(candidate: Candidate, solved: Sequence[PredictedCandidate]) -> PredictedCandidate:
+    """Return the solved candidate by which the effort of another one is estimated: of those to the same goal, the most similar.
 
-    The first choice is a candidate that passes all obstacles on the same sides, to any goal. The second choice is one to the
-    same goal, the third one is any. Of several, the one of most similar effort is taken.
+    If there are none to its goal, all are compared.
     """
-    effort = compute_detour_effort(*_measure(candidate))
 
-    def measure(other: PredictedCandidate) -> tuple[bool, bool, float]:
-        differs = other.candidate.sides != candidate.sides, other.candidate.goal != candidate.goal
-        return *differs, abs(math.log(find_ratio(other)))
+    def measure(other: PredictedCandidate) -> tuple[bool, float]:
+        return other.candidate.goal != candidate.goal, abs(math.log(compare_efforts(candidate, other)))
 
-    def find_ratio(other: PredictedCandidate) -> float:
-        return effort / compute_detour_effort(*_measure(other.candidate))
+    return min(solved, key=measure)
 
-    similar = min(solved, key=measure)
-    return similar, find_ratio(similar)
+
+def compare_efforts(candidate: Candidate, other: PredictedCandidate) -> float:
+    """Return the effort of a class relative to that of another one, as their shortest paths lead to expect."""
+    return compute_detour_effort(*_measure(candidate)) / compute_detour_effort(*_measure(other.candidate))
 
 
 def _measure(candidate: Candidate) -> tuple[float, float]:
@@ -143,10 +142,10 @@ def _has_path(candidate: PredictedCandidate, obstacles: Obstacles) -> bool:
     return measure_clearance(candidate.candidate.guess, obstacles, solution.dt) >= 0.0
 
 
-def _estimate(candidate: PredictedCandidate, similar: tuple[PredictedCandidate, float]) -> PredictedCandidate:
+def _estimate(candidate: PredictedCandidate, known: PredictedCandidate) -> PredictedCandidate:
     """Return a candidate with a path in its class, and the effort and safety that a similar one leads to expect."""
-    (known, ratio), failed = similar, candidate.solution
-    effort = ratio * known.cost / failed.dt
+    failed = candidate.solution
+    effort = compare_efforts(candidate.candidate, known) * known.cost / failed.dt
     mean = failed.mean
     if not _is_in_class(candidate.candidate, candidate.sides):
         mean = _derive_states(candidate.candidate.guess, failed.dt, mean.shape[1])
@@ -180,8 +179,9 @@ def estimate_unfollowed(
 ) -> list[PredictedCandidate]:
     """Return the classes that the search has seen and that are no candidates, each with an estimated effort and safety.
 
-    The estimate follows from a candidate of similar effort (`find_similar`). These classes are ranked with the candidates by the
-    same rule, and what they get is the unknown share.
+    Each candidate leads to an estimate (`compare_efforts`), of which the largest is taken: classes that are not followed have the
+    longest paths, with turns that cost more than their length tells. They are ranked with the candidates by the same rule, and
+    what they get is the unknown share.
 
     Parameters
     ----------
@@ -197,14 +197,14 @@ def estimate_unfollowed(
         return []
     estimated = []
     for candidate in [each for each in unfollowed if each.label not in names]:
-        similar, ratio = find_similar(candidate, known)
-        dt, cost = durations_s[candidate.goal] / (len(candidate.guess) - 1), ratio * similar.cost
+        cost, reference = max([(compare_efforts(candidate, each) * each.cost, each) for each in known], key=itemgetter(0))
+        dt = durations_s[candidate.goal] / (len(candidate.guess) - 1)
         solution = replace(
-            similar.solution,
+            reference.solution,
             status=Status.ESTIMATED,
             message='not followed',
             dt=dt,
-            mean=_derive_states(candidate.guess, dt, similar.solution.mean.shape[1]),
+            mean=_derive_states(candidate.guess, dt, reference.solution.mean.shape[1]),
             effort=cost / dt,
             expected=cost / dt,
         )

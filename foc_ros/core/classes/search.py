@@ -59,7 +59,8 @@ class Search:
     next_goal : int
         Row of the first goal that the deadline left out, at which the next search should begin; 0 if there was time for all.
     unfollowed : tuple[Candidate, ...]
-        Classes that were seen and are no candidates, with taut guesses: at most `MOST_UNFOLLOWED` besides those of goals.
+        Classes that were seen and are no candidates, with taut guesses. One that passes all obstacles as a candidate to another
+        goal does is left out where its own goal has a candidate: its way and its goal are followed.
     """
 
     candidates: tuple[Candidate, ...]
@@ -127,8 +128,8 @@ def search(
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
     chosen = ranking.choose(count)
     candidates = scene.make_candidates(chosen, duration_s, steps)
-    labels = {each.label for each in chosen}
-    seen = {each.label: each for each in ranking.seen if each.label not in labels}
+    courses, reached = {each.course for each in chosen}, {each.goal for each in chosen}
+    seen = {each.label: each for each in ranking.seen if each.course not in courses or each.goal not in reached}
     unfollowed = scene.make_candidates(tuple(seen.values()), duration_s, steps, is_smooth=False)
     return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal, unfollowed)
 
