@@ -1,10 +1,10 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with what demo and test need; repeated only after a change.
 #                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them
-# make check       lint, and the tests that run within one process: less than a minute on two cores
-# make test        all tests but the long ones: a few minutes on two cores
+# make check       lint, and the quick tests: three quarters of a minute on two cores
+# make test        all tests but the long ones: three minutes on two cores
 # make test-long   the long studies, tests under load and the commands of the documentation
-#                  test/tiers.py lists the long tests (mark `long`) and finds those that start another process, a ROS graph or a
-#                  browser (mark `process`); make check is pytest -m 'not long and not process'
+#                  test/tiers.py lists the long tests (mark `long`) and those that take more than half a second, and finds those
+#                  that start another process, a ROS graph or a browser (mark `process`); make check has neither
 # make lint        ruff, mypy and the import contracts
 # make demo        the demo: the node and the packaged recording
 # make doc         the documentation as HTML, in build/doc/index.html
@@ -60,9 +60,10 @@ esac
 endef
 CHECK_PYTHON = $(PYTHON) -c '' 2>/dev/null || { $(EXPLAIN_PYTHON); exit 1; }
 
-TEST = ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
+# tests that share something run in one worker; what is compiled for one target is there for the next
+TEST = env -u PYTHONDONTWRITEBYTECODE ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4 --dist loadgroup
 
-.PHONY: setup help check test test-long lint demo doc bench people stress colcon dist clean
+.PHONY: setup help check quick-tests test test-long lint demo doc bench people stress colcon dist clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -83,7 +84,11 @@ $(STAMP): setup.py setup.cfg pyproject.toml
 help:
 	@sed -n 's/^# //p; /^$$/q' Makefile
 
-check: lint
+# mypy keeps one processor busy for as long as the tests do
+check: $(VENV)/.lint
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync=target lint quick-tests
+
+quick-tests: $(STAMP)
 	$(TEST) -m 'not long and not process'
 
 test: $(STAMP)

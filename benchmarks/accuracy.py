@@ -80,18 +80,18 @@ def build_random(seed: int, noise: float, steps: int = 50) -> Scene:
     return Scene(f'random {seed}', build_problem, reach_helpers.bowed((0, 0), goal, steps, amplitude))
 
 
-def load_reference(file: Path, build: Callable[[Any], Problem]) -> list[tuple[dict[str, Any], Problem, Array]]:
+def load_reference(file: Path) -> list[tuple[dict[str, Any], Problem, Array]]:
     """Return cases of `reference_cases.py` or `reference_shapes.py` with their answers, each with its problem and guess."""
-    return [(case, build(case), reach_helpers.case_guess(case)) for case in json.loads(file.read_text(encoding='utf-8'))]
+    cases = json.loads(file.read_text(encoding='utf-8'))
+    return [(case, reach_helpers.case_problem(case), reach_helpers.case_guess(case)) for case in cases]
 
 
 def format_agreement(*, has_shapes: bool) -> str:
     """Return the table of relative differences of effort, or of cost and effort among boxes, capsules, hulls and circles."""
     peer, columns = ('IPOPT', ['obstacles']) if has_shapes else ('quadprog', ['obstacles', 'c'])
     head = ['case', *columns, 'η', f'`fixed` / {peer} − 1', '`optimal` / IPOPT − 1', 'η achieved']
-    file, build = (SHAPES, reach_helpers.shapes_problem) if has_shapes else (CASES, reach_helpers.case_problem)
     rows = []
-    for number, (case, problem, guess) in enumerate(load_reference(file, build)):
+    for number, (case, problem, guess) in enumerate(load_reference(SHAPES if has_shapes else CASES)):
         reference, least = case['fixed' if has_shapes else 'converged_qp'], case['min_effort_at_eta']
         fixed = reach_helpers.solved(problem, guess, 'fixed', tau=reference['tau'], lam=reference['lam'])
         optimal = reach_helpers.solved(problem, guess, 'optimal')

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Short recordings for tests."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pages in a headless Chromium, and the check that a report page shows the numbers of its report."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os

@@ -6,12 +6,15 @@ import math
 import os
 import signal
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
+from browser_helpers import chromium
 from hypothesis import settings
 from message_helpers import message_types
 from ros_helpers import Graph, graph, prepare_environment
-from tiers import add_marks
+from tiers import add_marks, is_left_out
 
 from foc_ros.io import terminal
 from foc_ros.ros.messages.types import MessageTypes
@@ -32,6 +35,16 @@ REQUIRE_ROS = os.environ.get('FOC_ROS_REQUIRE_ROS') == '1'
 # Tests that may be skipped even then: they need data that is not part of the sources, a browser that is not required, or
 # message packages that the node does without.
 ALLOWED = ('Skipped: optional data', 'Skipped: optional browser', 'Skipped: optional message package')
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Know the mark of xdist where it is not installed, too."""
+    config.addinivalue_line('markers', 'xdist_group(name): the tests of a group run in one worker')
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave out the files of other tiers."""
+    return (collection_path.suffix == '.py' and is_left_out(collection_path.name, config.option.markexpr)) or None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -97,14 +110,7 @@ def types(request: pytest.FixtureRequest) -> MessageTypes:
 
 
 @pytest.fixture(scope='module')
-def cluster_address() -> Iterator[str]:
-    """Yield the address of a Dask cluster of two worker processes on this machine."""
-    dask = pytest.importorskip('dask', reason='the extra cluster is not installed')
-    distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
-    # a task is given up after its second death, not its fourth: the test is shorter
-    settings = {'distributed.scheduler.allowed-failures': 1, 'distributed.worker.multiprocessing-method': 'spawn'}
-    with (
-        dask.config.set(settings),
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=':0') as cluster,
-    ):
-        yield cluster.scheduler_address
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Yield a headless Chromium for the tests of a file."""
+    with chromium(tmp_path_factory.mktemp('profile')) as opened:
+        yield opened

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """ObservedRecording and recordings made by hand, for the tests of the evaluation."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of a simulated operator, for the tests of `fit`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import evaluation_samples
 import numpy as np
+import pytest
 
+from foc_ros.analysis.fitting import fit, race
 from foc_ros.analysis.fitting.direct import RecordedHand
 from foc_ros.core.obstacle_table import Obstacles
 
@@ -41,3 +41,10 @@ def write_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float 
 def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> RecordedHand:
     """Return a recorded hand from its samples."""
     return RecordedHand(name, np.round(times * 1e9).astype(np.int64), positions, obstacles, goals)
+
+
+def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a fit in this process predict seldom and try few settings."""
+    monkeypatch.setattr(fit, 'PREDICTIONS', 3)
+    for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
+        monkeypatch.setattr(race, name, few)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Input messages for tests, of rclpy and of rosbags."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -108,3 +106,12 @@ def transform(
     shift, turn = types.fill('geometry_msgs/msg/Vector3', translation), types.fill('geometry_msgs/msg/Quaternion', rotation)
     moved = types.fill('geometry_msgs/msg/Transform', (shift, turn))
     return types.fill('geometry_msgs/msg/TransformStamped', (make_header(types, stamp_ns, parent), child, moved))
+
+
+def read_columns(cloud: Any) -> dict[str, np.ndarray]:
+    """Read a cloud by its own field descriptions."""
+    raw = np.frombuffer(bytes(cloud.data), np.uint8).reshape(cloud.height * cloud.width, cloud.point_step)
+    dtypes = {7: '<f4', 6: '<u4'}
+    return {
+        field.name: raw[:, field.offset : field.offset + 4].copy().view(dtypes[field.datatype])[:, 0] for field in cloud.fields
+    }

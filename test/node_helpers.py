@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A FocNode and publishers of its inputs, in one private graph."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

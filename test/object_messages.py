@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of packages that need not be installed, made from their definitions: collision objects and detections."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`foc_ros play` as a process, its page in a browser, and a hand that is steered by synthetic events."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
@@ -84,13 +82,15 @@ class Play:
 
 @contextmanager
 def play(folder: Path, *arguments: str, program: str = '') -> Iterator[Play]:
-    """Run `foc_ros play` within a context; program: Python code in place of `-m foc_ros`."""
+    """Run `foc_ros play` within a context, at whose end it is stopped; program: Python code in place of `-m foc_ros`."""
     started = Play(folder, *arguments, program=program)
     try:
         started.wait()
         yield started
-    finally:
+    except BaseException:
         started.stop()
+        raise
+    assert started.stop() == 0, started.output
 
 
 def until(condition: Callable[[], Any], what: str, seconds: float = 60.0) -> Any:

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Predictions made by hand, for tests of what is done with them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node as a process of its own, and a player that publishes its inputs and hears its outputs."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

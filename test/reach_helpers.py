@@ -10,7 +10,7 @@ import pytest
 
 from foc_ros.core.config import FocConfig
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
-from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
@@ -21,7 +21,7 @@ REFERENCE = Path(__file__).with_name('reference_cases.json')
 REFERENCE_SHAPES = Path(__file__).with_name('reference_shapes.json')
 MORE_REFERENCE = Path(__file__).resolve().parents[2] / 'shared' / 'reference' / 'cases.json'
 
-KINDS = {'box': Box, 'capsule': Capsule, 'circle': Circle, 'hull': Hull}
+KINDS = {'': Circle, 'box': Box, 'capsule': Capsule, 'circle': Circle, 'hull': Hull}
 
 
 def reference_cases() -> list:
@@ -46,12 +46,9 @@ def bowed(start, goal, steps: int, amplitude: float) -> np.ndarray:
 
 
 def case_problem(case: dict, eta: float | None = None) -> Problem:
-    """Return the problem of a reference case."""
-    obstacles = case['obstacles']
+    """Return the problem of a reference case; an obstacle without a kind is a circle."""
     return reach(
-        make_obstacles(
-            [[o['x'], o['y']] for o in obstacles], [o['radius'] for o in obstacles], [o['radius_stddev'] for o in obstacles]
-        ),
+        collect_obstacles([make_shape(**each) for each in case['obstacles']]),
         goal=case['goal'],
         steps=case['steps'],
         duration=case['duration_s'],
@@ -60,17 +57,10 @@ def case_problem(case: dict, eta: float | None = None) -> Problem:
     )
 
 
-def shapes_problem(case: dict) -> Problem:
-    """Return the problem of a case of `reference_shapes.json`."""
-    shapes = [KINDS[each['kind']](**{key: value for key, value in each.items() if key != 'kind'}) for each in case['obstacles']]
-    return reach(
-        collect_obstacles(shapes),
-        goal=case['goal'],
-        steps=case['steps'],
-        duration=case['duration_s'],
-        noise=case['noise'],
-        eta=case['min_effort_at_eta']['eta'],
-    )
+def make_shape(kind: str = '', **fields) -> Shape:
+    if not kind:
+        fields['centre'] = fields.pop('x'), fields.pop('y')
+    return KINDS[kind](**fields)
 
 
 def case_guess(case: dict) -> np.ndarray:

@@ -2,15 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scene, hand samples and predictions in closed form, so that a test knows the contents of a picture."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
+import prediction_samples
 
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Status
 from foc_ros.core.types import NANOSECONDS, Array, HandSample
 
 START_NS = 1_000 * NANOSECONDS
@@ -45,34 +44,22 @@ def samples(reaches: int = 1, seconds: float = 1.0, rest: float = 0.5) -> list[H
 def outcome(
     label: str, goal: int, bow: float, likelihood: float, start: Array, status: Status = Status.SOLVED
 ) -> PredictedCandidate:
-    s = np.linspace(0.0, 1.0, 21)
+    s, dt = np.linspace(0.0, 1.0, 21), 0.05
     path = start + quintic(s)[:, None] * (GOALS[goal] - start) + np.outer(np.sin(np.pi * s), [0.0, bow])
-    dt = 0.05
-    mean = np.column_stack([path, np.gradient(path, dt, axis=0), np.zeros_like(path)])
     covariance = np.zeros((21, 6, 6))
-    covariance[:, 0, 0] = (0.001 + 0.01 * s) ** 2
-    covariance[:, 1, 1] = (0.001 + 0.004 * s) ** 2
-    solution = Solution(
-        status,
-        'solved' if status is Status.SOLVED else 'out of reach',
-        dt,
-        mean,
-        covariance,
-        np.zeros((20, 2)),
-        100.0 * (2 - likelihood),
-        {},
-        0.0,
-        1.0,
-        0.9,
-    )
-    return PredictedCandidate(
-        Candidate(label, goal, SIDES[label], path, 0.3),
-        solution,
-        {},
-        100.0 * (2 - likelihood),
-        likelihood if solution.status in (Status.SOLVED, Status.COMPROMISED) else 0.0,
-        way=list(SIDES).index(label),
-    )
+    covariance[:, 0, 0], covariance[:, 1, 1] = (0.001 + 0.01 * s) ** 2, (0.001 + 0.004 * s) ** 2
+    solution = {
+        'status': status,
+        'message': 'solved' if status is Status.SOLVED else 'out of reach',
+        'dt': dt,
+        'mean': np.column_stack([path, np.gradient(path, dt, axis=0), np.zeros_like(path)]),
+        'covariance': covariance,
+        'control': np.zeros((20, 2)),
+        'effort': 100.0 * (2 - likelihood),
+        'eta': 0.9,
+    }
+    made = prediction_samples.outcome(label, likelihood, cost=100.0 * (2 - likelihood), **solution)
+    return replace(made, candidate=Candidate(label, goal, SIDES[label], path, 0.3), sides={}, way=list(SIDES).index(label))
 
 
 def prediction(stamp_ns: int, start: Array, share: float = 0.6) -> Prediction:

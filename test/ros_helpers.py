@@ -5,8 +5,6 @@
 Use the `ros` fixture of conftest.py (or :func:`graph`) and :meth:`Graph.spin_until`.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 import time

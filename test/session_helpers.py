@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A session of `foc_ros play` without a server: a page and a predictor that keep what they receive."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from typing import Any

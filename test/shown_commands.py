@@ -6,8 +6,6 @@ Every line of a block marked `console`, in README, CONTRIBUTING and doc/, runs a
 NOT_RUN lists it. Lines of ENDLESS run until they are interrupted. A line that is listed and no longer shown is an error, too.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +17,7 @@ SUDO, ROOT_OR_NETWORK = 'needs root', 'needs root or the network'
 ROS = 'needs the commands of a ROS installation'
 BY_CI = '.ci/run runs this line'
 LONG = 'takes minutes'
-PARTLY, REPLAYED = f'{LONG}; test_simulation.py runs a part', f'{LONG}; test_measure_predictions.py measures a part'
+PARTLY, REPLAYED = f'{LONG}; test_simulation.py runs a part', f'{LONG}; test_benchmarks.py measures a part'
 FIT = 'takes minutes; test_fit.py and test_evaluate.py run it with few predictions'
 LAUNCH = 'ros2launch is not a package of the index; test_launch.py starts the files where launch_ros is installed'
 SHELL = 'the program is on the path of the test already'
@@ -50,10 +48,10 @@ NOT_RUN = {
     # start
     '. .venv/bin/activate': SHELL,
     # beside_a_stack
-    "ros2 service call /foc/engage std_srvs/srv/SetBool '{data: false}'": f'{ROS}; test_beside_a_stack.py makes the same calls',
-    "ros2 service call /foc/engage std_srvs/srv/SetBool '{data: true}'": f'{ROS}; test_beside_a_stack.py makes the same calls',
-    'ros2 param set /teleoperation obstacles false': f'{ROS}; test_beside_a_stack.py makes the same calls',
-    'ros2 param set /teleoperation obstacles true': f'{ROS}; test_beside_a_stack.py makes the same calls',
+    "ros2 service call /foc/engage std_srvs/srv/SetBool '{data: false}'": f'{ROS}; test_node_process.py makes the same calls',
+    "ros2 service call /foc/engage std_srvs/srv/SetBool '{data: true}'": f'{ROS}; test_node_process.py makes the same calls',
+    'ros2 param set /teleoperation obstacles false': f'{ROS}; test_node_process.py makes the same calls',
+    'ros2 param set /teleoperation obstacles true': f'{ROS}; test_node_process.py makes the same calls',
     'ros2 launch foc_ros foc.launch.py hand_pose:=/MTMR/measured_cp obstacles:=/perception/obstacles plane:=xz': LAUNCH,
     'ros2 launch foc_ros two_arms.launch.py left_hand:=/MTML/measured_cp right_hand:=/MTMR/measured_cp': LAUNCH,
     'ros2 launch foc_ros foc_rviz.launch.py hand_pose:=/MTMR/measured_cp': LAUNCH,

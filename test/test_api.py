@@ -8,7 +8,6 @@ import pickle
 import subprocess
 import sys
 from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +24,6 @@ from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.interpolation import interpolate_covariance
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.predict import predict
-from foc_ros.core.prediction import Prediction
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
@@ -111,17 +109,6 @@ def test_a_sample_that_cannot_be_used_is_refused_and_changes_nothing(t, position
     assert predictor.update(1.02, (0.0, 0.0)).t == 1.02
 
 
-def test_without_goals_there_is_no_prediction():
-    with pytest.raises(foc_ros.SceneError, match='goals'):
-        foc_ros.Predictor(FAST).update(0.0, (0.0, 0.0))
-
-
-@pytest.mark.parametrize('goals', [[], [(0.3, 0.0, 0.1, 0.0)], [(0.3, float('inf'))], [(0.3, 0.0, float('nan'))], 0.3])
-def test_goals_that_cannot_be_used_are_refused(goals):
-    with pytest.raises(foc_ros.SceneError, match='goals'):
-        foc_ros.Predictor().set_goals(goals)
-
-
 def test_an_outlier_is_refused_and_the_movement_goes_on():
     predictor, plain = foc_ros.Predictor(FAST), foc_ros.Predictor(FAST)
     for each in (predictor, plain):
@@ -135,31 +122,6 @@ def test_an_outlier_is_refused_and_the_movement_goes_on():
         predictor.update(0.06, (0.3, 0.4))
     restarted = predictor.update(0.08, (0.3, 0.41))
     np.testing.assert_array_equal(restarted.candidates[0].solution.mean[0], [0.3, 0.41, 0.0, 0.0, 0.0, 0.0])
-
-
-@pytest.mark.parametrize('obstacles', [[(0.1, 0.0, 0.02)], [CUP, CUP]])
-def test_obstacles_are_circles_with_different_names(obstacles):
-    with pytest.raises(foc_ros.SceneError, match='obstacles'):
-        foc_ros.solve((0, 0), (0.3, 0), obstacles)
-
-
-@pytest.mark.parametrize(
-    ('changed', 'field'),
-    [
-        ({'start': [0.0, 0.0, 0.0, 0.0]}, 'start'),
-        ({'start': (0.0, float('nan'))}, 'start'),
-        ({'start': (0.15, 0.0)}, 'start'),
-        ({'goal': (0.3,)}, 'goal'),
-        ({'strategy': 'fastest'}, 'foc.strategy'),
-        ({'eta': 1.0}, 'foc.eta'),
-        ({'duration_s': 0.0}, 'duration.fixed_s'),
-        ({'config': {'eta': 0.9}}, 'config'),
-        ({'guess': [(0.1, 0.1, 0.1)]}, 'guess'),
-    ],
-)
-def test_a_scene_that_cannot_be_solved_is_refused_by_field(changed, field):
-    with pytest.raises(foc_ros.InputError, match=f'^{field}: expected .*, got'):
-        foc_ros.solve(**({'start': (0, 0), 'goal': (0.3, 0), 'obstacles': [CUP]} | changed))
 
 
 def test_lists_states_and_tables_are_accepted():
@@ -224,7 +186,7 @@ TWO = [Goal((0.3, -0.1), name='bowl'), (0.3, 0.1)]
 
 
 @pytest.fixture(scope='module')
-def predicted() -> foc_ros.Prediction:
+def predicted():
     """Predict towards two goals, of which one has a name, past one obstacle that is given without a list."""
     predictor = foc_ros.Predictor(FAST)
     predictor.set_goals(TWO)
@@ -232,7 +194,7 @@ def predicted() -> foc_ros.Prediction:
     return predictor.update(0.0, (0.0, 0.0))
 
 
-def test_goals_have_names_and_likelihoods(predicted: foc_ros.Prediction) -> None:
+def test_goals_have_names_and_likelihoods(predicted):
     bowl, other = predicted.goals
     assert (bowl.name, other.name) == ('bowl', 'goal1')
     np.testing.assert_array_equal(predicted.goal_positions, [bowl.position, other.position])
@@ -245,7 +207,7 @@ def test_goals_have_names_and_likelihoods(predicted: foc_ros.Prediction) -> None
     assert all(each.label.startswith(f'goal{each.candidate.goal}:') for each in predicted)
 
 
-def test_a_goal_of_which_nothing_is_known_is_not_unlikely() -> None:
+def test_a_goal_of_which_nothing_is_known_is_not_unlikely():
     lost = outcome('goal1:+l1', status=Status.ITERATION_LIMIT)
     lost = replace(lost, candidate=replace(lost.candidate, goal=1))
     made = prediction(outcome('goal0:+l1', 1.0), lost, goal_positions=np.array([[0.3, 0.0], [0.3, 0.1]]))
@@ -253,7 +215,7 @@ def test_a_goal_of_which_nothing_is_known_is_not_unlikely() -> None:
     assert repr(made.goals[1]) == '<PredictedGoal goal1 at (0.3, 0.1) m, likelihood unknown>'
 
 
-def test_a_prediction_is_the_sequence_of_its_candidates(predicted: foc_ros.Prediction) -> None:
+def test_a_prediction_is_the_sequence_of_its_candidates(predicted):
     assert list(predicted) == list(predicted.candidates)
     assert len(predicted) == len(predicted.candidates) == 4
     nothing = prediction()
@@ -262,7 +224,7 @@ def test_a_prediction_is_the_sequence_of_its_candidates(predicted: foc_ros.Predi
     assert all(len(repr(each)) < 100 for each in (predicted, first, first.candidate, first.solution, *predicted.goals))
 
 
-def test_positions_between_the_steps_are_on_the_mean_path(predicted: foc_ros.Prediction) -> None:
+def test_positions_between_the_steps_are_on_the_mean_path(predicted):
     for each in predicted:
         np.testing.assert_allclose(each.position_at(each.times), each.mean[:, :2], atol=1e-15)
         np.testing.assert_allclose(each.covariance_at(each.times), each.covariance[:, :2, :2], rtol=1e-12)
@@ -274,7 +236,7 @@ def test_positions_between_the_steps_are_on_the_mean_path(predicted: foc_ros.Pre
         np.testing.assert_allclose(speed, half_way, atol=1e-5)
 
 
-def test_covariances_between_the_steps_are_those_of_the_motor_noise() -> None:
+def test_covariances_between_the_steps_are_those_of_the_motor_noise():
     """The noises of the controls add up: with the response R of the position, its variance is the sum of R^2 c^2 U^2."""
     solution = foc_ros.solve((0, 0), (0.3, 0), ROUND_CUP, config=FAST)
     times = np.linspace(0.0, 20.0, 333)
@@ -288,13 +250,13 @@ def test_covariances_between_the_steps_are_those_of_the_motor_noise() -> None:
 
 
 @pytest.mark.parametrize('t', [-0.1, 99.0, float('nan'), 'now', None, [0.1, 99.0]])
-def test_no_position_is_told_beyond_the_prediction(predicted: foc_ros.Prediction, t: Any) -> None:
+def test_no_position_is_told_beyond_the_prediction(predicted, t):
     for ask in (predicted.candidates[0].position_at, predicted.candidates[0].covariance_at):
         with pytest.raises(foc_ros.InputError, match=r'^t: expected seconds from now in \[0, 1\.\d+\], .*, got'):
             ask(t)
 
 
-def test_plain_values_are_those_of_the_prediction(predicted: foc_ros.Prediction) -> None:
+def test_plain_values_are_those_of_the_prediction(predicted):
     read = json.loads(json.dumps(predicted.to_dict(), allow_nan=False))
     assert [each['name'] for each in read['goals']] == ['bowl', 'goal1']
     assert [each['likelihood'] for each in read['goals']] == [each.likelihood for each in predicted.goals]
@@ -302,7 +264,7 @@ def test_plain_values_are_those_of_the_prediction(predicted: foc_ros.Prediction)
     np.testing.assert_array_equal(read['candidates'][0]['mean'], predicted.candidates[0].mean[:, :2])
 
 
-def test_the_table_has_a_row_for_each_step_of_each_candidate(predicted: foc_ros.Prediction) -> None:
+def test_the_table_has_a_row_for_each_step_of_each_candidate(predicted):
     rows = predicted.to_records()
     assert len(rows) == 4 * 21 and len({tuple(row) for row in rows}) == 1
     assert all(isinstance(value, (str, int, float)) for value in rows[0].values())
@@ -312,16 +274,41 @@ def test_the_table_has_a_row_for_each_step_of_each_candidate(predicted: foc_ros.
     assert {row['goal'] for row in rows} == {'bowl', 'goal1'}
 
 
-def test_a_group_of_parameters_is_given_as_a_whole_or_by_its_values() -> None:
+def test_a_group_of_parameters_is_given_as_a_whole_or_by_its_values():
     assert Config(foc=FocConfig(eta=0.95)) == Config(foc={'eta': 0.95}) == Config().with_values({'foc.eta': 0.95})
     assert isinstance(Config(foc={'eta': 0}).foc.eta, float), 'a whole number becomes the type of the parameter'
     groups = [item.name for item in fields(Config) if 'bound' not in item.metadata]
     assert groups == [type(getattr(Config(), name)).__name__.removesuffix('Config').lower() for name in groups]
 
 
+def solve_with(**changed):
+    return foc_ros.solve(**({'start': (0, 0), 'goal': (0.3, 0), 'obstacles': [CUP]} | changed))
+
+
+NO_GOALS = [], [(0.3, 0.0, 0.1, 0.0)], [(0.3, float('inf'))], [(0.3, 0.0, float('nan'))], 0.3
+NO_SCENES = [
+    ({'start': [0.0, 0.0, 0.0, 0.0]}, 'start'),
+    ({'start': (0.0, float('nan'))}, 'start'),
+    ({'start': (0.15, 0.0)}, 'start'),
+    ({'goal': (0.3,)}, 'goal'),
+    ({'strategy': 'fastest'}, r'foc\.strategy'),
+    ({'eta': 1.0}, r'foc\.eta'),
+    ({'duration_s': 0.0}, r'duration\.fixed_s'),
+    ({'config': {'eta': 0.9}}, 'config'),
+    ({'guess': [(0.1, 0.1, 0.1)]}, 'guess'),
+]
+
+
 @pytest.mark.parametrize(
     ('create', 'text'),
     [
+        (lambda: foc_ros.Predictor(FAST).update(0.0, (0.0, 0.0)), 'goals'),
+        *((lambda goals=goals: foc_ros.Predictor().set_goals(goals), 'goals') for goals in NO_GOALS),
+        *(
+            (lambda obstacles=obstacles: solve_with(obstacles=obstacles), 'obstacles')
+            for obstacles in ([(0.1, 0.0, 0.02)], [CUP, CUP])
+        ),
+        *((lambda changed=changed: solve_with(**changed), f'^{field}: expected .*, got') for changed, field in NO_SCENES),
         (lambda: FocConfig(eta=2), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
         (lambda: Config(foc={'eta': 2}), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
         (lambda: Config(foc={'zeta': 2}), r'foc\.zeta: expected a known parameter .*foc\.eta.*, got 2'),
@@ -331,6 +318,7 @@ def test_a_group_of_parameters_is_given_as_a_whole_or_by_its_values() -> None:
         (lambda: Circle((0, 0), center=(0, 0), radius=0.1), r'obstacle\.center: expected one centre, got two'),
         (lambda: foc_ros.Predictor().set_obstacles(None), 'obstacles: expected a list of Circle'),
         (lambda: foc_ros.Predictor().set_goals(Goal((0, 0), name='')), r"goal\.name: expected a text that is not empty, got ''"),
+        (lambda: Goal((0, 0), object=' '), r'goal\.object: expected a text that is not empty'),
         (lambda: Goal((0, 0, 0, 0)), r'goal\.position: expected two numbers \[m\] in the task plane, or three with the height'),
         (lambda: foc_ros.Predictor().set_goals([(0, 0), (0, 0, 1)]), 'goals: expected a height for all goals or for none'),
         (
@@ -342,25 +330,25 @@ def test_a_group_of_parameters_is_given_as_a_whole_or_by_its_values() -> None:
         (lambda: foc_ros.solve((0, 0), TWO), 'goal: expected one goal; solve_classes takes several'),
     ],
 )
-def test_what_cannot_be_meant_is_refused_in_one_sentence(create: Any, text: str) -> None:
+def test_what_cannot_be_meant_is_refused_in_one_sentence(create, text):
     with pytest.raises(foc_ros.InputError, match=text):
         create()
 
 
-def test_all_wrong_parameters_are_named_at_once() -> None:
+def test_all_wrong_parameters_are_named_at_once():
     with pytest.raises(foc_ros.ParameterError, match=r'foc\.steps') as caught:
         Config(foc={'steps': 1, 'eta': 2})
     assert [each.partition(':')[0] for each in caught.value.__notes__] == ['foc.eta']
 
 
 @pytest.mark.parametrize('goals', [(0.3, 0.0), np.array([0.3, 0.0]), Goal((0.3, 0.0)), [(0.3, 0.0)], iter([(0.3, 0.0)])])
-def test_one_goal_needs_no_list(goals: Any) -> None:
+def test_one_goal_needs_no_list(goals):
     predictor = foc_ros.Predictor(FAST)
     predictor.set_goals(goals)
     assert [each.name for each in predictor.update(0.0, (0.0, 0.0)).goals] == ['goal0']
 
 
-def test_three_numbers_are_one_goal_with_a_height() -> None:
+def test_three_numbers_are_one_goal_with_a_height():
     predictor = foc_ros.Predictor(FAST)
     predictor.set_goals((0.3, 0.0, 0.1))
     with pytest.raises(foc_ros.InputError, match=r'^position: expected x, y and the height, because the goals have heights'):
@@ -369,24 +357,24 @@ def test_three_numbers_are_one_goal_with_a_height() -> None:
     assert height is not None and height.mean[-1, 0] == pytest.approx(0.1, abs=1e-3)
 
 
-def test_both_spellings_of_the_centre_are_taken() -> None:
+def test_both_spellings_of_the_centre_are_taken():
     assert Circle(center=(0.1, 0.2), radius=0.01) == Circle((0.1, 0.2), 0.01)
     assert foc_ros.Box(center=(0.1, 0.2), size=(0.1, 0.1)) == foc_ros.Box((0.1, 0.2), (0.1, 0.1))
 
 
 @pytest.fixture(scope='module')
-def kept() -> Prediction:
+def kept():
     """Predict a reach past one obstacle."""
     hand = HandState(0, np.zeros(6), 1e-6 * np.eye(6))
     return predict(Config(), hand, make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]]), NO_TRACKS)[0]
 
 
-def test_a_record_from_another_process_is_read_only() -> None:
+def test_a_record_from_another_process_is_read_only():
     kept = pickle.loads(pickle.dumps(make_obstacles([[0.15, 0.0]], 0.02)))
     assert not any(value.flags.writeable for value in vars(kept).values() if isinstance(value, np.ndarray))
 
 
-def test_all_arrays_of_a_prediction_are_read_only(kept: Prediction) -> None:
+def test_all_arrays_of_a_prediction_are_read_only(kept):
     for each in kept.candidates:
         for record in (each.solution, each.candidate):
             arrays = [value for value in vars(record).values() if isinstance(value, np.ndarray)]

@@ -1,13 +1,10 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bags: no message is lost, no file is overwritten, and every damage is reported."""
+"""Bags: no message is lost, no file is overwritten, every damage is reported, and every checksum is written and compared."""
 
-from __future__ import annotations
-
+import random
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from bag_helpers import messages, write_bag, write_by_rosbags, write_mcap
@@ -17,24 +14,26 @@ from foc_ros.analysis.recordings import BagRecording
 from foc_ros.core.errors import FocWarning, RecordingError
 from foc_ros.io.bags import TYPESTORE, BagReader
 
+PACKAGED = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 
-def read(path: Path, chosen: dict[str, str] | None = None) -> list[Any]:
+
+def read(path, chosen=None):
     with BagReader(path, chosen) as reader:
         return list(reader)
 
 
-def assert_same(items: list[Any], written: list[tuple[str, int, Any]]) -> None:
+def assert_same(items, written):
     assert [(item.topic, item.log_ns) for item in items] == [(topic, stamp_ns) for topic, stamp_ns, _ in written]
     for item, (_, _, message) in zip(items, written, strict=True):
         assert bytes(TYPESTORE.serialize_cdr(item.message, message.__msgtype__)) == bytes(item.raw)
         assert bytes(item.raw) == bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
 
 
-def mcap(bag: Path) -> Path:
+def mcap(bag):
     return bag / f'{bag.name}.mcap'
 
 
-def test_a_bag_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_a_bag_is_read_as_it_was_written(tmp_path):
     bag = write_bag(tmp_path / 'one')
     assert sorted(each.name for each in bag.iterdir()) == ['metadata.yaml', 'one.mcap']
     with BagReader(bag) as reader:
@@ -47,13 +46,13 @@ def test_a_bag_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('plugin', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
 @pytest.mark.parametrize('whole', [True, False])
-def test_bags_of_the_library_are_read_as_a_folder_and_as_a_file(tmp_path: Path, plugin: StoragePlugin, whole: bool) -> None:
+def test_bags_of_the_library_are_read_as_a_folder_and_as_a_file(tmp_path, plugin, whole):
     bag = tmp_path / 'old'
     write_by_rosbags(bag, messages(), version=8, storage_plugin=plugin)
     assert_same(sorted(read(bag if whole else next(bag.glob('old.*'))), key=lambda item: item.log_ns), messages())
 
 
-def test_channels_that_are_not_needed_may_be_anything(tmp_path: Path) -> None:
+def test_channels_that_are_not_needed_may_be_anything(tmp_path):
     """A JSON channel, one without a definition, the events of a service, and a definition that cannot be parsed."""
     odd = {
         '/notes': ('json', 'notes', 'jsonschema', b'{"type": "object"}'),
@@ -65,7 +64,7 @@ def test_channels_that_are_not_needed_may_be_anything(tmp_path: Path) -> None:
     assert_same(read(tmp_path / 'mixed.mcap'), messages())
 
 
-def test_an_existing_path_is_not_overwritten(tmp_path: Path) -> None:
+def test_an_existing_path_is_not_overwritten(tmp_path):
     bag = write_bag(tmp_path / 'one')
     before = mcap(bag).read_bytes()
     with pytest.raises(RecordingError, match='exists already and is not overwritten'):
@@ -73,8 +72,8 @@ def test_an_existing_path_is_not_overwritten(tmp_path: Path) -> None:
     assert mcap(bag).read_bytes() == before
 
 
-def test_an_unfinished_bag_is_removed(tmp_path: Path) -> None:
-    def interrupted() -> Iterator[tuple[str, int, Any]]:
+def test_an_unfinished_bag_is_removed(tmp_path):
+    def interrupted():
         yield from messages()
         raise KeyboardInterrupt
 
@@ -83,7 +82,7 @@ def test_an_unfinished_bag_is_removed(tmp_path: Path) -> None:
     assert not (tmp_path / 'half').exists()
 
 
-def test_a_path_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_a_path_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / 'file').write_text('not a directory')
     with pytest.raises(RecordingError, match=re.escape(str(tmp_path / 'file' / 'bag'))):
         write_bag(tmp_path / 'file' / 'bag')
@@ -99,7 +98,7 @@ def test_a_path_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         (lambda path: path.write_bytes(b'\x89MCAP0\r\n'), 'damaged or cut short'),
     ],
 )
-def test_a_path_that_is_no_bag_is_refused(tmp_path: Path, make: Any, reason: str) -> None:
+def test_a_path_that_is_no_bag_is_refused(tmp_path, make, reason):
     path = tmp_path / 'it.mcap'
     make(path)
     with pytest.raises(RecordingError, match=f'^{re.escape(str(path))}: {reason}'):
@@ -107,7 +106,7 @@ def test_a_path_that_is_no_bag_is_refused(tmp_path: Path, make: Any, reason: str
 
 
 @pytest.mark.parametrize(('beyond', 'as_folder'), [(0, True), (4, False), (100, True), (400, False)])
-def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path: Path, beyond: int, as_folder: bool) -> None:
+def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path, beyond, as_folder):
     """The recorder was killed: there is no metadata.yaml either."""
     (tmp_path / 'killed').mkdir()
     path = tmp_path / 'killed' / 'killed_0.mcap'
@@ -121,9 +120,57 @@ def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path: 
 
 
 @pytest.mark.parametrize(('share', 'single'), [(0.02, True), (0.6, False)])
-def test_a_file_without_a_whole_chunk_is_refused(tmp_path: Path, share: float, single: bool) -> None:
+def test_a_file_without_a_whole_chunk_is_refused(tmp_path, share, single):
     bag = write_bag(tmp_path / 'cut')
     whole = mcap(bag).read_bytes()
     mcap(bag).write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(RecordingError, match='damaged or cut short: no whole chunk'):
         read(mcap(bag) if single else bag)
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    return write_bag(tmp_path_factory.mktemp('whole') / 'bag')
+
+
+def content(path):
+    return [(item.topic, item.log_ns, bytes(item.raw)) for item in read(path)]
+
+
+def mutants(data, count):
+    """Yield copies with a changed bit, a changed byte, a block of zeros, or two bytes exchanged, at seeded places."""
+    source = random.Random(7)
+    for number in range(count):
+        changed, place = bytearray(data), source.randrange(len(data) - 8)
+        if number % 4 == 0:
+            changed[place] ^= 1 << source.randrange(8)
+        elif number % 4 == 1:
+            changed[place] = source.randrange(256)
+        elif number % 4 == 2:
+            changed[place : place + 3] = bytes(3)
+        else:
+            changed[place], changed[place + 7] = changed[place + 7], changed[place]
+        yield bytes(changed)
+
+
+def test_no_mutant_of_a_written_file_is_read_with_another_content(bag, tmp_path):
+    whole, data, refused, total = content(bag), (bag / 'bag.mcap').read_bytes(), 0, 0
+    file = tmp_path / 'bad.mcap'
+    for mutant in mutants(data, 200):
+        file.write_bytes(mutant)
+        try:
+            assert content(file) == whole
+        except RecordingError:
+            refused += 1
+        total += mutant != data
+    assert refused == total > 100
+
+
+def test_an_independent_reader_finds_every_checksum_right(bag):
+    stream_reader = pytest.importorskip('mcap.stream_reader', reason='the mcap library is not installed')
+    for file in (bag / 'bag.mcap', PACKAGED):
+        with file.open('rb') as stream:
+            records = {type(each).__name__: each for each in stream_reader.StreamReader(stream, emit_chunks=True).records}
+        assert records['Chunk'].uncompressed_crc and records['DataEnd'].data_section_crc and records['Footer'].summary_crc
+        with file.open('rb') as stream:
+            assert sum(1 for _ in stream_reader.StreamReader(stream, validate_crcs=True).records) > 10

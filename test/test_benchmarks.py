@@ -1,18 +1,23 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The program of the benchmark, with a row that compares the package with itself and so needs no peer."""
+"""The program of the benchmark, with a row that compares the package with itself, and the study of steady predictions."""
 
+import importlib
 import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
 ROOT = Path(__file__).parents[1]
-sys.path.append(str(ROOT / 'benchmarks'))
+sys.path += [str(ROOT / 'benchmarks'), str(ROOT / 'scripts')]
+
+flicker = importlib.import_module('flicker')
 
 
-def run(*options: str, **environment: str) -> subprocess.CompletedProcess:
+def run(*options, **environment):
     command = [sys.executable, str(ROOT / 'benchmarks' / 'run.py'), '--quick', *options]
     return subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=False)
 
@@ -38,7 +43,22 @@ def test_a_row_that_cannot_be_measured_reports_the_error(tmp_path):
     assert (row['agree'], row['ratio']) == (False, None)
 
 
-def test_an_unknown_row_is_rejected():
-    done = run('--only', 'warm_vs_hot')
-    assert done.returncode == 2
-    assert 'warm_vs_hot' in done.stderr
+def write_reach(folder, rate_hz=100.0):
+    """Write a minimum-jerk reach of 0.4 m in 0.8 s past the left of a box, as tables like those of HLP."""
+    times = np.arange(0.0, 1.0, 1.0 / rate_hz)
+    s = np.minimum(times / 0.8, 1.0)
+    y = 0.4 * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    x = -0.08 * np.sin(np.pi * y / 0.4)
+    rows = [f'a,{t:.4f},{px:.6f},{py:.6f},0.7' for t, px, py in zip(times, x, y, strict=True)]
+    (folder / 'recordings.csv').write_text('\n'.join(['recording,t_s,x_m,y_m,z_m', *rows]))
+    scene = ['a,Target,0,0.4,0.7,0.05,0.05,0.1', 'a,ObstacleLong,0.02,0.2,0.7,0.1,0.05,0.1', 'a,LeftBoundary,-0.4,0,0,1,1,1']
+    (folder / 'scenes.csv').write_text('\n'.join(['recording,object,x_m,y_m,z_m,width_m,depth_m,height_m', *scene]))
+    return folder
+
+
+def test_steadiness_of_a_reach_is_measured(tmp_path, capsys):
+    folder = str(write_reach(tmp_path))
+    flicker.main([folder, '--strategy', 'lv', '--noise', '0', '--set', 'foc.steps=20', '--set', 'rate_hz=25'])
+    cells = capsys.readouterr().out.splitlines()[-1].strip('|').split('|')
+    assert cells[1:3] == ['`lv`', '0']
+    assert int(cells[3]) == 24

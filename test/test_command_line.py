@@ -1,33 +1,33 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The program: exit codes, errors in one line, and no unnecessary imports."""
-
-from __future__ import annotations
+"""The program: exit codes, errors in one line, no unnecessary imports, and output that fits into 80 columns."""
 
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
+from bag_helpers import messages, write_bag
 
 from foc_ros.cli import main as command_line
+from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
+from foc_ros.io import terminal
+from foc_ros.io.terminal import COLUMNS, show_table
 
 ROOT = Path(__file__).parents[1]
 
 
-def start(program: str, *arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
+def start(program, *arguments, **options):
     command = [sys.executable, '-c', program, *arguments]
     return subprocess.run(
         command, **{'cwd': ROOT, 'capture_output': True, 'text': True, 'timeout': 100, 'check': False, **options}
     )
 
 
-def test_the_program_exits_with_the_code_of_its_command() -> None:
+def test_the_program_exits_with_the_code_of_its_command():
     program = 'import runpy, sys; sys.argv[0] = "foc_ros"; runpy.run_module("foc_ros", run_name="__main__", alter_sys=True)'
     result = start(program, 'fly')
     assert (result.returncode, result.stdout) == (2, '') and result.stderr.startswith('foc_ros fly: Unknown command "fly".')
@@ -50,13 +50,13 @@ def test_the_program_exits_with_the_code_of_its_command() -> None:
         (['replay', 'no_such_bag'], 'foc_ros replay: Invalid value "no_such_bag" for BAG. "no_such_bag" does not exist.'),
     ],
 )
-def test_wrong_arguments_exit_2_with_one_line(arguments: list[str], line: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_arguments_exit_2_with_one_line(arguments, line, capsys):
     assert command_line.main(arguments) == 2
     out, err = capsys.readouterr()
     assert out == '' and err.startswith(line) and err.count('\n') == 1
 
 
-def test_wrong_parameters_of_the_node_are_answered_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_parameters_of_the_node_are_answered_together(tmp_path, capsys):
     file = tmp_path / 'wrong.yaml'
     file.write_text('/**: {ros__parameters: {foc: {etta: 0.5}, use_sim_time: true}}')
     given = ['-p', 'rate_hz:=-1', '--params-file', str(file), '-p', 'foc.steps:=1e1', '-p', 'qos_overrides./a.b:=x']
@@ -76,12 +76,12 @@ print(sorted({'numpy', 'rclpy', 'rosbags', 'piqp'} & set(sys.modules)))
 """
 
 
-def test_help_imports_nothing_heavy() -> None:
+def test_help_imports_nothing_heavy():
     result = start(HEAVY)
     assert result.returncode == 0 and result.stdout.endswith('\n[]\n'), result.stderr
 
 
-def test_help_names_every_command_and_explains_every_argument(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_names_every_command_and_explains_every_argument(capsys):
     assert command_line.main(['--help']) == command_line.main([]) == 0
     shown = capsys.readouterr().out
     for command in command_line.list_commands():
@@ -152,7 +152,7 @@ print("foc_ros.core.ocp.solver" in sys.modules)
 """
 
 
-def test_wrong_inputs_are_answered_before_the_solver_is_imported(tmp_path: Path) -> None:
+def test_wrong_inputs_are_answered_before_the_solver_is_imported(tmp_path):
     (tmp_path / 'scene.yaml').write_text(SCENE)
     (tmp_path / 'bag.mcap').write_bytes(b'x')
     (tmp_path / 'tables').mkdir()
@@ -167,11 +167,11 @@ def test_wrong_inputs_are_answered_before_the_solver_is_imported(tmp_path: Path)
 
 
 @pytest.fixture
-def ends(monkeypatch: pytest.MonkeyPatch) -> Callable[[int | BaseException], None]:
+def ends(monkeypatch):
     """Return a function that adds a command `end` with a given outcome."""
 
-    def add(outcome: int | BaseException) -> None:
-        def end() -> int:
+    def add(outcome):
+        def end():
             if isinstance(outcome, BaseException):
                 raise outcome
             return outcome
@@ -193,19 +193,13 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> Callable[[int | BaseException], Non
         (KeyboardInterrupt(), 130, ''),
     ],
 )
-def test_exit_codes(
-    ends: Callable[[int | BaseException], None],
-    capsys: pytest.CaptureFixture[str],
-    outcome: int | BaseException,
-    code: int,
-    line: str,
-) -> None:
+def test_exit_codes(ends, capsys, outcome, code, line):
     ends(outcome)
     assert command_line.main(['end']) == code
     assert capsys.readouterr() == ('', line)
 
 
-def test_arguments_of_node_are_passed_to_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_arguments_of_node_are_passed_to_ros(monkeypatch):
     taken = []
     monkeypatch.setattr('foc_ros.ros.main.main', lambda given: taken.append(list(given)) or 0)
     monkeypatch.setattr('foc_ros.cli.commands.find_spec', lambda name: object())
@@ -214,7 +208,7 @@ def test_arguments_of_node_are_passed_to_ros(monkeypatch: pytest.MonkeyPatch) ->
     assert taken == [ros]
 
 
-def test_a_name_that_standard_output_cannot_show_is_escaped() -> None:
+def test_a_name_that_standard_output_cannot_show_is_escaped():
     program = (
         'import sys\nfrom foc_ros.cli import main as command_line\n'
         '@command_line.app.command\n'
@@ -238,15 +232,15 @@ MANY_LINES, A_LINE = 'for _ in range(100000): print("x" * 100)', 'print("x")'
 A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 10000)'
 
 
-def printed_to(output: int | None, what: str) -> subprocess.CompletedProcess[str]:
+def printed_to(output, what):
     """Run a command that prints; output: file descriptor of its standard output, which is closed without one."""
     closing = {'preexec_fn': lambda: os.close(1)} if output is None else {'stdout': output}
     command = [sys.executable, '-c', LOUD.format(what)]
     return subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, timeout=100, check=False, **closing)
 
 
-@pytest.mark.parametrize('what', [MANY_LINES, A_LINE, A_TABLE])
-def test_a_pipe_whose_reader_has_closed_it_gives_141_and_no_traceback(what: str) -> None:
+@pytest.mark.parametrize('what', [A_LINE, A_TABLE])
+def test_a_pipe_whose_reader_has_closed_it_gives_141_and_no_traceback(what):
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -257,14 +251,58 @@ def test_a_pipe_whose_reader_has_closed_it_gives_141_and_no_traceback(what: str)
 
 
 @pytest.mark.skipif(not Path('/dev/full').exists(), reason='only Linux has a device that is always full')
-@pytest.mark.parametrize('what', [MANY_LINES, A_LINE])
-def test_a_full_standard_output_gives_2_and_one_line(what: str) -> None:
+@pytest.mark.parametrize('what', [MANY_LINES])
+def test_a_full_standard_output_gives_2_and_one_line_and_a_closed_one_changes_no_exit_code(what):
     with Path('/dev/full').open('w') as full:
         result = printed_to(full.fileno(), what)
     assert (result.returncode, result.stderr) == (2, 'foc_ros loud: [Errno 28] No space left on device\n')
-
-
-@pytest.mark.parametrize('what', [A_LINE])
-def test_a_closed_standard_output_changes_no_exit_code(what: str) -> None:
-    result = printed_to(None, what)
+    result = printed_to(None, A_LINE)
     assert (result.returncode, result.stderr) == (0, '')
+
+
+POST_NAMES = ('front_left_post', 'front_right_post_of_the_shelf', 'a_name_that_is_longer_than_a_column_40')
+POSTS = [
+    f'{{x: {x}, y: {y}, radius: 0.02, id: {name}}}'
+    for name, x, y in zip(POST_NAMES, (0.15, 0.2, 0.25), (0.01, 0.05, -0.02), strict=True)
+]
+POST_SCENE = f'start: [0, 0]\ngoals: [[0.3, 0.0], [0.3, 0.1]]\nobstacles: [{", ".join(POSTS)}]\n'
+
+
+def find_widest(printed):
+    return max(map(len, printed.splitlines()))
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ['solve', 'scene.yaml', '--monte-carlo', '100'],
+        ['replay', 'bag', '--params', 'slow.yaml'],
+        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1', '--params', 'quick.yaml'],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_the_output_of_a_command_fits(tmp_path, monkeypatch, capsys, arguments):
+    monkeypatch.chdir(tmp_path)
+    Path('scene.yaml').write_text(POST_SCENE)
+    Path('slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}')
+    Path('quick.yaml').write_text('/**: {ros__parameters: {rate_hz: 5.0, foc.steps: 10}}')
+    write_bag(Path('bag'), messages(0.1))
+    assert main(arguments) == 0
+    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
+
+
+def test_a_wide_table_is_divided_and_loses_nothing(capsys):
+    columns = ['rule', *(f'column {number} of a wide table' for number in range(7)), 'last']
+    rows = [[f'rule {row}', *(f'{row}.{number} (1 to 2)' for number in range(7)), f'end {row}'] for row in range(3)]
+    show_table(columns, rows, 'title')
+    printed = capsys.readouterr().out
+    assert find_widest(printed) <= COLUMNS
+    assert all(printed.count(text) == 1 for text in ('title', *columns[1:], *(cell for row in rows for cell in row[1:])))
+    assert printed.count('rule 2') == 4
+
+
+def test_progress_is_printed_at_times_where_there_is_no_terminal(monkeypatch, capsys):
+    for quiet_s, lines in ((60.0, []), (0.0, ['replay: 1 of 2', 'replay: 2 of 2'])):
+        monkeypatch.setattr(terminal, 'QUIET_S', quiet_s)
+        assert list(terminal.show_progress('ab', 'replay', 2)) == ['a', 'b']
+        assert capsys.readouterr().err.splitlines() == lines

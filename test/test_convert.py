@@ -2,11 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """CSV tables to bags: every number arrives, and every wrong cell is named."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -21,7 +16,7 @@ OBSTACLES = 'name,x_m,y_m,radius_m\nleft,0.5,-0.1,0.03\nright,0.425,0.08,0.025\n
 GOALS = 'goal,x_m,y_m\n0,0.28,0.35\n1,0.42,0.35\n'
 
 
-def convert(folder: Path, recordings: str = RECORDINGS, obstacles: str = OBSTACLES, goals: str | None = GOALS) -> int:
+def convert(folder, recordings=RECORDINGS, obstacles=OBSTACLES, goals=GOALS):
     arguments = ['convert', str(folder / 'r.csv'), '--obstacles', str(folder / 'o.csv'), '--output', str(folder / 'bags')]
     (folder / 'r.csv').write_text(recordings, 'utf-8')
     (folder / 'o.csv').write_text(obstacles, 'utf-8')
@@ -31,7 +26,7 @@ def convert(folder: Path, recordings: str = RECORDINGS, obstacles: str = OBSTACL
     return main(arguments)
 
 
-def table(message: object) -> np.ndarray:
+def table(message):
     names = [field.name for field in message.fields]
     formats = [{7: '<f4', 5: '<i4'}[field.datatype] for field in message.fields]
     offsets = [field.offset for field in message.fields]
@@ -39,7 +34,7 @@ def table(message: object) -> np.ndarray:
     return np.frombuffer(message.data.tobytes(), kind)
 
 
-def test_every_number_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_number_arrives(tmp_path, capsys):
     assert convert(tmp_path) == 0
     assert capsys.readouterr().out.startswith('2 bags with 4 hand poses and 2 obstacles written to ')
     assert sorted(each.name for each in (tmp_path / 'bags').iterdir()) == ['a', 'b']
@@ -65,7 +60,7 @@ def test_every_number_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert not rows['z'].any() and not rows['radius_stddev'].any()
 
 
-def test_optional_columns(tmp_path: Path) -> None:
+def test_optional_columns(tmp_path):
     obstacles = 'id,x_m,y_m,radius_m,radius_stddev_m,z_m\n7,0.5,-0.1,0.03,0.002,0.1\n-2,0,0,0,0,0\n'
     assert convert(tmp_path, 'recording,t_s,x_m,y_m,z_m\n1,0,0.1,0.2,0.3\n', obstacles, 'x_m,y_m,z_m\n0.1,0.2,0.4\n') == 0
     with BagReader(tmp_path / 'bags' / '1') as reader:
@@ -76,7 +71,7 @@ def test_optional_columns(tmp_path: Path) -> None:
     assert np.allclose(table(items['obstacles']).tolist(), expected)
 
 
-def test_boxes_and_circles_share_a_table(tmp_path: Path) -> None:
+def test_boxes_and_circles_share_a_table(tmp_path):
     obstacles = 'x_m,y_m,radius_m,size_x_m,size_y_m,yaw_rad\n0.5,-0.1,0,0.2,0.1,0.3\n0.6,0.1,0.02,0,0,0\n'
     assert convert(tmp_path, obstacles=obstacles) == 0
     with BagReader(tmp_path / 'bags' / 'a') as reader:
@@ -85,7 +80,7 @@ def test_boxes_and_circles_share_a_table(tmp_path: Path) -> None:
     assert decode_point_cloud(message, 'xy').obstacles.corners.tolist() == [4, 1]
 
 
-def test_each_recording_has_its_own_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_recording_has_its_own_scene(tmp_path, capsys):
     obstacles = 'recording,x_m,y_m,radius_m\na,0.5,-0.1,0.03\nb,0.1,0,0.01\na,0.6,0,0.02\n'
     assert convert(tmp_path, obstacles=obstacles, goals='recording,x_m,y_m\nb,1,0\na,2,0\na,3,0\n') == 0
     assert '2 bags with 4 hand poses and 1 to 2 obstacles written' in capsys.readouterr().out
@@ -97,24 +92,24 @@ def test_each_recording_has_its_own_scene(tmp_path: Path, capsys: pytest.Capture
         assert [pose.position.x for pose in items['goals'].poses] == goals
 
 
-def test_a_table_needs_obstacles_beside_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_needs_obstacles_beside_it(tmp_path, capsys):
     (tmp_path / 'r.csv').write_text(RECORDINGS, 'utf-8')
     assert main(['convert', str(tmp_path / 'r.csv'), '--output', str(tmp_path / 'bags')]) == 2
     assert '--obstacles: expected a table of obstacles, which may be without rows, got nothing' in capsys.readouterr().err
 
 
-def test_without_goals_the_bag_has_none(tmp_path: Path) -> None:
+def test_without_goals_the_bag_has_none(tmp_path):
     assert convert(tmp_path, goals=None) == 0
     with pytest.raises(RecordingError, match='no topic for goals'), BagReader(tmp_path / 'bags' / 'a'):
         pass
 
 
-def test_names_are_safe(tmp_path: Path) -> None:
+def test_names_are_safe(tmp_path):
     assert convert(tmp_path, 'recording,t_s,x_m,y_m\n../up,0,0,0\nüb er,0,0,0\n..,0,0,0\n') == 0
     assert sorted(each.name for each in (tmp_path / 'bags').iterdir()) == ['_', '_b_er', '_up']
 
 
-def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_existing_bag_stops_before_anything_is_written(tmp_path, capsys):
     (tmp_path / 'bags' / 'b').mkdir(parents=True)
     assert convert(tmp_path) == 2
     assert 'exists already and is not overwritten' in capsys.readouterr().err
@@ -148,9 +143,7 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path: Path, capsys
         ('goals', 'x_m,y_m\n' + 257 * '0,0\n', 'g.csv: expected at most 256 rows, got more'),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], which: str, text: str, message: str
-) -> None:
+def test_what_is_wrong_is_said_in_one_line(tmp_path, capsys, which, text, message):
     tables = {'recordings': f'recording,t_s,x_m,y_m\n{text}\n'} if which == 'rows' else {which: text}
     assert convert(tmp_path, **tables) == 2
     error = capsys.readouterr().err
@@ -158,7 +151,7 @@ def test_what_is_wrong_is_said_in_one_line(
     assert not (tmp_path / 'bags').exists()
 
 
-def test_all_errors_of_a_table_are_found_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_all_errors_of_a_table_are_found_at_once(tmp_path, capsys):
     rows = 'recording,t_s,x_m,y_m\na,0,x,y\na,1,0\na,2,0,0\na,1,0,0\n'
     assert convert(tmp_path, rows) == 2
     lines = capsys.readouterr().err.splitlines()
@@ -172,7 +165,7 @@ def test_all_errors_of_a_table_are_found_at_once(tmp_path: Path, capsys: pytest.
     ]  # fmt: skip
 
 
-def write_folder(folder: Path, separator: str = ',', comma: bool = False, seconds: float = 1.0, metres: float = 1.0) -> Path:
+def write_folder(folder, separator=',', comma=False, seconds=1.0, metres=1.0):
     """A reach of 0.3 m in 1 s in other units, with another separator and with decimal commas."""
     times = np.arange(0.0, 1.0, 0.02)
     rows = [['recording', 't_s', 'x_m', 'y_m']]
@@ -200,9 +193,7 @@ def write_folder(folder: Path, separator: str = ',', comma: bool = False, second
         ({'metres': 1e6}, 'the position of recording a seems to be in um: the hand moves at 5.76e+05 m/s'),
     ],
 )
-def test_units_that_cannot_be_right_are_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], units: dict[str, float], words: str
-) -> None:
+def test_units_that_cannot_be_right_are_named(tmp_path, capsys, units, words):
     folder = write_folder(tmp_path / 'tables', **units)
     is_within_bounds = max(units.values(), default=1.0) <= 1e3
     single = [str(folder / 'recordings.csv'), '--obstacles', str(folder / 'obstacles.csv')]
@@ -215,9 +206,7 @@ def test_units_that_cannot_be_right_are_named(
 
 
 @pytest.mark.parametrize(('factor', 'unit', 'far_m'), [(1e3, 'mm', 320), (1e2, 'cm', 31.7)])
-def test_scenes_that_cannot_be_in_metres_are_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], factor: float, unit: str, far_m: float
-) -> None:
+def test_scenes_that_cannot_be_in_metres_are_named(tmp_path, capsys, factor, unit, far_m):
     folder = write_folder(tmp_path / 'tables')
     goals, obstacles = folder / 'goals.csv', folder / 'obstacles.csv'
     goals.write_text(f'x_m,y_m\n{0.32 * factor},0\n{0.5 * factor},{0.1 * factor}\n')
@@ -230,7 +219,7 @@ def test_scenes_that_cannot_be_in_metres_are_named(
         assert capsys.readouterr().err.splitlines() == told
 
 
-def test_times_that_repeat_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_times_that_repeat_are_named(tmp_path, capsys):
     rows = '\n'.join(f'a,{0.02 * (i // 2):.2f},{0.001 * i},0' for i in range(20))
     assert convert(tmp_path, recordings=f'recording,t_s,x_m,y_m\n{rows}\n') == 0
     assert 't_s of recording a repeats: 10 of 19 rows have the time of the row before' in capsys.readouterr().err
@@ -247,9 +236,7 @@ def test_times_that_repeat_are_named(tmp_path: Path, capsys: pytest.CaptureFixtu
         pytest.param(',', False, lambda text: text.replace('\n', ',,\n'), id='empty columns of a spreadsheet'),
     ],
 )
-def test_other_separators_and_decimal_commas_are_read(
-    tmp_path: Path, separator: str, comma: bool, change: Callable[[str], str]
-) -> None:
+def test_other_separators_and_decimal_commas_are_read(tmp_path, separator, comma, change):
     usual = read_tables(write_folder(tmp_path / 'usual'))['a'].read_movement()
     folder = write_folder(tmp_path / 'other', separator, comma)
     for file in folder.iterdir():

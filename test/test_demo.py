@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The demo end to end: the real node in its own process receives the first seconds of the packaged recording over DDS."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -25,7 +23,7 @@ OUTPUTS = ('/foc/prediction', '/foc/likelihoods', '/foc/path', '/foc/markers')
 STARTED = 'demo with the node in process '
 
 
-def counted(bag: Path) -> Counter[str]:
+def counted(bag):
     """Return how many messages of each topic can be read and decoded."""
     with AnyReader([bag]) as reader:
         found: Counter[str] = Counter()
@@ -36,7 +34,14 @@ def counted(bag: Path) -> Counter[str]:
     return found
 
 
-def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def read_stamps(bag, topic):
+    with AnyReader([bag]) as reader:
+        chosen = [each for each in reader.connections if each.topic == topic]
+        stamps = [reader.deserialize(raw, each.msgtype).header.stamp for each, _, raw in reader.messages(chosen)]
+    return [stamp.sec * 10**9 + stamp.nanosec for stamp in stamps]
+
+
+def test_end_to_end(tmp_path, capsys):
     from foc_ros.cli.demo import perform
 
     before = dict(os.environ)
@@ -56,6 +61,8 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (found['/hand_pose'], found['/obstacles'], found['/goals']) == (201, 11, 3)
     assert found['/foc/prediction'] > 0
     assert {found[topic] for topic in OUTPUTS} == {found['/foc/prediction']}
+    sent, made = (read_stamps(tmp_path / 'out' / 'bag', topic) for topic in ('/hand_pose', '/foc/prediction'))
+    assert set(made) <= set(sent) and made == sorted(set(made)), 'the live predictions are those of the recording'
     numbers = json.loads((tmp_path / 'out' / 'report' / 'predictions.json').read_text(encoding='utf-8'))
     assert len(numbers['predictions']) == found['/foc/prediction']
     assert all(each['candidates'] or each['unsolved'] is not None for each in numbers['predictions'])
@@ -65,23 +72,7 @@ def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (tmp_path / 'out' / 'report' / 'overview.png').read_bytes().startswith(b'\x89PNG')
 
 
-def test_the_live_predictions_are_those_of_the_recording(tmp_path: Path) -> None:
-    """Every prediction has the stamp of a hand pose that was sent; the stamps increase."""
-    from foc_ros.cli.demo import perform
-
-    perform(tmp_path / 'out', last_s=1.0)
-    stamps: dict[str, list[int]] = {'/hand_pose': [], '/foc/prediction': []}
-    with AnyReader([tmp_path / 'out' / 'bag']) as reader:
-        for connection, _, raw in reader.messages():
-            if connection.topic in stamps:
-                stamp = reader.deserialize(raw, connection.msgtype).header.stamp
-                stamps[connection.topic].append(stamp.sec * 10**9 + stamp.nanosec)
-    assert stamps['/foc/prediction']
-    assert set(stamps['/foc/prediction']) <= set(stamps['/hand_pose'])
-    assert stamps['/foc/prediction'] == sorted(set(stamps['/foc/prediction']))
-
-
-def start(output: Path) -> tuple[subprocess.Popen[str], int]:
+def start(output):
     """Start a demo as a process and return it with the process id of its node once the recording plays."""
     program = f"""
 import sys
@@ -110,7 +101,7 @@ sys.exit(demo.perform(Path({str(output)!r})))
     raise AssertionError(f'the demo never played: {demo.communicate()}')
 
 
-def gone(pid: int) -> bool:
+def gone(pid):
     deadline = time.monotonic() + 10.0
     while time.monotonic() < deadline:
         try:
@@ -121,7 +112,7 @@ def gone(pid: int) -> bool:
     return False
 
 
-def test_an_interrupt_ends_it_cleanly(tmp_path: Path) -> None:
+def test_an_interrupt_ends_it_cleanly(tmp_path):
     demo, node = start(tmp_path / 'out')
     demo.send_signal(signal.SIGINT)
     printed, errors = demo.communicate(timeout=60)
@@ -132,7 +123,7 @@ def test_an_interrupt_ends_it_cleanly(tmp_path: Path) -> None:
     assert not (tmp_path / 'out' / 'report').exists()
 
 
-def test_a_node_that_dies_is_told(tmp_path: Path) -> None:
+def test_a_node_that_dies_is_told(tmp_path):
     demo, node = start(tmp_path / 'out')
     os.kill(node, signal.SIGKILL)
     _, errors = demo.communicate(timeout=60)

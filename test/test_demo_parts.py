@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parts of the demo that need no ROS: recorder, display, the node's process, the output directory."""
 
-from __future__ import annotations
-
 import importlib
 import io
 import signal
@@ -13,7 +11,6 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -40,25 +37,25 @@ TYPES = RosbagsTypes(TYPESTORE)
 STEP_NS = 20_000_000
 
 
-def send_scene(recorder: Recorder) -> None:
+def send_scene(recorder):
     goals = encode_goals(TYPES, START_NS, 'world', np.array([[0.3, 0.0, 0.1], [0.3, 0.12, 0.1]]))
     cloud = encode_obstacles(TYPES, START_NS, 'world', [(0.15, 0.0, 0.1, 0.03, 0.003, 1)])
     for role, message in (('goals', goals), ('obstacles', cloud)):
         recorder.add_sent(Item(role, f'/{role}', START_NS, message, b''), 0.0)
 
 
-def send_hand(recorder: Recorder, number: int, now: float) -> None:
+def send_hand(recorder, number, now):
     stamp_ns = START_NS + number * STEP_NS
     recorder.add_sent(
         Item('hand_pose', '/hand_pose', stamp_ns, encode_hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1)), b''), now
     )
 
 
-def make(number: int) -> Prediction:
+def make(number):
     return prediction(START_NS + number * STEP_NS, np.zeros(2), 0.3 + 0.01 * number)
 
 
-def filled(count: int = 5, lost: tuple[str, int] = ('', 0)) -> Recorder:
+def filled(count=5, lost=('', 0)):
     """Return a recorder of some predictions; lost: name and number of a message that never comes."""
     recorder = Recorder(Config())
     send_scene(recorder)
@@ -74,7 +71,7 @@ def filled(count: int = 5, lost: tuple[str, int] = ('', 0)) -> Recorder:
     return recorder
 
 
-def test_recorder_keeps_every_prediction_with_its_scene() -> None:
+def test_recorder_keeps_every_prediction_with_its_scene():
     recorder = filled()
     stamps = [START_NS + n * STEP_NS for n in range(5)]
     assert [each.stamp_ns for each in recorder.samples] == [each.stamp_ns for each in recorder.snapshots] == stamps
@@ -87,11 +84,11 @@ def test_recorder_keeps_every_prediction_with_its_scene() -> None:
 
 
 @pytest.mark.parametrize('lost', ['prediction', 'likelihoods'])
-def test_recorder_pairs_messages_after_a_loss(lost: str) -> None:
+def test_recorder_pairs_messages_after_a_loss(lost):
     assert [(each.stamp_ns - START_NS) // STEP_NS for each in filled(6, (lost, 2)).snapshots] == [0, 1, 3, 4, 5]
 
 
-def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
+def shown(recorder, terminal, times):
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=terminal, width=80, height=24)
     items = [Item('goals', '/goals', START_NS + after_ns, None, b'') for after_ns in (0, 5 * NANOSECONDS)]
@@ -101,7 +98,7 @@ def shown(recorder: Recorder, terminal: bool, times: np.ndarray) -> str:
     return screen.getvalue()
 
 
-def test_without_a_terminal_a_line_is_printed_each_second() -> None:
+def test_without_a_terminal_a_line_is_printed_each_second():
     recorder = filled()
     recorder.health = {'hand_pose rate [Hz]': '99.8', 'prediction rate [Hz]': '49.9'}
     lines = shown(recorder, False, np.arange(0.0, 3.0, 0.01)).splitlines()
@@ -112,7 +109,7 @@ def test_without_a_terminal_a_line_is_printed_each_second() -> None:
     assert '\x1b' not in ''.join(lines)
 
 
-def test_on_a_terminal_a_table_is_shown() -> None:
+def test_on_a_terminal_a_table_is_shown():
     text = shown(filled(), True, np.array([0.2]))
     for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1: left of 1, right of post', '0.90', 'x 1.15'):
         assert part in text
@@ -121,7 +118,7 @@ def test_on_a_terminal_a_table_is_shown() -> None:
 
 
 @pytest.mark.parametrize('terminal', [False, True])
-def test_nothing_solved_is_shown(terminal: bool) -> None:
+def test_nothing_solved_is_shown(terminal):
     recorder = Recorder(Config())
     send_scene(recorder)
     send_hand(recorder, 0, 0.0)
@@ -131,7 +128,7 @@ def test_nothing_solved_is_shown(terminal: bool) -> None:
     assert 'no solved candidate' in shown(recorder, terminal, np.array([1.0]))
 
 
-def test_output_directory_is_made_and_an_earlier_demo_is_replaced(tmp_path: Path) -> None:
+def test_output_directory_is_made_and_an_earlier_demo_is_replaced(tmp_path):
     output = tmp_path / 'new' / 'demo_output'
     demo.prepare(output)
     for name in ('bag', 'report'):
@@ -143,7 +140,7 @@ def test_output_directory_is_made_and_an_earlier_demo_is_replaced(tmp_path: Path
 
 
 @pytest.mark.parametrize('what', ['directory', 'file'])
-def test_output_directory_with_other_contents_is_refused(tmp_path: Path, what: str) -> None:
+def test_output_directory_with_other_contents_is_refused(tmp_path, what):
     output = tmp_path / 'other'
     if what == 'directory':
         (output / 'bag').mkdir(parents=True)
@@ -154,9 +151,7 @@ def test_output_directory_with_other_contents_is_refused(tmp_path: Path, what: s
     assert (output / 'bag').exists() or output.read_text() == 'mine'
 
 
-def test_without_rclpy_one_line_says_how_to_install_it(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_rclpy_one_line_says_how_to_install_it(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr('foc_ros.cli.commands.find_spec', lambda name: None)
     assert main(['demo', '--output', str(tmp_path / 'out')]) == 2
     error = capsys.readouterr().err
@@ -165,7 +160,7 @@ def test_without_rclpy_one_line_says_how_to_install_it(
     assert not (tmp_path / 'out').exists()
 
 
-def test_the_first_line_is_printed_before_anything_is_imported(tmp_path: Path) -> None:
+def test_the_first_line_is_printed_before_anything_is_imported(tmp_path):
     program = """
 import builtins, sys
 from foc_ros.cli.main import main
@@ -182,7 +177,7 @@ sys.exit(main(['demo']))
     assert result.stdout.startswith('Welcome to foc_ros. A recorded hand moves ') and result.stdout.endswith(' []\n')
 
 
-def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:
+def test_the_lead_of_the_goal_that_was_reached_is_described():
     made = samples(1)
     snapshots = [build_snapshot(each) for each in predictions(made)]
     words = describe_lead(build_hand_trajectory(made), snapshots)
@@ -196,7 +191,7 @@ def test_the_lead_of_the_goal_that_was_reached_is_described() -> None:
     assert describe_lead(build_hand_trajectory(made[:5]), snapshots).endswith('no movement ended at a goal.')
 
 
-def test_a_domain_in_use_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_domain_in_use_is_not_taken(monkeypatch):
     monkeypatch.setattr(isolated_node, 'DOMAINS', range(200, 203))
     with isolated_node.reserve_domain() as reserved, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
         with isolated_node.reserve_domain() as other:
@@ -208,14 +203,14 @@ def test_a_domain_in_use_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
                 pass
 
 
-def until(condition: object, seconds: float = 20.0) -> None:
+def until(condition, seconds=20.0):
     deadline = time.monotonic() + seconds
     while not condition():  # type: ignore[operator]
         assert time.monotonic() < deadline
         time.sleep(0.01)
 
 
-def alive(pid: int) -> bool:
+def alive(pid):
     try:
         state = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
     except FileNotFoundError:
@@ -224,7 +219,7 @@ def alive(pid: int) -> bool:
 
 
 @pytest.mark.skipif(sys.platform != 'linux', reason='only Linux ends a child with its parent')
-def test_the_node_does_not_outlive_a_killed_demo(tmp_path: Path) -> None:
+def test_the_node_does_not_outlive_a_killed_demo(tmp_path):
     package = tmp_path / 'stand_in' / 'foc_ros'
     package.mkdir(parents=True)
     (package / '__init__.py').touch()
@@ -255,7 +250,7 @@ script = importlib.import_module('recordings')
 PACKAGED = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
 
 
-def read(file: Path) -> list[tuple[str, int, Any]]:
+def read(file):
     with AnyReader([file]) as reader:
         out = [
             (connection.topic, log_ns, reader.deserialize(data, connection.msgtype))
@@ -266,11 +261,11 @@ def read(file: Path) -> list[tuple[str, int, Any]]:
 
 
 @pytest.fixture(scope='module')
-def recorded() -> list[tuple[str, int, Any]]:
+def recorded():
     return read(PACKAGED)
 
 
-def hand(recorded: list[tuple[str, int, Any]]) -> np.ndarray:
+def hand(recorded):
     poses = [
         (m.header.stamp.sec * 10**9 + m.header.stamp.nanosec, m.pose.position)
         for topic, _, m in recorded
@@ -279,10 +274,14 @@ def hand(recorded: list[tuple[str, int, Any]]) -> np.ndarray:
     return np.array([[(stamp - poses[0][0]) * 1e-9, p.x, p.y, p.z] for stamp, p in poses])
 
 
-def test_equals_a_fresh_run(recorded: list[tuple[str, int, Any]], tmp_path: Path) -> None:
+def test_the_packaged_recording_and_the_example_tables_equal_those_of_the_script(recorded, tmp_path):
     script.write_recording(tmp_path / 'fresh.mcap')
     fresh = read(tmp_path / 'fresh.mcap')
     assert [item[:2] for item in fresh] == [item[:2] for item in recorded]
     np.testing.assert_allclose(hand(fresh), hand(recorded), rtol=0, atol=1e-6)
     for (topic, _, made), (_, _, kept) in zip(fresh, recorded, strict=True):
         assert topic == '/hand_pose' or repr(made) == repr(kept)
+    (tmp_path / 'tables').mkdir()
+    script.write_tables(tmp_path / 'tables')
+    for file in (tmp_path / 'tables').iterdir():
+        assert file.read_bytes() == (ROOT / 'doc' / 'examples' / file.name).read_bytes(), file.name

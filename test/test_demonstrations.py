@@ -4,11 +4,11 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from bag_helpers import messages, write_bag
+from evaluation_samples import write_tables
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,8 +34,9 @@ from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
+from foc_ros.io import class_library
 from foc_ros.io.bags import BagReader
-from foc_ros.io.class_library import MOST_WAYS, load_library, save_library
+from foc_ros.io.class_library import load_library, save_library
 from foc_ros.ros.parameters import load_parameter_file
 
 OBSTACLES = make_obstacles([[0.15, 0.0], [0.15, 0.06], [0.15, -0.06]], 0.015)
@@ -250,22 +251,14 @@ def test_without_a_recording_that_agrees_it_is_the_model(library):
         np.testing.assert_array_equal(one.covariance, other.covariance)
 
 
-HEADS = {'goals.csv': 'goal,x_m,y_m\n0,0.3,0.0\n', 'obstacles.csv': 'obstacle,x_m,y_m,radius_m\na,0.15,0.0,0.015\n'}
-
-
-def write_tables(folder, ends):
-    for name, text in HEADS.items():
-        (folder / name).write_text(text)
-    rows = [
-        f'r{k},{0.02 * t:.3f},{end * t / 50:.5f},{0.03 * np.sin(np.pi * t / 50):.5f}'
-        for k, end in enumerate(ends)
-        for t in range(51)
-    ]
-    (folder / 'recordings.csv').write_text('recording,t_s,x_m,y_m\n' + '\n'.join(rows) + '\n')
+def write_reaches(folder, ends):
+    share = np.linspace(0.0, 1.0, 51)
+    paths = [np.column_stack([end * share, 0.03 * np.sin(np.pi * share)]) for end in ends]
+    write_tables(folder, {f'r{k}': (share, path) for k, path in enumerate(paths)}, [(0.3, 0.0)], [(0.15, 0.0, 0.015)])
 
 
 def test_learn_writes_a_library_of_recordings(tmp_path):
-    write_tables(tmp_path, [0.3, 0.3])
+    write_reaches(tmp_path, [0.3, 0.3])
     assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 0
     recordings = load_library(str(tmp_path / 'ways.json'))
     assert len(recordings) == 2
@@ -276,7 +269,7 @@ def test_learn_writes_a_library_of_recordings(tmp_path):
 
 
 def test_a_recording_that_does_not_reach_its_goal_is_named(tmp_path, capsys):
-    write_tables(tmp_path, [0.3, 0.1])
+    write_reaches(tmp_path, [0.3, 0.1])
     assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 2
     assert 'r1: expected a movement' in capsys.readouterr().err
     assert len(load_library(str(tmp_path / 'ways.json'))) == 1
@@ -285,18 +278,18 @@ def test_a_recording_that_does_not_reach_its_goal_is_named(tmp_path, capsys):
 PARAMETERS = '/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 20, homotopy.library: "%s"}}'
 
 
-def run(bag: Path, *options: str, library: str = '') -> int:
+def run(bag, *options, library=''):
     parameters = bag.parent / 'parameters.yaml'
     parameters.write_text(PARAMETERS % library)
     return main(['replay', str(bag), '--params', str(parameters), *options])
 
 
 @pytest.fixture
-def bag(tmp_path: Path) -> Path:
+def bag(tmp_path):
     return write_bag(tmp_path / 'reach', messages(seconds=1.02))
 
 
-def test_a_reach_is_learned_once(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_reach_is_learned_once(bag, tmp_path, capsys):
     file = tmp_path / 'ways.json'
     assert run(bag, '--learn', str(file), '--json') == 0
     assert json.loads(capsys.readouterr().out)['summary']['learned'] == 1
@@ -310,12 +303,12 @@ def test_a_reach_is_learned_once(bag: Path, tmp_path: Path, capsys: pytest.Captu
     assert run(bag, library=str(file)) == 0
 
 
-def test_another_library_in_the_parameters_is_refused(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_library_in_the_parameters_is_refused(bag, tmp_path, capsys):
     assert run(bag, '--learn', str(tmp_path / 'ways.json'), library=str(tmp_path / 'other.json')) == 2
     assert '--learn: expected no other class library in homotopy.library' in capsys.readouterr().err
 
 
-def test_a_reach_that_ends_before_its_goal_is_not_learned(tmp_path: Path) -> None:
+def test_a_reach_that_ends_before_its_goal_is_not_learned(tmp_path):
     bag, file = write_bag(tmp_path / 'short', messages(seconds=0.4)), tmp_path / 'ways.json'
     assert run(bag, '--learn', str(file)) == 0
     assert load_library(str(file)) == ()
@@ -323,9 +316,7 @@ def test_a_reach_that_ends_before_its_goal_is_not_learned(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize('text', ['{"ways": [{}]}', '{', 'x' * 6_000_000])
 @pytest.mark.parametrize('use', ['learn', 'load'])
-def test_a_library_that_cannot_be_used_is_exit_2_in_one_line(
-    bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], use: str, text: str
-) -> None:
+def test_a_library_that_cannot_be_used_is_exit_2_in_one_line(bag, tmp_path, capsys, use, text):
     file = tmp_path / 'ways.json'
     file.write_text(text)
     options = {'learn': (['--learn', str(file)], ''), 'load': ([], str(file))}[use]
@@ -336,24 +327,25 @@ def test_a_library_that_cannot_be_used_is_exit_2_in_one_line(
     assert file.read_text() == text
 
 
-def test_a_place_that_cannot_be_written_is_exit_2_in_one_line(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_place_that_cannot_be_written_is_exit_2_in_one_line(bag, capsys):
     assert run(bag, '--learn', '/nowhere/ways.json') == 2
     error = capsys.readouterr().err
     assert '--learn: expected a file in a directory that exists, got /nowhere/ways.json' in error and error.count('\n') == 1
 
 
-def test_a_full_library_stays_as_it_was(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_full_library_stays_as_it_was(bag, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(class_library, 'MOST_WAYS', 3)
     file = tmp_path / 'ways.json'
     far = make_obstacles([[0.1, 1.0]], 0.01)
-    demonstrations = [record_demonstration('other', np.array([[0.0, 0.1 * k], [0.3, 0.1 * k]]), far) for k in range(MOST_WAYS)]
+    demonstrations = [record_demonstration('other', np.array([[0.0, 0.1 * k], [0.3, 0.1 * k]]), far) for k in range(3)]
     save_library(file, demonstrations)
     held = file.read_bytes()
     assert run(bag, '--learn', str(file)) == 2
-    assert 'ways: expected at most 500, got 501 with the new ones' in capsys.readouterr().err
+    assert 'ways: expected at most 3, got 4 with the new ones' in capsys.readouterr().err
     assert file.read_bytes() == held
 
 
-def test_the_parameters_of_the_operator_are_written(bag: Path, tmp_path: Path) -> None:
+def test_the_parameters_of_the_operator_are_written(bag, tmp_path):
     file = tmp_path / 'operator.yaml'
     assert run(bag, '--operator', str(file)) == 0
     replayed = Replay(load_parameter_file(bag.parent / 'parameters.yaml'))

@@ -2,37 +2,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """The documentation names only files, parameters, commands and tests that exist, and the start page leads to every page."""
 
-import ast
-import importlib
 import re
-import sys
 from pathlib import Path
 
 import pytest
 import yaml
-from tiers import LONG, PROCESS, is_listed, list_test_functions
+from tiers import LONG, PROCESS, SLOW, is_listed, list_test_functions
 
 from foc_ros.cli.main import list_commands
 from foc_ros.core.config import list_parameters
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'doc').glob('**/*.md')])
-TESTS = {
-    f'{file.name}::{node.name}'
-    for file in (ROOT / 'test').glob('test_*.py')
-    for node in ast.walk(ast.parse(file.read_text('utf-8')))
-    if isinstance(node, ast.FunctionDef) and node.name.startswith('test_')
-}
+TESTS = list_test_functions()
 
 
-def find_anchors(page: Path) -> set[str]:
+def find_anchors(page):
     """Return the anchors that repositories give to the headings of a page."""
     headings = re.findall(r'^#+ (.+)$', page.read_text('utf-8'), re.MULTILINE)
     return {re.sub(r'[^\w -]', '', heading.lower()).replace(' ', '-') for heading in headings}
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_links_lead_somewhere(page: Path) -> None:
+def test_links_lead_somewhere(page):
     for target in re.findall(r'\]\(([^)\s]+)\)', page.read_text('utf-8')):
         path, _, anchor = target.partition('#')
         if '://' in target:
@@ -43,14 +35,14 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_paths_named_exist(page: Path) -> None:
+def test_paths_named_exist(page):
     """Module paths, scripts and tests in code font are those of this tree."""
     text = page.read_text('utf-8')
     for path in re.findall(r'`((?:foc_ros|scripts|test|examples|benchmarks|config|rosdep)/[\w/.]*)`', text):
         assert (ROOT / path).exists(), f'{page.name}: there is no {path}'
 
 
-def test_every_page_is_in_the_table_of_contents() -> None:
+def test_every_page_is_in_the_table_of_contents():
     contents = (ROOT / 'doc' / 'index.md').read_text('utf-8')
     listed = set(re.findall(r'^(\w+)$', contents, re.MULTILINE))
     pages = {page.stem for page in (ROOT / 'doc').glob('*.md')} - {'index'}
@@ -58,7 +50,7 @@ def test_every_page_is_in_the_table_of_contents() -> None:
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_parameters_named_exist(page: Path) -> None:
+def test_parameters_named_exist(page):
     known = {parameter.name for parameter in list_parameters()}
     groups = '|'.join(sorted({name.partition('.')[0] for name in known if '.' in name}))
     for name in re.findall(rf'`((?:{groups})\.(?!py`)\w+)`', page.read_text('utf-8')):
@@ -66,20 +58,20 @@ def test_parameters_named_exist(page: Path) -> None:
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_commands_named_exist(page: Path) -> None:
+def test_commands_named_exist(page):
     text = page.read_text('utf-8')
     shown = '\n'.join([*re.findall(r'^```console\n(.*?)^```', text, re.MULTILINE | re.DOTALL), *re.findall(r'`([^`\n]+)`', text)])
     for command in re.findall(r'(?:^|[/ ])foc_ros ([a-z][\w-]*)(?![\w.])', shown, re.MULTILINE):
         assert command in {*list_commands(), 'foc_node'}, f'{page.name}: there is no command {command}'
 
 
-def test_every_command_is_documented() -> None:
+def test_every_command_is_documented():
     text = (ROOT / 'doc' / 'interfaces.md').read_text('utf-8')
     for command in list_commands():
         assert re.search(rf'^\| `{command}\b', text, re.MULTILINE), f'doc/interfaces.md does not list {command}'
 
 
-def read_failures() -> dict[str, list[list[str]]]:
+def read_failures():
     """Return the cells of each row of the table of failures, by the heading within the table under which it stands."""
     text = (ROOT / 'doc' / 'troubleshoot.md').read_text('utf-8').partition('\n## All failures\n')[2]
     header, _, *lines = [line for line in text.splitlines() if line.startswith('|')]
@@ -98,7 +90,7 @@ UNTESTED = 'Installation', 'Predictions are not what you expect'
 """What is no failure of the program, but of its installation or of an expectation."""
 
 
-def test_failures_are_tested_as_they_say() -> None:
+def test_failures_are_tested_as_they_say():
     """Every row of the table of failures has tests, and they exist."""
     rows = [cells[0] for part, found in read_failures().items() if part not in UNTESTED for cells in found]
     named_tests = yaml.safe_load((ROOT / 'test' / 'failure_tests.yaml').read_text('utf-8'))
@@ -108,7 +100,7 @@ def test_failures_are_tested_as_they_say() -> None:
         assert names and not set(names) - TESTS, f'{row}: no such test: {set(names) - TESTS}'
 
 
-def test_failures_quote_texts_that_exist() -> None:
+def test_failures_quote_texts_that_exist():
     """What the table quotes is in the sources, perhaps with values between."""
     sources = [ROOT / 'Makefile', *(ROOT / 'foc_ros').rglob('*.py')]
     text = '\n'.join(file.read_text('utf-8') for file in sources)
@@ -122,7 +114,7 @@ def test_failures_quote_texts_that_exist() -> None:
 INPUTS = '(?:hand_pose|hand|obstacle_markers|obstacles|collision_objects|detections|goals|predict|scene)'
 
 
-def test_failures_count_what_they_say() -> None:
+def test_failures_count_what_they_say():
     """A count that the table names is in the sources, as a whole or as what follows the name of the input."""
     text = '\n'.join(file.read_text('utf-8') for file in (ROOT / 'foc_ros').rglob('*.py'))
     rows = [cells[-1] for found in read_failures().values() for cells in found]
@@ -132,40 +124,20 @@ def test_failures_count_what_they_say() -> None:
         assert count in text or re.search(rf"['_]{reason}\b", text), f'no source counts {count}'
 
 
-def test_failures_name_the_level_of_the_diagnostics_or_the_exit_code() -> None:
+def test_failures_name_the_level_of_the_diagnostics_or_the_exit_code():
     for found in read_failures().values():
         for cells in found:
             assert len(cells) == 3, cells
             assert re.match(r'(OK|WARN|ERROR|unchanged|none|exit \d+)\b|$', cells[1]), cells
 
 
-def test_the_documentation_is_short() -> None:
+def test_the_documentation_is_short():
     """A reader has an hour: README and pages together have at most 25,000 words."""
     words = {page.name: len(page.read_text('utf-8').split()) for page in [ROOT / 'README.md', *(ROOT / 'doc').glob('*.md')]}
     assert sum(words.values()) <= 25_000, words
 
 
-sys.path.append(str(ROOT / 'scripts'))
-page = importlib.import_module('page')
-PAGE = ROOT / 'doc' / 'accuracy.md'
-MEASURED = {'guarantee', 'outcomes', 'reference', 'shapes', 'bounds'}
-"""The blocks that `benchmarks/accuracy.py` measures."""
-
-
-def test_the_page_shows_the_main_measurements_with_their_pictures():
-    text = PAGE.read_text(encoding='utf-8')
-    blocks = page.find_blocks(text)
-    assert set(blocks) >= MEASURED
-    for name, block in ((name, blocks[name]) for name in MEASURED):
-        rows = block.strip().splitlines()
-        assert len(rows) >= 7, name
-        assert len({row.count('|') for row in rows}) == 1, f'{name}: the rows differ in length'
-    for picture in ('guarantee', 'effort_over_eta'):
-        assert f'(images/{picture}.png)' in text
-        assert (page.IMAGES / f'{picture}.png').is_file()
-
-
-def test_every_pattern_matches_a_test() -> None:
-    functions = list_test_functions()
-    stale = [pattern for pattern in LONG + PROCESS if not any(is_listed(*each, (pattern,)) for each in functions)]
-    assert stale == []
+def test_every_pattern_matches_a_test():
+    functions = [name.split('::') for name in TESTS]
+    patterns = LONG + PROCESS + SLOW
+    assert [pattern for pattern in patterns if not any(is_listed(*each, (pattern,)) for each in functions)] == []

@@ -2,18 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The web site in a browser: it names project and version, fits its window, is readable in the dark, and needs no network."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from browser_helpers import chromium, show
+from browser_helpers import show
 
 import foc_ros
 
@@ -29,7 +25,7 @@ LONG_TYPES = ('ndarray[tuple', 'TypeAliasForwardRef', '<factory>', 'dtype[', '~n
 
 
 @pytest.fixture(scope='module')
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory):
     """Build the site without running the examples of its gallery, from a copy of what it is made from."""
     root = tmp_path_factory.mktemp('site')
     copied = shutil.ignore_patterns('auto_examples', '__pycache__')
@@ -46,25 +42,19 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root / 'html'
 
 
-@pytest.fixture(scope='module')
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    with chromium(tmp_path_factory.mktemp('profile')) as opened:
-        yield opened
-
-
 PAGES = ('index', 'api', 'concepts', 'interfaces', 'parameters', 'auto_examples/index', 'auto_examples/plot_08_replay_bag')
 
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('page', PAGES)
-def test_a_page_fits_its_window_and_needs_no_network(site: Path, browser: Any, page: str) -> None:
+def test_a_page_fits_its_window_and_needs_no_network(site, browser, page):
     for width in (1280, 1440, 1920):
         assert show(browser, site / f'{page}.html', width) == []
         assert browser.execute_script('return document.documentElement.scrollWidth') <= width, f'{width} pixels'
         assert browser.execute_script(TOO_WIDE) == []
 
 
-def test_the_site_says_what_it_is_about(site: Path, browser: Any) -> None:
+def test_the_site_says_what_it_is_about(site, browser):
     show(browser, site / 'index.html')
     assert f'foc_ros {foc_ros.__version__}' in browser.title
     sidebar = browser.find_element('css selector', '.sidebar-drawer').text
@@ -75,7 +65,7 @@ def test_the_site_says_what_it_is_about(site: Path, browser: Any) -> None:
     assert browser.execute_script("return document.querySelector('.sidebar-logo').naturalWidth") > 0
 
 
-def test_the_reference_has_the_types_of_the_sources(site: Path, browser: Any) -> None:
+def test_the_reference_has_the_types_of_the_sources(site, browser):
     show(browser, site / 'api.html')
     signatures = browser.execute_script("return [...document.querySelectorAll('dt.sig')].map((each) => each.textContent)")
     assert len(signatures) > 80

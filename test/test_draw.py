@@ -2,12 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures for print: what is drawn is what was computed, and it can be told apart, read and placed anywhere."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +17,6 @@ from report_samples import START_NS, prediction, predictions, samples, widen
 
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.reporting.draw import (
     ELLIPSES_PER_CANDIDATE,
@@ -36,7 +31,7 @@ PNG = b'\x89PNG\r\n\x1a\n'
 NOWHERE = np.zeros(2)
 
 
-def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dotted_and_says_its_eta() -> None:
+def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dotted_and_says_its_eta():
     widths = [get_candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
     assert np.all(np.diff(widths) > 0.0)
     assert {get_candidate_style(slot, 0.5)['linestyle'] for slot in (None, 0, 5, 6, 11)} == {'-'}
@@ -54,27 +49,27 @@ def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dot
         assert words.count('estimated: eta 0.900') == 1 and 'compromised' not in words
 
 
-def axes_of(made: Prediction) -> Any:
+def axes_of(made):
     return make_scene_figure(build_snapshot(made)).axes[0]
 
 
-def legends_of(axes: Any) -> list[Legend]:
+def legends_of(axes):
     """Return the legends below axes: of the candidates, and of the signs."""
     (below,) = [each for each in axes.figure.axes if each.get_gid() == f'legend {id(axes)}']
     return [each for each in below.get_children() if isinstance(each, Legend)]
 
 
-def entries_of(axes: Any) -> list[str]:
+def entries_of(axes):
     """Return the lines of the legend."""
     return [text.get_text() for each in legends_of(axes) for text in each.get_texts()]
 
 
-def legend_of(axes: Any) -> str:
+def legend_of(axes):
     """Return the text of the legend without its line breaks."""
     return ' '.join(' '.join(each.split()) for each in entries_of(axes))
 
 
-def test_a_scene_holds_every_obstacle_goal_and_candidate() -> None:
+def test_a_scene_holds_every_obstacle_goal_and_candidate():
     made = prediction(START_NS, NOWHERE)
     axes = axes_of(made)
     radii = sorted(patch.radius for patch in axes.patches if isinstance(patch, Circle))
@@ -84,7 +79,7 @@ def test_a_scene_holds_every_obstacle_goal_and_candidate() -> None:
         assert any(np.array_equal(line, points) for line in drawn)
 
 
-def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it() -> None:
+def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it():
     made = prediction(START_NS, NOWHERE)  # its third candidate leads through `post`, the last one could not be solved
     axes = axes_of(made)
     ghosts = [line for line in axes.lines if line.get_color() == GHOST_COLOUR]
@@ -100,7 +95,7 @@ def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it() -> No
     assert 'goal1: left of 1, right of post; leads through obstacle post' in legend_of(axes)
 
 
-def test_goals_are_called_by_their_names() -> None:
+def test_goals_are_called_by_their_names():
     made = prediction(START_NS, NOWHERE).with_goal_names(('bowl', 'plate'))
     words = {text.get_text() for text in axes_of(made).texts}
     assert {'bowl', 'plate'} <= words and not words & {'goal0', 'goal1'}
@@ -109,7 +104,7 @@ def test_goals_are_called_by_their_names() -> None:
     assert (written.count('bowl'), written.count('plate')) == (1, 2), 'an object that is a goal has its name once'
 
 
-def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse_widens_the_axes() -> None:
+def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse_widens_the_axes():
     made = build_snapshot(prediction(START_NS, NOWHERE))
     solutions = [each.solution.with_covariance(1e4 * each.covariance) for each in made]
     wide = replace(made, candidates=tuple(replace(each, solution=new) for each, new in zip(made, solutions, strict=True)))
@@ -128,7 +123,7 @@ def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse
     assert (paths >= [left, bottom]).all() and (paths <= [right, top]).all() and right - left < 0.35
 
 
-def test_everything_drawn_is_in_the_legend_once_and_the_hand_has_past_and_future() -> None:
+def test_everything_drawn_is_in_the_legend_once_and_the_hand_has_past_and_future():
     hand = build_hand_trajectory(samples())
     (span,) = hand.find_movements(0.05)
     during = [build_snapshot(widen(each)) for each in predictions(samples()) if span[0] <= each.stamp_ns <= span[1]]
@@ -146,13 +141,13 @@ def test_everything_drawn_is_in_the_legend_once_and_the_hand_has_past_and_future
     np.testing.assert_array_equal(later[0].get_xydata()[0], now)
 
 
-def sorted_shares(snapshot: Prediction) -> list[str]:
+def sorted_shares(snapshot):
     """Return the shares of the candidates in the legend, those without one last."""
     shares = [f'{100 * each.likelihood:.0f}' for each in snapshot.candidates_with_likelihood]
     return shares + ['-'] * len(list_unsolved(snapshot))
 
 
-def layouts() -> dict[str, Any]:
+def layouts():
     """Return axes by how they were made, as users do."""
     return {
         'new': None,
@@ -164,7 +159,7 @@ def layouts() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize('name', ['new', 'one', 'two', 'four', 'placed'])
-def test_a_plot_survives_subplots_and_savefig(name: str, tmp_path: Path) -> None:
+def test_a_plot_survives_subplots_and_savefig(name, tmp_path):
     """The legend is within the figure and covers no other axes, also when it is drawn again."""
     given, made = layouts()[name], widen(prediction(START_NS, NOWHERE))
     axes = plot_prediction(made, given)
@@ -185,7 +180,7 @@ def test_a_plot_survives_subplots_and_savefig(name: str, tmp_path: Path) -> None
     plt.close('all')
 
 
-def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_start(tmp_path: Path) -> None:
+def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_start(tmp_path):
     made = prediction(START_NS, NOWHERE)
     lost = [each for each in made.candidates if not each.is_solved]
     nothing = replace(made, candidates=tuple(lost), most_likely=None, obstacles=make_obstacles())
@@ -200,7 +195,7 @@ def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_s
 @pytest.mark.parametrize(
     ('name', 'expected'), [('scene.xyz', r'\.png'), ('scene', r'\.png'), ('no/such/scene.png', 'can be written')]
 )
-def test_a_file_that_cannot_be_written(tmp_path: Path, name: str, expected: str) -> None:
+def test_a_file_that_cannot_be_written(tmp_path, name, expected):
     with pytest.raises(InputError, match=expected):
         write_picture(tmp_path / name, prediction(START_NS, NOWHERE))
     assert list(tmp_path.iterdir()) == []

@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Encoding of a prediction, checked with independent readers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from message_helpers import STORE, both_kinds, message_types
+from message_helpers import STORE, both_kinds, message_types, read_columns
 from prediction_samples import DT, STEPS, outcome, prediction, three_ways
 from scipy.spatial.transform import Rotation
 
@@ -17,11 +15,9 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
-from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import Status
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_goal_likelihoods, encode_outputs
 from foc_ros.ros.messages.plane import lift, project
-from foc_ros.ros.messages.types import MessageTypes
 
 BAGS = message_types('rosbags')
 NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz', 'candidate', 'likelihood']
@@ -29,25 +25,16 @@ PAIRS = NAMES[7:13]
 NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS), 'goal', 'way', 'status']
 
 
-def made(name: str, of: Prediction, types: MessageTypes = BAGS, plane: str = 'xy') -> Any:
+def made(name, of, types=BAGS, plane='xy'):
     return encode_outputs(of, plane, types, [name])[name]
-
-
-def columns(cloud: Any) -> dict[str, np.ndarray]:
-    """Read a cloud by its own field descriptions."""
-    raw = np.frombuffer(bytes(cloud.data), np.uint8).reshape(cloud.height * cloud.width, cloud.point_step)
-    dtypes = {7: '<f4', 6: '<u4'}
-    return {
-        field.name: raw[:, field.offset : field.offset + 4].copy().view(dtypes[field.datatype])[:, 0] for field in cloud.fields
-    }
 
 
 @both_kinds
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
-def test_the_cloud_contains_every_solved_candidate(types: MessageTypes, plane: str) -> None:
+def test_the_cloud_contains_every_solved_candidate(types, plane):
     ways = three_ways()
     cloud = made('prediction', ways, types, plane)
-    table = columns(cloud)
+    table = read_columns(cloud)
     assert list(table) == NAMES
     assert (cloud.height, cloud.width, cloud.row_step, len(cloud.data)) == (
         1,
@@ -71,16 +58,16 @@ def test_the_cloud_contains_every_solved_candidate(types: MessageTypes, plane: s
             np.testing.assert_allclose(table['xyz'[i] + 'xyz'[j]][rows], space[:, i, j], rtol=1e-6)
 
 
-def test_goal_and_number_of_the_class_do_not_depend_on_the_rank() -> None:
+def test_goal_and_number_of_the_class_do_not_depend_on_the_rank():
     one, other = outcome('goal1:+l1', 0.2, 0.1), outcome('goal0:-l1', 0.8, -0.1)
     one = replace(one, candidate=replace(one.candidate, goal=1), way=7)
-    table = columns(made('prediction', prediction(replace(other, way=3), one)))
+    table = read_columns(made('prediction', prediction(replace(other, way=3), one)))
     assert table['way'].tolist() == [3] * (STEPS + 1) + [7] * (STEPS + 1)
     assert table['goal'].tolist() == [0] * (STEPS + 1) + [1] * (STEPS + 1)
 
 
 @both_kinds
-def test_the_likelihoods_are_a_table_with_labels(types: MessageTypes) -> None:
+def test_the_likelihoods_are_a_table_with_labels(types):
     message = made('likelihoods', three_ways(), types)
     rows, columns_, stamp = message.layout.dim
     assert (stamp.label, stamp.size, stamp.stride) == ('stamp_ns:5000000000', 1, 1)
@@ -91,7 +78,7 @@ def test_the_likelihoods_are_a_table_with_labels(types: MessageTypes) -> None:
 
 
 @both_kinds
-def test_likelihoods_are_told_by_the_names_of_goals_and_classes(types: MessageTypes) -> None:
+def test_likelihoods_are_told_by_the_names_of_goals_and_classes(types):
     goals = np.array([[0.3, 0.0], [0.3, 0.1]])
     made_of = replace(three_ways(), goal_positions=goals, unknown=0.0)
     message = made('likelihoods_by_name', made_of, types)
@@ -106,7 +93,7 @@ def test_likelihoods_are_told_by_the_names_of_goals_and_classes(types: MessageTy
 
 
 @both_kinds
-def test_the_path_is_the_most_likely_one_with_stamps_in_the_future(types: MessageTypes) -> None:
+def test_the_path_is_the_most_likely_one_with_stamps_in_the_future(types):
     ways = three_ways()
     message = made('path', ways, types, 'xz')
     stamps = [pose.header.stamp.sec * 10**9 + pose.header.stamp.nanosec for pose in message.poses]
@@ -117,17 +104,17 @@ def test_the_path_is_the_most_likely_one_with_stamps_in_the_future(types: Messag
     assert {pose.pose.orientation.w for pose in message.poses} == {1.0}
 
 
-def test_the_candidate_called_most_likely_is_first_even_if_another_is_likelier() -> None:
+def test_the_candidate_called_most_likely_is_first_even_if_another_is_likelier():
     ways = prediction(outcome('a', 0.52, 0.1), outcome('b', 0.48, -0.1), most_likely='b')
     assert made('likelihoods', ways).layout.dim[0].label == 'b;a'
-    table = columns(made('prediction', ways))
+    table = read_columns(made('prediction', ways))
     np.testing.assert_allclose(table['likelihood'][table['candidate'] == 0], 0.48, rtol=1e-6)
     assert made('path', ways).poses[2].pose.position.y < 0
 
 
 @both_kinds
 @pytest.mark.parametrize('outcomes', [(), (outcome(status=Status.INFEASIBLE),)])
-def test_nothing_solved_is_an_empty_answer(types: MessageTypes, outcomes: tuple[PredictedCandidate, ...]) -> None:
+def test_nothing_solved_is_an_empty_answer(types, outcomes):
     messages = encode_outputs(prediction(*outcomes), 'xy', types)
     assert (messages['prediction'].width, len(messages['prediction'].data)) == (0, 0)
     assert [field.name for field in messages['prediction'].fields] == NAMES
@@ -138,7 +125,7 @@ def test_nothing_solved_is_an_empty_answer(types: MessageTypes, outcomes: tuple[
 
 @pytest.mark.parametrize('value', [np.nan, np.inf, 1e31])
 @pytest.mark.parametrize('where', ['mean', 'covariance', 'effort', 'eta'])
-def test_a_number_that_is_not_finite_is_not_encoded(value: float, where: str) -> None:
+def test_a_number_that_is_not_finite_is_not_encoded(value, where):
     good = getattr(outcome().solution, where)
     bad = np.array(good)
     bad.flat[-1] = value
@@ -149,7 +136,7 @@ def test_a_number_that_is_not_finite_is_not_encoded(value: float, where: str) ->
 
 
 @both_kinds
-def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
+def test_markers_show_every_candidate_and_obstacle(types):
     markers = made('markers', three_ways(), types).markers
     assert (markers[0].action, markers[0].ns) == (3, '')
     by_name: dict[str, list[Any]] = {}
@@ -172,13 +159,13 @@ def test_markers_show_every_candidate_and_obstacle(types: MessageTypes) -> None:
     assert [each.scale.x for each in by_name['obstacle_deviation']] == pytest.approx([0.07, 0.04])
 
 
-def test_a_compromised_candidate_takes_part_and_says_so() -> None:
+def test_a_compromised_candidate_takes_part_and_says_so():
     ways = prediction(outcome('a', 0.7), outcome('b', 0.3, eta=0.62, status=Status.COMPROMISED))
-    table = columns(made('prediction', ways))
+    table = read_columns(made('prediction', ways))
     assert set(table['candidate'][table['compromised'] == 1]) == {1}
     assert table['status'][:: STEPS + 1].tolist() == [0, 1]
     late = prediction(*(outcome(status.value, 0.3, status=status) for status in (Status.ESTIMATED, Status.DEADLINE)))
-    table = columns(made('prediction', late))
+    table = read_columns(made('prediction', late))
     assert table['status'][:: STEPS + 1].tolist() == [2, 3] and table['compromised'].all()
     assert made('likelihoods', ways).layout.dim[0].label == 'a;b'
     texts = [each.text for each in made('markers', ways).markers if each.ns == 'label']
@@ -188,7 +175,7 @@ def test_a_compromised_candidate_takes_part_and_says_so() -> None:
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
-def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
+def test_an_ellipse_has_the_axes_of_the_covariance(plane):
     names, lifted = ('motor_noise', 'total_uncertainty'), lift(np.eye(2), 0.0, plane)
     ellipses = [each for each in made('markers', three_ways(), plane=plane).markers if each.ns in names]
     assert ellipses
@@ -201,7 +188,7 @@ def test_an_ellipse_has_the_axes_of_the_covariance(plane: str) -> None:
 
 @both_kinds
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
-def test_a_box_is_drawn_as_triangles_that_cover_it(types: MessageTypes, plane: str) -> None:
+def test_a_box_is_drawn_as_triangles_that_cover_it(types, plane):
     shapes = collect_obstacles([Box((0.1, 0.0), (0.1, 0.04), 0.5, radius_stddev=0.01), Circle((0.2, 0.1), 0.02)])
     markers = encode_outputs(replace(three_ways(), obstacles=shapes), plane, types, ['markers'])['markers'].markers
     for name, radius in (('obstacle', 0.0), ('obstacle_deviation', 0.01)):
@@ -216,7 +203,7 @@ def test_a_box_is_drawn_as_triangles_that_cover_it(types: MessageTypes, plane: s
         assert area == pytest.approx(0.1 * 0.04 + 2 * 0.14 * radius + np.pi * radius**2, rel=1e-2)
 
 
-def test_the_nearest_of_many_obstacles_are_drawn() -> None:
+def test_the_nearest_of_many_obstacles_are_drawn():
     crowd = make_obstacles([[0.01 * i, 0.0] for i in range(1000, 0, -1)], 0.001)
     markers = encode_outputs(replace(three_ways(), obstacles=crowd), 'xy', BAGS, ['markers'])['markers'].markers
     drawn = [each.pose.position.x for each in markers if each.ns == 'obstacle']
@@ -224,7 +211,7 @@ def test_the_nearest_of_many_obstacles_are_drawn() -> None:
 
 
 @both_kinds
-def test_every_output_is_the_same_after_serialisation(types: MessageTypes) -> None:
+def test_every_output_is_the_same_after_serialisation(types):
     for name, message in encode_outputs(three_ways(), 'xy', types).items():
         kind = OUTPUTS[name][0]
         if hasattr(message, '__msgtype__'):

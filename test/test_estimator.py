@@ -29,26 +29,25 @@ from foc_ros.core.plant.covariance import compute_duration_sensitivity, compute_
 from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
 from foc_ros.core.plant.replanning import compute_error_map, triple_integrator_goal_map, triple_integrator_process_covariance
 from foc_ros.core.predict import predict
-from foc_ros.core.solution import Solution
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus
+from foc_ros.core.types import NANOSECONDS, HandSample, HandState, SampleStatus
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
 START = 100 * NANOSECONDS
 
 
-def sample(seconds: float, x: float = 0.0, y: float = 0.0, height: float = 0.0) -> HandSample:
+def sample(seconds, x=0.0, y=0.0, height=0.0):
     return HandSample(START + round(seconds * 1e9), np.array([x, y]), height, 'world')
 
 
-def run(times: Array, positions: Array, config: EstimatorConfig = CONFIG) -> list[FilterState]:
+def run(times, positions, config=CONFIG):
     states: list[FilterState] = []
     for t, (x, y) in zip(times, positions, strict=True):
         states.append(update(states[-1] if states else None, sample(t, x, y), config).state)
     return states
 
 
-def test_the_filter_equals_a_plain_one_with_six_states() -> None:
+def test_the_filter_equals_a_plain_one_with_six_states():
     rng = np.random.default_rng(1)
     times = np.cumsum(rng.uniform(0.002, 0.1, 60))
     positions = 0.003 * rng.standard_normal((60, 2))
@@ -72,9 +71,7 @@ def test_the_filter_equals_a_plain_one_with_six_states() -> None:
     steps=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=30),
     far=st.floats(0.0, 1e6),
 )
-def test_the_estimate_stays_finite_and_positive_for_any_configuration(
-    stddev: float, density: float, gap: float, steps: list[float], far: float
-) -> None:
+def test_the_estimate_stays_finite_and_positive_for_any_configuration(stddev, density, gap, steps, far):
     config = EstimatorConfig(position_stddev=stddev, jerk_density=density, gap_s=gap)
     times = np.cumsum(np.maximum(np.array(steps) * gap, 1e-9))
     for state in run(times, far * np.array([[(-1.0) ** i, i % 3] for i in range(len(times))]), config):
@@ -85,7 +82,7 @@ def test_the_estimate_stays_finite_and_positive_for_any_configuration(
         assert np.linalg.eigvalsh(state.covariance / np.outer(scale, scale)).min() > -1e-9
 
 
-def test_duplicates_and_late_samples_change_nothing() -> None:
+def test_duplicates_and_late_samples_change_nothing():
     state = run(np.arange(0.0, 1.0, 0.02), np.zeros((50, 2)))[-1]
     for seconds, status in [(0.0, SampleStatus.DUPLICATE), (-1e-9, SampleStatus.LATE), (-0.5, SampleStatus.LATE)]:
         updated = update(state, sample(0.98 + seconds, 9.0, 9.0), CONFIG)
@@ -93,7 +90,7 @@ def test_duplicates_and_late_samples_change_nothing() -> None:
         assert updated.state is state
 
 
-def test_backward_jumps_and_gaps_restart_the_filter() -> None:
+def test_backward_jumps_and_gaps_restart_the_filter():
     state = run(np.arange(0.0, 1.0, 0.02), np.outer(np.arange(0.0, 1.0, 0.02), [0.5, 0.0]))[-1]
     assert state.onset_ns is not None
     for seconds, status in [
@@ -111,7 +108,7 @@ def test_backward_jumps_and_gaps_restart_the_filter() -> None:
 
 
 @pytest.mark.parametrize('dt', [0.0035, 0.02, 0.1])
-def test_a_position_that_jumps_decides_nothing_before_the_next_one(dt: float) -> None:
+def test_a_position_that_jumps_decides_nothing_before_the_next_one(dt):
     times = np.arange(0.0, 1.0, dt)
     state = run(times, np.outer(times, [2.0, 0.0]))[-1]
     expected = state.mean[0] + dt * state.mean[2]
@@ -138,7 +135,7 @@ def test_a_position_that_jumps_decides_nothing_before_the_next_one(dt: float) ->
     assert update(other.state, later, CONFIG).status is SampleStatus.RESTARTED_GAP
 
 
-def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it() -> None:
+def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it():
     config = replace(CONFIG, position_stddev=1e-5)
     times = np.arange(0.0, 6.0, 0.01)
     speeds = np.interp(times, [0.0, 1.0, 3.0, 5.0, 6.0], [0.0, 0.0, 0.1, 0.0, 0.0])
@@ -155,7 +152,7 @@ def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it() -> 
 
 
 @pytest.mark.parametrize('rate', [15.0, 200.0])
-def test_noise_at_rest_begins_no_movement(rate: float) -> None:
+def test_noise_at_rest_begins_no_movement(rate):
     rng = np.random.default_rng(8)
     false = 0
     for _ in range(10):
@@ -170,7 +167,7 @@ FIXED = replace(FITTS, model='fixed', fixed_s=1.5)
 DURATION_GOAL = np.array([0.3, 0.0])
 
 
-def hand(x: float, onset: float | None = None, since_s: float = 0.0, speed: float = 100.0) -> HandState:
+def hand(x, onset=None, since_s=0.0, speed=100.0):
     mean = np.array([x, 0.0, 0.6 * speed, -0.8 * speed, 0.0, 0.0])
     stamp = 5 * NANOSECONDS
     if onset is None:
@@ -178,29 +175,29 @@ def hand(x: float, onset: float | None = None, since_s: float = 0.0, speed: floa
     return HandState(stamp, mean, np.eye(6), onset_ns=stamp - round(since_s * 1e9), onset_position=np.array([onset, 0.0]))
 
 
-def time_to_go(state: HandState, goal: np.ndarray, config: DurationConfig) -> float:
+def time_to_go(state, goal, config):
     return estimate_times_to_go(state, goal[None], config)[0]
 
 
-def test_fitts_law_at_whole_bits() -> None:
+def test_fitts_law_at_whole_bits():
     for bits in range(8):
         distance = 0.02 * (2.0**bits - 1.0)
         assert compute_movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
 
 
-def test_during_a_movement_the_time_to_go_is_the_duration_less_the_time_since_onset() -> None:
+def test_during_a_movement_the_time_to_go_is_the_duration_less_the_time_since_onset():
     assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), DURATION_GOAL, FITTS) == pytest.approx(1.2 - 0.4)
     assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), DURATION_GOAL, FIXED) == pytest.approx(1.5 - 0.4)
 
 
-def test_lower_and_upper_limit() -> None:
+def test_lower_and_upper_limit():
     assert time_to_go(hand(0.29, onset=0.0, since_s=5.0), DURATION_GOAL, FITTS) == 0.3
     assert time_to_go(hand(0.3), DURATION_GOAL, replace(FITTS, fitts_a_s=0.0)) == 0.3
     assert time_to_go(hand(0.0), DURATION_GOAL, replace(FIXED, fixed_s=30.0)) == 10.0
     assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.0), DURATION_GOAL, FIXED) == 10.0
 
 
-def test_a_slow_hand_needs_the_time_of_the_distance_at_its_speed() -> None:
+def test_a_slow_hand_needs_the_time_of_the_distance_at_its_speed():
     assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.05), DURATION_GOAL, FIXED) == pytest.approx(0.2 / 0.05)
     assert time_to_go(hand(0.1, onset=0.0, since_s=3.0, speed=0.05), DURATION_GOAL, FIXED) == pytest.approx(0.2 / 0.05)
     # too early for the speed to count
@@ -208,7 +205,7 @@ def test_a_slow_hand_needs_the_time_of_the_distance_at_its_speed() -> None:
 
 
 @pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 10))
-def test_a_minimum_jerk_movement_of_the_expected_duration_is_not_delayed(share: float) -> None:
+def test_a_minimum_jerk_movement_of_the_expected_duration_is_not_delayed(share):
     x = 0.3 * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
     speed = 0.3 / 1.5 * (30.0 * share**2 - 60.0 * share**3 + 30.0 * share**4)
     state = hand(x, onset=0.0, since_s=1.5 * share, speed=speed)
@@ -216,16 +213,14 @@ def test_a_minimum_jerk_movement_of_the_expected_duration_is_not_delayed(share: 
 
 
 @given(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.0, 1e4), st.floats(0.0, 1e3), st.sampled_from([FITTS, FIXED]))
-def test_the_time_to_go_stays_in_bounds_and_is_continuous_at_onset(
-    x: float, onset: float, since_s: float, speed: float, config: DurationConfig
-) -> None:
+def test_the_time_to_go_stays_in_bounds_and_is_continuous_at_onset(x, onset, since_s, speed, config):
     assert 0.3 <= time_to_go(hand(x, onset, since_s, speed), DURATION_GOAL, config) <= 10.0
     assert time_to_go(hand(x, x, 0.0, speed), DURATION_GOAL, config) == time_to_go(hand(x, speed=speed), DURATION_GOAL, config)
     slower = time_to_go(hand(x, onset, since_s, speed / 2.0), DURATION_GOAL, config)
     assert slower >= time_to_go(hand(x, onset, since_s, speed), DURATION_GOAL, config)
 
 
-def test_the_goal_that_the_speed_fits_best_gives_the_factor_for_all_goals() -> None:
+def test_the_goal_that_the_speed_fits_best_gives_the_factor_for_all_goals():
     """A hand that is slow near one goal gets no longer durations to the others."""
     goals = np.array([[0.3, 0.0], [-0.3, 0.0]])
     near = estimate_times_to_go(hand(0.28, onset=0.0, since_s=1.3, speed=0.1), goals, FIXED)
@@ -237,7 +232,7 @@ def test_the_goal_that_the_speed_fits_best_gives_the_factor_for_all_goals() -> N
 MEAN = np.array([0.0, 0.0, 0.2, 0.1, -0.4, 1.0])
 
 
-def first(time_s: float, onset_ns: int | None = 0) -> np.ndarray:
+def first(time_s, onset_ns=0):
     """The state of the predicted movement at its first step."""
     config = replace_values(Config(), {'estimator.acceleration_time_s': time_s})
     hand = HandState(200_000_000, MEAN, 1e-6 * np.eye(6), onset_ns=onset_ns, onset_position=np.zeros(2))
@@ -249,12 +244,12 @@ def first(time_s: float, onset_ns: int | None = 0) -> np.ndarray:
     ('time_s', 'expected'),
     [(0.0, MEAN), (0.1, [0.0, 0.0, 0.16, 0.2, 0.0, 0.0]), (0.5, [0.0, 0.0, 0.0, 0.6, 0.0, 0.0])],
 )
-def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to(time_s: float, expected: list[float]) -> None:
+def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to(time_s, expected):
     np.testing.assert_allclose(first(time_s), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize('time_s', [0.0, 0.5])
-def test_a_hand_that_has_not_begun_to_move_is_at_rest(time_s: float) -> None:
+def test_a_hand_that_has_not_begun_to_move_is_at_rest(time_s):
     np.testing.assert_allclose(first(time_s, None), np.zeros(6), atol=1e-12)
 
 
@@ -271,18 +266,18 @@ PASSING = replace_values(
 FREE = make_obstacles()
 
 
-def moving_hand(*mean: float) -> HandState:
+def moving_hand(*mean):
     return HandState(0, np.array(mean), 1e-8 * np.eye(6), onset_ns=0, onset_position=np.array(mean[:2]))
 
 
-def compute_least_effort(length: float, speed: float, acceleration: float) -> float:
+def compute_least_effort(length, speed, acceleration):
     """Return the least integral of squared jerk [m^2/s^5] of an axis that passes its goal after 1 s with no acceleration."""
     held = [0, 2]
     missing = (np.array([length, 0.0, 0.0]) - compute_transition(1.0) @ [0.0, speed, acceleration])[held]
     return float(missing @ np.linalg.solve(compute_gramian(1.0)[np.ix_(held, held)], missing))
 
 
-def test_a_hand_that_keeps_its_speed_passes_without_effort() -> None:
+def test_a_hand_that_keeps_its_speed_passes_without_effort():
     (found,) = predict(PASSING, moving_hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), FREE, np.array([[0.3, 0.1]]), NO_TRACKS)[
         0
     ].solved_candidates
@@ -290,16 +285,16 @@ def test_a_hand_that_keeps_its_speed_passes_without_effort() -> None:
     assert_allclose(found.solution.mean[-1], [0.3, 0.1, 0.3, 0.1, 0.0, 0.0], atol=1e-9)
 
 
-def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration() -> None:
+def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration():
     start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
-    config = replace_values(PASSING, {'foc.steps': 400})
+    config = replace_values(PASSING, {'foc.steps': 150})
     (found,) = predict(config, moving_hand(*start), FREE, np.array([[0.3, 0.1]]), NO_TRACKS)[0].solved_candidates
     along = [compute_least_effort(way, *start[2 + axis :: 2]) for axis, way in enumerate((0.3, 0.1))]
-    assert found.solution.effort * found.solution.dt == pytest.approx(sum(along), rel=1e-3)
+    assert found.solution.effort * found.solution.dt == pytest.approx(sum(along), rel=3e-3)
     assert_allclose(found.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-9)
 
 
-def test_the_covariance_agrees_with_a_hand_that_replans_at_each_step() -> None:
+def test_the_covariance_agrees_with_a_hand_that_replans_at_each_step():
     steps, dt, draws = 12, 0.1, 20_000
     plant, noise = discretise_triple_integrator(dt), np.random.default_rng(3)
     root = np.linalg.cholesky(np.kron(compute_gramian(dt), np.eye(2)))
@@ -318,14 +313,14 @@ GOAL = np.array([0.3, 0.1])
 HAND = HandState(0, np.array([0.05, 0.0, 0.3, -0.1, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 
 
-def _plan(duration_s: float, passing: bool, mean: np.ndarray) -> Solution:
+def _plan(duration_s, passing, mean):
     """Plan a movement without obstacles."""
     stacked = build_triple_integrator_horizon(duration_s / STEPS, STEPS)
     problem = rest_to_goal(stacked, mean, GOAL, make_obstacles([], []), np.array([0.05, 0.05]), 0.9, passing=passing)
     return solve_problem(problem, cold_start(np.linspace(mean[:2], GOAL, STEPS + 1)), Config().foc)
 
 
-def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods() -> None:
+def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods():
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
     announced = replace_values(Config(), {'likelihood.other_goal': 0.0})
     exact = replace_values(announced, {'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0})
@@ -346,7 +341,7 @@ def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoo
         assert np.trace(added[STEPS // 2, :2, :2]) == pytest.approx(2 * (0.006 * half_way) ** 2 + 0.3**2 * late @ late)
 
 
-def test_the_onset_delay_covariance_agrees_with_samples() -> None:
+def test_the_onset_delay_covariance_agrees_with_samples():
     plan, wait_s = _plan(0.8, False, np.zeros(6)), 0.15
     delays = np.random.default_rng(4).exponential(wait_s, 20_000)
     found = compute_onset_delay_covariance(plan, wait_s)
@@ -362,7 +357,7 @@ def test_the_onset_delay_covariance_agrees_with_samples() -> None:
         assert_allclose(found[step, :2, :2], drawn[:2, :2], atol=0.05 * drawn[:2, :2].max())
 
 
-def test_the_onset_delay_widens_predictions_at_rest_only() -> None:
+def test_the_onset_delay_widens_predictions_at_rest_only():
     scene = make_obstacles([], []), GOAL[None]
     delayed = replace_values(Config(), {'duration.wait_s': 0.2})
     for hand, widens in ((HandState(0, np.zeros(6), 1e-6 * np.eye(6)), True), (HAND, False)):

@@ -2,18 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `evaluate`: kinds of data, failures by name, workers, JSON, page, and baselines from outside."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.evaluation import Forecast, Observation, Question, register_baseline
+from foc_ros.analysis.evaluation import Forecast, register_baseline
 from foc_ros.analysis.evaluation.baselines import BASELINES
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
@@ -24,7 +21,7 @@ OBSTACLE = [(0.15, 0.0, 0.03)]
 GOAL = [(0.3, 0.0)]
 
 
-def write_three(folder: Path) -> Path:
+def write_three(folder):
     """Write three reaches past one obstacle, the last one with a wrong label."""
     write_tables(folder, {name: reach(aside, GOAL[0]) for name, aside in ASIDE.items()}, GOAL, OBSTACLE)
     # low x is on neither side of a movement along x; by convention the left counts as high
@@ -34,15 +31,15 @@ def write_three(folder: Path) -> Path:
 
 
 @pytest.fixture
-def tables(tmp_path: Path) -> Path:
+def tables(tmp_path):
     return write_three(tmp_path / 'data')
 
 
-def run(data: Path, *options: str, workers: str = '--workers=1') -> int:
+def run(data, *options, workers='--workers=1'):
     return main(['evaluate', str(data), '--params', str(data / 'parameters.yaml'), workers, *options])
 
 
-def evaluate(data: Path, *options: str, code: int = 0, workers: str = '--workers=1') -> dict:
+def evaluate(data, *options, code=0, workers='--workers=1'):
     output = io.StringIO()
     with contextlib.redirect_stdout(output):
         assert run(data, '--json', *options, workers=workers) == code
@@ -50,12 +47,12 @@ def evaluate(data: Path, *options: str, code: int = 0, workers: str = '--workers
 
 
 @pytest.fixture(scope='module')
-def whole(tmp_path_factory: pytest.TempPathFactory) -> dict:
+def whole(tmp_path_factory):
     """Return the answer about the three reaches."""
     return evaluate(write_three(tmp_path_factory.mktemp('whole') / 'data'))
 
 
-def test_reaches_past_an_obstacle_are_scored_by_class(whole: dict) -> None:
+def test_reaches_past_an_obstacle_are_scored_by_class(whole):
     assert whole['recordings'] == 3 and whole['failed'] == {} and whole['predictions'] >= 12
     assert set(whole['questions']) == {'way', 'gap'}
     by_class = whole['questions']['way']
@@ -68,7 +65,7 @@ def test_reaches_past_an_obstacle_are_scored_by_class(whole: dict) -> None:
     assert whole['labels_not_taken'] == {'left too': 'label 0, path 1'}
 
 
-def test_in_order_a_recording_is_evaluated_with_what_was_learnt_in_those_before(tables: Path, whole: dict) -> None:
+def test_in_order_a_recording_is_evaluated_with_what_was_learnt_in_those_before(tables, whole):
     with (tables / 'recordings.csv').open('a') as file:
         file.write('short,0.0,nan,0.0\n')
     learnt = evaluate(tables, '--in-order', code=2)
@@ -78,12 +75,12 @@ def test_in_order_a_recording_is_evaluated_with_what_was_learnt_in_those_before(
     assert learnt['questions']['way']['uniform'] == whole['questions']['way']['uniform']
 
 
-def forecast_first(observation: Observation, question: Question, confidence: float) -> Forecast:
+def forecast_first(observation, question, confidence):
     """Name the first answer of the candidates, whatever the hand does."""
     return Forecast.from_answer(question.answers[question.given[0]], confidence, question)
 
 
-def test_a_baseline_from_outside_is_compared(tables: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_baseline_from_outside_is_compared(tables, monkeypatch):
     extended = Registry('baseline', {})
     for name in BASELINES:
         extended.register(name, BASELINES.get(name))
@@ -98,7 +95,7 @@ def test_a_baseline_from_outside_is_compared(tables: Path, monkeypatch: pytest.M
     assert found['settings']['way']['first answer'] in (0.0, 0.5)
 
 
-def test_reaches_without_obstacles_are_scored_by_goal(tmp_path: Path) -> None:
+def test_reaches_without_obstacles_are_scored_by_goal(tmp_path):
     goals = [(0.3, 0.0), (0.0, 0.3), (-0.3, 0.0)]
     data = write_tables(tmp_path / 'free', {f'to{i}': reach(0.0, goal) for i, goal in enumerate(goals)}, goals)
     found = evaluate(data)
@@ -108,12 +105,7 @@ def test_reaches_without_obstacles_are_scored_by_goal(tmp_path: Path) -> None:
     assert goal['by_tenth'][9]['right'] == 1.0 and goal['gain'] > 0.2
 
 
-def test_workers_do_not_matter_nor_whether_they_are_those_of_a_cluster(tables: Path, whole: dict, cluster_address: str) -> None:
-    assert evaluate(tables, workers='--workers=2') == whole
-    assert evaluate(tables, workers=f'--scheduler={cluster_address}') == whole
-
-
-def test_bags_are_scored_as_their_tables(tables: Path, tmp_path: Path, whole: dict) -> None:
+def test_bags_are_scored_as_their_tables(tables, tmp_path, whole):
     bags = tmp_path / 'bags'
     assert main(['convert', str(tables), '--output', str(bags)]) == 0
     (bags / 'parameters.yaml').write_text((tables / 'parameters.yaml').read_text())
@@ -125,7 +117,7 @@ def test_bags_are_scored_as_their_tables(tables: Path, tmp_path: Path, whole: di
     assert main(['evaluate', str(bags / 'left'), '--workers', '1', '--params', str(bags / 'parameters.yaml')]) == 0
 
 
-def test_a_bad_recording_fails_by_name_and_the_others_are_scored(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_recording_fails_by_name_and_the_others_are_scored(tables, capsys):
     with (tables / 'recordings.csv').open('a') as file:
         file.write('broken,0.0,0.0,0.0\nbroken,0.1,nan,0.0\nbackward,1.0,0.0,0.0\nbackward,0.5,0.1,0.0\nshort,0.0,0.0,0.0\n')
     found = evaluate(tables, code=2)
@@ -135,7 +127,7 @@ def test_a_bad_recording_fails_by_name_and_the_others_are_scored(tables: Path, c
     assert 'foc_ros evaluate: broken: ' in capsys.readouterr().err
 
 
-def test_the_exit_code_is_3_where_nothing_can_be_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_exit_code_is_3_where_nothing_can_be_scored(tmp_path, capsys):
     ring = [(0.3 + 0.1 * np.cos(angle), 0.1 * np.sin(angle), 0.05) for angle in np.linspace(0.0, 6.0, 13)]
     data = write_tables(tmp_path / 'none', {'blocked': reach(0.0, (0.1, 0.0))}, [(0.3, 0.0)], ring)
     assert run(data) == 3
@@ -153,16 +145,14 @@ def test_the_exit_code_is_3_where_nothing_can_be_scored(tmp_path: Path, capsys: 
         (lambda data: (data / 'parameters.yaml').write_text('/**: {ros__parameters: {foc.eta: 2.0}}'), 'foc.eta'),
     ],
 )
-def test_data_that_cannot_be_used_is_one_line_and_exit_2(tables: Path, capsys, change, words: str) -> None:
+def test_data_that_cannot_be_used_is_one_line_and_exit_2(tables, capsys, change, words):
     change(tables)
     assert run(tables) == 2
     captured = capsys.readouterr()
     assert captured.out == '' and words in captured.err and captured.err.count('\n') == 1
 
 
-def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_labels(
-    tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_labels(tables, tmp_path, capsys):
     assert run(tables, '--report', str(tmp_path / 'report')) == 0
     out, err = capsys.readouterr()
     assert err == 'foc_ros evaluate: left too: the label differs from the recorded path: label 0, path 1\n'
@@ -176,6 +166,6 @@ def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_
     assert any(line.startswith('Positions 0.5 s ahead: ') for line in lines)
 
 
-def test_a_report_that_cannot_be_written_is_refused_before_the_work(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_report_that_cannot_be_written_is_refused_before_the_work(tables, capsys):
     assert run(tables, '--report', str(tables / 'goals.csv')) == 2
     assert '--report: expected a folder' in capsys.readouterr().err

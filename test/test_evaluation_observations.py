@@ -2,11 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observations hold what the predictor publishes and what really came, against values computed by hand."""
 
-from __future__ import annotations
-
-import pickle
-from pathlib import Path
-
 import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
@@ -14,21 +9,19 @@ from evaluation_samples import reach, write_tables
 from foc_ros.analysis.csv_recordings import EPOCH_NS
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
 from foc_ros.analysis.evaluation.observations import (
-    ObservedRecording,
     observe,
     observe_in_order,
 )
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
-from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth, find_rows_ahead
-from foc_ros.analysis.recordings import BagRecording, convert_tables, find_recordings
-from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth
+from foc_ros.analysis.recordings import find_recordings
 from foc_ros.core import tracks
 from foc_ros.core.classes.rows import find_rows
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT
-from foc_ros.io.bags import TYPESTORE, BagReader, Item
+from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.ros.messages.encode_inputs import encode_goals
 from foc_ros.ros.messages.types import RosbagsTypes
 
@@ -40,39 +33,27 @@ GOALS = [(0.32, 0.05), (0.32, -0.05)]
 
 
 @pytest.fixture(autouse=True)
-def without_a_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_a_filter(monkeypatch):
     monkeypatch.setattr(tracks, 'SMOOTHING_S', 1e-9)
 
 
 @pytest.fixture(scope='module')
-def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def data(tmp_path_factory):
     return write_tables(tmp_path_factory.mktemp('data'), {'one': reach(0.06, GOALS[0])}, GOALS, OBSTACLES)
 
 
-def observe_one(data: Path, config: Config) -> ObservedRecording:
+def observe_one(data, config):
     return observe(find_recordings(data)['one'], config)
 
 
-def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_them(data: Path) -> None:
+def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_them(data):
     for plain, ahead in zip(observe_one(data, PLAIN).observations, observe_one(data, AHEAD).observations, strict=True):
         tried = dict(zip(plain.candidates.labels, power_rule_shares(plain, AHEAD.likelihood), strict=True))
         published = dict(zip(ahead.candidates.labels, ahead.candidates.likelihood, strict=True))
         assert tried == pytest.approx(published)
 
 
-def test_a_bag_is_observed_as_its_table_and_as_replay_predicts_it(data: Path, tmp_path: Path) -> None:
-    convert_tables(data, None, None, tmp_path)
-    recording = observe(BagRecording('one', tmp_path / 'one'), PLAIN)
-    with BagReader(tmp_path / 'one') as reader:
-        predictions = [step.prediction for step in Replay(PLAIN).steps(reader) if step.prediction is not None]
-    for each, prediction in zip(recording.observations, predictions, strict=False):
-        assert each.stamp_ns == prediction.stamp_ns and each.most_likely == prediction.most_likely
-        assert each.candidates.likelihood.tolist() == [outcome.likelihood for outcome in prediction.candidates]
-    first = recording.observations[0].candidates
-    assert pickle.dumps(first) == pickle.dumps(observe_one(data, PLAIN).observations[0].candidates)
-
-
-def test_the_ground_truth_is_that_of_the_path(data: Path) -> None:
+def test_the_ground_truth_is_that_of_the_path(data):
     recording = observe_one(data, PLAIN)
     relevant = find_relevant_obstacles(recording)
     assert relevant == {'0', '1'}
@@ -87,7 +68,7 @@ def test_the_ground_truth_is_that_of_the_path(data: Path) -> None:
     assert 0.0 <= last.truth.left_s < 0.3 and first.truth.left_s == pytest.approx(1.2, abs=0.1)
 
 
-def test_no_goal_is_true_for_predictions_with_other_goals(data: Path) -> None:
+def test_no_goal_is_true_for_predictions_with_other_goals(data):
     class Changing:
         name, goal = 'changing', None
 
@@ -105,7 +86,7 @@ def test_no_goal_is_true_for_predictions_with_other_goals(data: Path) -> None:
 
 
 @pytest.mark.parametrize('duration_s', [0.4, 1.0])
-def test_in_order_a_recording_has_its_own_hand_and_obstacles_only(tmp_path: Path, duration_s: float) -> None:
+def test_in_order_a_recording_has_its_own_hand_and_obstacles_only(tmp_path, duration_s):
     """Markers stay until they are deleted; those of another recording are not in the scene of this one."""
     rows, scenes, times_s = [], [], np.arange(0.0, duration_s, 0.02)
     for name in ('one_1', 'one_2'):
@@ -126,18 +107,11 @@ def test_in_order_a_recording_has_its_own_hand_and_obstacles_only(tmp_path: Path
 DIRECTION = np.array([1.0, 0.0])
 
 
-def test_obstacles_that_overlap_along_the_direction_stand_in_one_row() -> None:
+def test_obstacles_that_overlap_along_the_direction_stand_in_one_row():
     centre = np.array([[3.0, 0.0], [1.0, 1.0], [1.15, -1.0], [2.0, 0.0]])
     ends = np.zeros(2), np.array([[4.0, 0.0]])
     assert find_rows(make_obstacles(centre, 0.1), DIRECTION, *ends).tolist() == [2, 0, 0, 1]
     assert find_rows(make_obstacles(), DIRECTION, *ends).shape == (0,)
-
-
-def test_a_row_is_passed_for_good_only_when_the_path_does_not_come_back() -> None:
-    place = np.array([0.0, 1.5, 0.5, 2.5])
-    assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place).tolist() == [True, True, False]
-    assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place[1:]).tolist() == [True, True, False]
-    assert find_rows_ahead(np.array([1.0, 2.0, 3.0]), place[3:]).tolist() == [False, False, False]
 
 
 TRUE_GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])
@@ -151,11 +125,11 @@ TRUE_GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])
         pytest.param([(0.0, 0.0), (0.2, 0.1)], (None, 1), id='none'),
     ],
 )
-def test_the_goal_reached_is_the_last_one_that_the_path_came_near(path, expected) -> None:
+def test_the_goal_reached_is_the_last_one_that_the_path_came_near(path, expected):
     assert find_reached_goal(np.array(path), TRUE_GOALS) == expected
 
 
-def test_progress_is_the_share_of_distance_and_noise_at_rest_adds_none() -> None:
+def test_progress_is_the_share_of_distance_and_noise_at_rest_adds_none():
     rest = np.array([[0.0, 0.0], [0.001, 0.0], [-0.001, 0.0], [0.001, 0.001]])
     positions = np.vstack([rest, [[0.25, 0.0], [0.5, 0.0], [1.0, 0.0]], [[1.0, 0.1]]])
     path = RecordedPath(np.arange(8) * 100_000_000, positions, TRUE_GOALS)
@@ -163,14 +137,14 @@ def test_progress_is_the_share_of_distance_and_noise_at_rest_adds_none() -> None
     np.testing.assert_allclose(path.progress, [0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 1.0, 1.0])
 
 
-def test_true_positions_are_interpolated_and_unknown_beyond_the_end() -> None:
+def test_true_positions_are_interpolated_and_unknown_beyond_the_end():
     path = RecordedPath(np.array([0, 500_000_000, 1_000_000_000]), np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), TRUE_GOALS)
     np.testing.assert_allclose(
         path.interpolate(250_000_000, np.array([0.25, 0.5, 1.0])), [[0.5, 0.0], [0.75, 0.0], [np.nan, np.nan]]
     )
 
 
-def test_a_hand_that_passes_a_row_and_comes_back_to_a_goal_before_it_has_a_truth() -> None:
+def test_a_hand_that_passes_a_row_and_comes_back_to_a_goal_before_it_has_a_truth():
     x = np.concatenate([np.linspace(0.0, 0.3, 30), np.linspace(0.29, 0.15, 10)])
     positions, goals = np.column_stack([x, np.zeros(40)]), np.array([[0.15, 0.0], [0.5, 0.0]])
     path = RecordedPath(np.arange(40) * 10_000_000, positions, goals, 0)

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Forecasts, their scores and the regions of positions, against values computed by hand."""
-
-from __future__ import annotations
+"""Forecasts, their scores, regions of positions and baselines, against values computed by hand and closed forms."""
 
 from dataclasses import replace
 
@@ -10,27 +8,42 @@ import numpy as np
 import pytest
 from evaluation_samples import TWO_CLASSES, H, make_candidates, observation, recorded
 
-from foc_ros.analysis.evaluation.baselines import UNCERTAINTY, Forecast, published_shares
-from foc_ros.analysis.evaluation.positions import compute_position_scores, find_denser_share
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
+from foc_ros.analysis.evaluation.baselines import (
+    BASELINES,
+    UNCERTAINTY,
+    Forecast,
+    boltzmann_shares,
+    compute_straight_costs,
+    compute_straight_positions,
+    guess_constant_velocity,
+    guess_nearest_gap,
+    guess_shortest_path,
+    make_baselines,
+    power_rule_shares,
+    published_shares,
+)
+from foc_ros.analysis.evaluation.positions import SINGER_SETTINGS, compute_position_scores, find_denser_share, forecast_singer
+from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, ask_main, find_relevant_obstacles
 from foc_ros.analysis.evaluation.report import make_verdict
 from foc_ros.analysis.evaluation.scores import (
     Scores,
     choose_held_out,
     compare_scores,
+    compute_log_likelihoods,
     compute_reliability,
     find_tenths,
     score_forecasts,
     summarise,
 )
-from foc_ros.analysis.evaluation.truth import TIMES_S
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, TIMES_S
+from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.solution import LEFT, RIGHT
 
 L, R = LEFT, RIGHT
 TWO_ROWS = {'centre': [(1.0, 0.2), (1.0, -0.2), (2.0, 0.0)], 'row': (0, 0, 1)}
 
 
-def test_rows_of_two_and_one_have_six_classes_and_the_next_row_three_gaps() -> None:
+def test_rows_of_two_and_one_have_six_classes_and_the_next_row_three_gaps():
     observed = observation(make_candidates([[L, L, L], [R, L, R]]), **TWO_ROWS, true_sides=(R, L, R))
     relevant = find_relevant_obstacles(recorded(observed))
     path_class, gap = ask(PATH_CLASS, observed, relevant), ask(GAP, observed, relevant)
@@ -38,7 +51,7 @@ def test_rows_of_two_and_one_have_six_classes_and_the_next_row_three_gaps() -> N
     assert gap.possible == 3 and gap.answers[gap.truth] == (R, L)
 
 
-def test_the_goal_is_in_question_where_there_are_several_and_one_was_reached() -> None:
+def test_the_goal_is_in_question_where_there_are_several_and_one_was_reached():
     goals = [(2.0, 0.0), (2.0, 1.0), (2.0, 2.0)]
     observed = observation(make_candidates(np.zeros((2, 0)), goal=[2, 0]), centre=(), row=(), true_sides=(), goals=goals, goal=2)
     found = ask(GOAL, observed, frozenset())
@@ -50,7 +63,7 @@ def ask_class(observed):
     return ask(PATH_CLASS, observed, frozenset('012'))
 
 
-def test_every_possible_answer_keeps_some_probability_and_all_sum_to_one() -> None:
+def test_every_possible_answer_keeps_some_probability_and_all_sum_to_one():
     observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]))
     forecast = Forecast.from_shares(published_shares(observed), ask_class(observed))
     np.testing.assert_allclose(forecast.probability, (1.0 - UNCERTAINTY) * np.array([0.8, 0.2]) + UNCERTAINTY / 2.0)
@@ -65,14 +78,14 @@ def test_every_possible_answer_keeps_some_probability_and_all_sum_to_one() -> No
         assert forecast.probability.sum() + question.unlisted * forecast.each_other == pytest.approx(1.0)
 
 
-def make_scores(confidence, right, recording=None, progress=None, left_s=None) -> Scores:
+def make_scores(confidence, right, recording=None, progress=None, left_s=None):
     zeros = np.zeros(len(confidence))
     recording, progress, left_s = (zeros if each is None else np.array(each) for each in (recording, progress, left_s))
     right = np.array(right, dtype=float)
     return Scores(recording.astype(int), progress, left_s, zeros + 2.0, zeros, np.array(confidence), right, zeros)
 
 
-def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness() -> None:
+def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness():
     observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]), progress=0.5, approach=0.6)
     question, p = ask_class(observed), (1.0 - UNCERTAINTY) * 0.8 + UNCERTAINTY / 2.0
     forecasts = Forecast.from_shares(published_shares(observed), question), Forecast.uniform(question)
@@ -86,14 +99,14 @@ def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness() -
     assert score_forecasts([(0, observed, gap, Forecast.uniform(gap))]).progress.tolist() == [0.6]
 
 
-def test_the_calibration_error_is_the_distance_of_confidence_and_share_correct() -> None:
+def test_the_calibration_error_is_the_distance_of_confidence_and_share_correct():
     found = make_scores([0.95, 0.95, 0.95, 0.95, 0.55, 0.55], [1, 1, 1, 0, 0, 0])
     assert summarise(found)['expected_calibration_error'] == pytest.approx((4 * 0.2 + 2 * 0.55) / 6)
     assert [each['count'] for each in compute_reliability(found)] == [0, 0, 0, 0, 0, 2, 0, 0, 0, 4]
     assert summarise(make_scores([0.75] * 4, [1, 1, 1, 0]))['expected_calibration_error'] == pytest.approx(0.0)
 
 
-def test_the_interval_of_a_bin_is_that_of_a_bootstrap_over_recordings() -> None:
+def test_the_interval_of_a_bin_is_that_of_a_bootstrap_over_recordings():
     one = compute_reliability(make_scores([0.95] * 40, [1, 0] * 20, [0] * 40))[9]
     assert one['interval'] == [0.5, 0.5]
     two = compute_reliability(make_scores([0.95] * 40, [1] * 20 + [0] * 20, [0] * 20 + [1] * 20))[9]
@@ -104,7 +117,7 @@ def test_the_interval_of_a_bin_is_that_of_a_bootstrap_over_recordings() -> None:
     assert compute_reliability(make_scores([0.95], [1]))[0]['interval'] is None
 
 
-def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse() -> None:
+def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse():
     ours = make_scores([0.5] * 40, [1] * 40, range(40), [0.05] * 20 + [0.95] * 20)
     change = np.where(np.arange(40) < 20, 0.1, -0.5)
     found = compare_scores(ours, ours._replace(log_likelihood=change), is_share=False)
@@ -121,7 +134,7 @@ def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse() ->
         ([-0.4, -0.1], 'foc is worse than uniform (+0.2 nat, worse in tenths 1).'),
     ],
 )
-def test_the_verdict_is_by_the_interval(interval: list[float], words: str) -> None:
+def test_the_verdict_is_by_the_interval(interval, words):
     errors = {'likelihood-weighted': 0.04, 'most likely': 0.03, 'constant velocity': 0.05, 'straight minimum jerk': 0.0401}
     answer = {
         'comparisons': {PATH_CLASS: {'uniform': {'difference': 0.2, 'interval': interval, 'worse_tenths': [1]}}},
@@ -138,7 +151,7 @@ def test_the_verdict_is_by_the_interval(interval: list[float], words: str) -> No
     ]
 
 
-def test_a_summary_counts_by_tenths_which_include_their_lower_bound() -> None:
+def test_a_summary_counts_by_tenths_which_include_their_lower_bound():
     found = summarise(make_scores([0.5] * 4, [1, 0, 1, 1], None, [0.05, 0.06, 0.95, 1.0], [1.0, 0.9, 0.2, 0.0]))
     assert [each['predictions'] for each in found['by_tenth']] == [2, 0, 0, 0, 0, 0, 0, 0, 0, 2]
     assert found['by_tenth'][0]['right'] == 0.5 and found['by_tenth'][1]['right'] is None
@@ -148,14 +161,14 @@ def test_a_summary_counts_by_tenths_which_include_their_lower_bound() -> None:
     assert find_tenths(np.array([0.0, 0.1, 0.3, 0.7, 0.99, 1.0])).tolist() == [0, 1, 3, 7, 9, 9]
 
 
-def test_a_held_out_recording_gets_the_setting_that_is_best_for_the_others() -> None:
+def test_a_held_out_recording_gets_the_setting_that_is_best_for_the_others():
     table = np.array([[0.0, -1.0, -3.0], [-5.0, 0.0, -3.0], [-9.0, -9.0, -1.0]])
     assert choose_held_out(table, ['a', 'b', 'c']).tolist() == [2, 2, 1]
     assert choose_held_out(table, ['a', 'b', 'b']).tolist() == [2, 0, 0]
     assert choose_held_out(table, ['a', 'a', 'a']).tolist() == [2, 2, 2]
 
 
-def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is_inside() -> None:
+def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is_inside():
     away = np.column_stack([8.0 * np.array(TIMES_S), np.zeros(len(TIMES_S))])
     away[-1] = np.nan
     scores = compute_position_scores([recorded(observation(TWO_CLASSES, positions=away))])
@@ -175,7 +188,7 @@ def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is
 
 
 @pytest.mark.parametrize('apart', [0.0, 1.5, 10.0])
-def test_the_region_holds_its_share_of_samples(apart: float) -> None:
+def test_the_region_holds_its_share_of_samples(apart):
     draws, count = np.random.default_rng(5), 4000
     likelihood = np.array([0.6, 0.3, 0.1])
     mean = apart * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -192,7 +205,7 @@ def test_the_region_holds_its_share_of_samples(apart: float) -> None:
         assert np.mean(found < level) == pytest.approx(level, abs=0.03)
 
 
-def test_a_position_in_a_less_likely_class_is_in_the_region_and_not_in_the_ellipse_of_the_likeliest() -> None:
+def test_a_position_in_a_less_likely_class_is_in_the_region_and_not_in_the_ellipse_of_the_likeliest():
     two = make_candidates([[LEFT], [RIGHT]], likelihood=[0.6, 0.4])
     two = replace(two, mean=np.stack([np.zeros((H, 2)), np.full((H, 2), [10.0, 0.0])]))
     true = np.full((H, 2), [11.6, 0.0])
@@ -202,3 +215,91 @@ def test_a_position_in_a_less_likely_class_is_in_the_region_and_not_in_the_ellip
     assert scores['inside_taken']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
     assert scores['inside_all']['0.9'] == {'0.25': 1.0, '0.5': 1.0, '1': None}
     assert scores['inside_all']['0.5'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
+
+
+def ask_of(observed, name=PATH_CLASS):
+    return ask(name, observed, frozenset('012'))
+
+
+@pytest.mark.parametrize(
+    ('velocity', 'side'),
+    [((1.0, 0.6), L), ((1.0, -0.6), R), ((1.0, 0.1), R), ((0.0, 0.2), L), ((-0.5, 0.2), L)],
+)
+def test_constant_velocity_passes_the_obstacle_on_its_line_or_on_the_side_to_which_it_turns(velocity, side):
+    observed = observation(TWO_CLASSES, centre=[(1.0, 0.3)], hand=(0.0, 0.0, *velocity, 0.0, 0.0))
+    assert guess_constant_velocity(observed, ask_of(observed)) == (side,)
+
+
+GOALS = [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+
+
+def test_towards_goals_constant_velocity_takes_the_direction_and_the_nearest_is_the_nearest():
+    candidates = make_candidates(np.zeros((3, 0)), goal=[0, 1, 2])
+    none = {'centre': (), 'row': (), 'true_sides': ()}
+    observed = observation(candidates, **none, goals=GOALS, hand=(0.0, 0.0, 0.9, 1.0, 0.0, 0.0))
+    assert guess_constant_velocity(observed, ask_of(observed, GOAL)) == (2,)
+    assert guess_nearest_gap(replace(observed, hand=np.array([0.1, 0.4, 1.0, 0.0, 0.0, 0.0])), ask_of(observed, GOAL)) == (1,)
+    assert guess_shortest_path(observed, ask_of(observed, GOAL)) == (0,)
+
+
+def test_boltzmann_weighs_differences_and_the_power_rule_ratios_of_effort():
+    observed = observation(make_candidates([[L], [R]], cost_to_go=[1.0, 3.0]))
+    np.testing.assert_allclose(boltzmann_shares(observed, np.log(2.0)), [0.8, 0.2])
+    np.testing.assert_allclose(power_rule_shares(observed, LikelihoodConfig(beta=2.0)), [0.9, 0.1])
+
+
+def reaching(hand=(0.0,) * 6, time_s=2.0, **more):
+    candidates = replace(make_candidates(np.zeros((2, 0)), goal=[0, 1]), time_s=np.array([time_s, time_s]))
+    none = {'centre': (), 'row': (), 'true_sides': ()}
+    return observation(candidates, **none, goals=[(1.0, 0.0), (0.0, 2.0)], hand=hand, **more)
+
+
+def test_straight_minimum_jerk_from_rest_has_the_known_effort_and_path():
+    np.testing.assert_allclose(compute_straight_costs(reaching()), [720.0 / 2.0**5, 720.0 * 4.0 / 2.0**5])
+    s = np.array([0.5, 1.0])
+    expected = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    np.testing.assert_allclose(compute_straight_positions(reaching(), 0, 2.0 * s)[:, 0], expected)
+    np.testing.assert_allclose(compute_straight_positions(reaching(), 0, np.array([5.0])), [[1.0, 0.0]])
+
+
+def test_straight_minimum_jerk_from_any_state_has_the_effort_of_its_own_jerk():
+    observed = reaching((0.2, -0.1, 0.5, 0.3, -1.0, 2.0))
+    t = np.linspace(0.0, 2.0, 4001)
+    for goal in (0, 1):
+        path = compute_straight_positions(observed, goal, t)
+        jerk = np.gradient(np.gradient(np.gradient(path, t, axis=0), t, axis=0), t, axis=0)[5:-5]
+        assert (jerk**2).sum() * t[1] == pytest.approx(compute_straight_costs(observed)[goal], rel=0.02)
+        np.testing.assert_allclose(path[-1], observed.goals[goal], atol=1e-9)
+        np.testing.assert_allclose((path[1] - path[0]) / t[1], [0.5, 0.3], atol=1e-2)
+
+
+def test_every_baseline_forecasts_every_setting():
+    recording = recorded(observation(make_candidates([[L], [R]], cost_to_go=[1.0, 3.0])))
+    pairs = ask_main(recording)
+    compared = make_baselines([recording], LikelihoodConfig())
+    assert [baseline.name for baseline in compared] == list(BASELINES) and len(compared) >= 9
+    for baseline in compared:
+        logs = compute_log_likelihoods(pairs, baseline)
+        assert logs.shape == (len(baseline.settings),) and np.isfinite(logs).all() and (logs <= 0.0).all()
+        # with its least certain setting, a predictor is hardly worse than a uniform guess
+        assert logs.max() >= np.log(0.5) - 0.02 or baseline.name == 'foc'
+
+
+AHEAD = np.array(HORIZONS_S)
+
+
+def test_a_steady_motion_is_continued_and_an_uncertain_one_has_its_error():
+    stamps_ns = np.arange(0, 2_000_000_000, 20_000_000)
+    positions = np.outer(stamps_ns / 1e9, [0.3, -0.1])
+    mean, variance = forecast_singer(stamps_ns, positions, stamps_ns[[20, 99]], AHEAD)
+    expected = positions[99] + AHEAD[:, None] * [0.3, -0.1]
+    np.testing.assert_allclose(mean[1], np.tile(expected, (len(SINGER_SETTINGS), 1, 1)), atol=2e-3)
+    assert mean.shape == (2, len(SINGER_SETTINGS), 3, 2) and (np.diff(variance, axis=2) > 0.0).all()
+
+
+def test_a_forecast_knows_nothing_of_later_samples():
+    draws = np.random.default_rng(0)
+    stamps_ns, positions = np.arange(0, 10**9, 5 * 10**7), np.cumsum(draws.normal(0.0, 0.01, (20, 2)), axis=0)
+    other = np.where(np.arange(20)[:, None] > 10, 1.0, positions)
+    for one, two in zip(*(forecast_singer(stamps_ns, each, stamps_ns[:11], AHEAD) for each in (positions, other)), strict=True):
+        np.testing.assert_array_equal(one, two)

@@ -2,13 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every example runs and makes a figure, and the Python code on the pages does what the pages say."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,19 +18,19 @@ mpl = pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
-SLOW = ('plot_08_replay_bag', 'plot_09_custom_strategy', 'plot_11_many_scenes')
-"""They take more than ten seconds each."""
+SLOW = ('07_monte_carlo', '08_replay_bag', '09_custom_strategy', '10_obstacle_source', '11_many_scenes', '14_blended_command')
+"""They take more than a second: `make doc`, which runs all examples, is their only test."""
 EXAMPLE_S = 280
 """Time limit: an example takes a few seconds, and minutes on a busy machine."""
 
 
-def python_blocks(page: Path) -> list[str]:
+def python_blocks(page):
     """Return the blocks of Python code of a page, in their order."""
     return re.findall(r'^```python\n(.*?)^```', page.read_text('utf-8'), re.MULTILINE | re.DOTALL)
 
 
 @pytest.fixture
-def pyplot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[object]:
+def pyplot(monkeypatch, tmp_path):
     """Figures are kept and not shown; the registries are as before afterwards."""
     monkeypatch.setenv('MPLBACKEND', 'Agg')
     mpl.use('Agg')
@@ -48,7 +45,7 @@ def pyplot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[object]:
     plt.close('all')
 
 
-def test_there_are_examples_with_titles() -> None:
+def test_there_are_examples_with_titles():
     assert len(EXAMPLES) >= 10
     gallery = (ROOT / 'doc' / 'examples.md').read_text('utf-8')
     for example in EXAMPLES:
@@ -58,33 +55,15 @@ def test_there_are_examples_with_titles() -> None:
 
 
 @pytest.mark.timeout(EXAMPLE_S)
-@pytest.mark.parametrize('example', [each for each in EXAMPLES if each.stem not in SLOW], ids=lambda example: example.stem)
-def test_the_example_runs_and_makes_a_figure(example: Path, pyplot: object) -> None:
-    run_example(example, pyplot)
-
-
-@pytest.mark.timeout(EXAMPLE_S)
-@pytest.mark.parametrize('example', [each for each in EXAMPLES if each.stem in SLOW], ids=lambda example: example.stem)
-def test_the_slow_example_runs_and_makes_a_figure(example: Path, pyplot: object) -> None:
-    run_example(example, pyplot)
-
-
-def run_example(example: Path, pyplot: object) -> None:
+@pytest.mark.parametrize('example', [each for each in EXAMPLES if not each.stem.endswith(SLOW)], ids=lambda example: example.stem)
+def test_the_example_runs_and_makes_a_figure(example, pyplot):
     runpy.run_path(str(example), run_name='__main__')
-    figures = pyplot.get_fignums()
-    assert figures, f'{example.name} makes no figure'
-    for number in figures:
-        pyplot.figure(number).savefig(f'{number}.png')
-
-
-@pytest.mark.parametrize('example', EXAMPLES, ids=lambda example: example.stem)
-def test_the_example_is_short(example: Path) -> None:
-    assert 20 <= len(example.read_text('utf-8').splitlines()) <= 82  # with the licence
+    assert pyplot.get_fignums(), f'{example.name} makes no figure'
 
 
 @pytest.mark.timeout(EXAMPLE_S)
 @pytest.mark.parametrize('page', [page for page in PAGES if python_blocks(page)], ids=lambda page: page.name)
-def test_the_code_on_the_page_runs(page: Path, tmp_path: Path) -> None:
+def test_the_code_on_the_page_runs(page, tmp_path):
     """All blocks of a page run in their order in one process of their own, where warnings are errors."""
     script = tmp_path / 'page.py'
     script.write_text('\n\n'.join(["import matplotlib\n\nmatplotlib.use('Agg')", *python_blocks(page)]), encoding='utf-8')
@@ -93,7 +72,7 @@ def test_the_code_on_the_page_runs(page: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_the_api_reference_lists_every_public_name() -> None:
+def test_the_api_reference_lists_every_public_name():
     page = (ROOT / 'doc' / 'api.md').read_text('utf-8')
     documented = set(re.findall(r'^\.\. auto\w+:: (\w+)', page, re.MULTILINE))
     assert documented == set(foc_ros.__all__)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parts from outside the package, each one function: a strategy, a plant, a likelihood rule and a QP backend."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,14 +9,10 @@ import pytest
 from reach_helpers import bowed, one_obstacle, solved
 
 import foc_ros
-from foc_ros.core.config import FocConfig
-from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.ocp.backend import Answer, DenseQP, solve_piqp
-from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.ocp.start import Start
-from foc_ros.core.ocp.strategies import Strategy, StrategyResult, solve_fixed
+from foc_ros.core.ocp.strategies import Strategy, solve_fixed
 from foc_ros.core.plant.models import PlantModel
 from foc_ros.core.plant.plants import Plant
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
@@ -27,9 +22,7 @@ BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
 
 
-def solve_margin(
-    problems: Sequence[Problem], starts: Sequence[Start], settings: FocConfig, deadline: Deadline
-) -> list[StrategyResult]:
+def solve_margin(problems, starts, settings, deadline):
     """Keep a little more than k standard deviations of the radius at the steps, as for a hand without noise."""
     results = []
     for problem, start in zip(problems, starts, strict=True):
@@ -38,12 +31,12 @@ def solve_margin(
     return [replace(each, aims_at_eta=True) for each in results]
 
 
-def discretise_double_integrator(dt: float) -> Plant:
+def discretise_double_integrator(dt):
     A = np.block([[np.eye(2), dt * np.eye(2)], [np.zeros((2, 2)), np.eye(2)]])
     return Plant(A, np.vstack([dt**2 / 2 * np.eye(2), dt * np.eye(2)]), dt)
 
 
-def solve_by_active_sets(qp: DenseQP) -> Answer:
+def solve_by_active_sets(qp):
     """Solve a strictly convex QP by trying rows as equalities: add the most broken one, drop those that pull."""
     rows = np.concatenate([np.zeros((0, len(qp.c))) if qp.G is None else qp.G, np.eye(len(qp.c))])
     limits = np.concatenate([np.zeros(0) if qp.g is None else qp.g, qp.lower])

@@ -2,10 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters that a fit finds without a prediction, and what a table of settings determines."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from evaluation_samples import reach as resting_reach
@@ -22,7 +18,6 @@ from foc_ros.analysis.fitting.direct import (
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.kalman import compute_gramian, compute_transition
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.types import Array
 
 CONFIG = replace_values(Config(), {'estimator.acceleration_time_s': 0.0})
 GOAL = np.array([[0.3, 0.0]])
@@ -30,7 +25,7 @@ BETA, WEAVING = 'likelihood.beta', 'likelihood.weaving'
 VALUES = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0])
 
 
-def _make_table(log_likelihood: Callable[[Array, Array], Array], values: Array = VALUES) -> SettingTable:
+def _make_table(log_likelihood, values=VALUES):
     """Return a table of one recording by exponent and weaving."""
     grid = [(beta, weaving) for beta in values for weaving in values]
     settings = tuple({BETA: beta, WEAVING: weaving} for beta, weaving in grid)
@@ -61,19 +56,19 @@ END = '8, the end of the values tried, explains the recordings best'
         ),
     ],
 )
-def test_what_a_table_of_log_likelihoods_determines(log_likelihood, values, expected, undetermined) -> None:
+def test_what_a_table_of_log_likelihoods_determines(log_likelihood, values, expected, undetermined):
     found = _make_table(log_likelihood, values).estimate(GIVEN, 'how')[0]
     assert found.values == {name: each for name, each in zip(GIVEN, expected, strict=True) if each is not None}
     assert found.undetermined == undetermined
 
 
-def test_where_only_a_sum_is_determined_one_part_is_kept_and_the_other_follows() -> None:
+def test_where_only_a_sum_is_determined_one_part_is_kept_and_the_other_follows():
     found = _make_table(lambda beta, weaving: -10.0 * (beta + weaving - 7.0) ** 2).estimate(GIVEN, 'how')[0]
     (name,), (kept,) = found.estimates, found.undetermined
     assert found.estimates[name].value == 7.0 - GIVEN[kept]
 
 
-def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
+def _drifting(seed, stddev, density, count=6):
     """Return hands that are driven by white jerk, as the filter expects."""
     rng = np.random.default_rng(seed)
     times = np.cumsum(rng.uniform(0.01, 0.03, 200))
@@ -90,7 +85,7 @@ def _drifting(seed: int, stddev: float, density: float, count: int = 6) -> list:
 
 
 @pytest.mark.parametrize(('stddev', 'density'), [(1e-3, 3.0), (3e-4, 20.0)])
-def test_the_deviations_that_made_the_data_are_found(stddev: float, density: float) -> None:
+def test_the_deviations_that_made_the_data_are_found(stddev, density):
     found = fit_estimator(_drifting(2, stddev, density), Config())
     assert found.undetermined == {}
     estimates = found.estimates
@@ -101,7 +96,7 @@ def test_the_deviations_that_made_the_data_are_found(stddev: float, density: flo
         assert 0.8 * each.low < true < 1.2 * each.high
 
 
-def _reaches(durations: list[float], goals: np.ndarray) -> list:
+def _reaches(durations, goals):
     rng = np.random.default_rng(4)
     rows = [reach(goal, 0.0, seconds, 100.0, rng, 2e-4) for seconds, goal in zip(durations, goals, strict=True)]
     return [
@@ -110,7 +105,7 @@ def _reaches(durations: list[float], goals: np.ndarray) -> list:
     ]
 
 
-def test_one_factor_is_fitted_where_distances_are_alike() -> None:
+def test_one_factor_is_fitted_where_distances_are_alike():
     config = replace_values(Config(), {'estimator.position_stddev': 2e-4})
     given = config.duration.fitts_a_s + config.duration.fitts_b_s * np.log2(0.3 / config.duration.target_width + 1)
     goals = np.tile([0.3, 0.0], (5, 1))
@@ -123,7 +118,7 @@ def test_one_factor_is_fitted_where_distances_are_alike() -> None:
     assert any('too alike to tell intercept and slope apart' in words for words in found.warnings)
 
 
-def test_distances_that_differ_determine_intercept_and_slope() -> None:
+def test_distances_that_differ_determine_intercept_and_slope():
     config = replace_values(Config(), {'estimator.position_stddev': 2e-4})
     distances = np.array([0.05, 0.1, 0.2, 0.4, 0.8])
     durations = 0.5 + 0.3 * np.log2(distances / config.duration.target_width + 1)
@@ -139,7 +134,7 @@ def test_distances_that_differ_determine_intercept_and_slope() -> None:
 
 
 @pytest.mark.parametrize('fading_s', [0.06, 0.2])
-def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
+def test_the_time_in_which_accelerations_fade_is_found(fading_s):
     rng, dt = np.random.default_rng(5), 0.005
     hands = []
     for number in range(6):
@@ -157,11 +152,11 @@ def test_the_time_in_which_accelerations_fade_is_found(fading_s: float) -> None:
     assert found.value == pytest.approx(fading_s, rel=0.25)
 
 
-def _make_resting(rest: float):
+def _make_resting(rest):
     return recorded_hand('one', *resting_reach(0.0, (0.3, 0.0), rest=rest), make_obstacles([], []), GOAL)
 
 
-def test_half_of_the_wait_is_left_on_average_and_the_stay_at_the_goal_does_not_count() -> None:
+def test_half_of_the_wait_is_left_on_average_and_the_stay_at_the_goal_does_not_count():
     found = fit_wait([_make_resting(0.6), _make_resting(1.0)], Config()).estimates
     # the wait includes the first 0.15 s of a movement, until its onset is detected
     assert found['duration.wait_s'].value == pytest.approx(0.4, abs=0.1)

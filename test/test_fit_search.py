@@ -2,57 +2,50 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters that a fit finds by replays: settings of the predictor in a race, and what widens the covariance."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from evaluation_samples import TWO_CLASSES, H, observation, recorded
-from fit_recordings import recorded_hand, write_tables
+from fit_recordings import write_tables
 
 from foc_ros.analysis.evaluation.truth import TIMES_S
-from foc_ros.analysis.fitting import Findings, race
-from foc_ros.analysis.fitting.direct import fit_duration, fit_other_models
+from foc_ros.analysis.fitting import race
 from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage, find_worse_positions, make_verdict
 from foc_ros.analysis.fitting.one_replay import fit_widening
-from foc_ros.analysis.fitting.race import DURATIONS, Replays, make_eta_settings, make_movement_settings
+from foc_ros.analysis.fitting.race import Replays, make_eta_settings
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.types import Array
 
 CONFIG = replace_values(
     Config(), {'foc.steps': 15, 'homotopy.max_candidates': 2, 'rate_hz': 4.0, 'estimator.acceleration_time_s': 0.0}
 )
-GOAL = np.array([[0.3, 0.0]])
 ARRIVALS = [CONFIG, replace_values(CONFIG, {'duration.arrival': 'passing'})]
 
 
 class KnownReplays:
     """Replays with known scores by setting and recording; keeps the number of settings and recordings of each round."""
 
-    def __init__(self, classes: Array, positions: Array | None = None) -> None:
+    def __init__(self, classes, positions=None):
         self.classes = np.asarray(classes, dtype=float)
         self.positions = np.zeros_like(self.classes) if positions is None else np.asarray(positions, dtype=float)
         self.recordings = {str(place): None for place in range(self.classes.shape[1])}
         self.rounds: list[tuple[int, int]] = []
 
-    def search(self, settings: list[Config]) -> tuple[Config, Findings]:
+    def search(self, settings):
         self.settings = settings
         return race.search_settings('kind', settings, self)  # type: ignore[arg-type]
 
-    def score(self, settings: list[Config], names: list[str], words: str) -> Array:
+    def score(self, settings, names, words):
         self.rounds.append((len(settings), len(names)))
         rows, columns = [self.settings.index(each) for each in settings], [int(name) for name in names]
         return np.array([self.classes[rows][:, columns], self.positions[rows][:, columns]])
 
 
-def test_the_better_choice_is_taken() -> None:
+def test_the_better_choice_is_taken():
     config, found = KnownReplays([[0.0] * 8, [0.1, 0.2, 0.1, 0.2, 0.1, 0.2, 0.1, -0.1]]).search(ARRIVALS)
     assert found.chosen == {'duration.arrival': 'passing'} and config.duration.arrival == 'passing'
     assert found.warnings == [] and found.undetermined == {}
@@ -61,13 +54,13 @@ def test_the_better_choice_is_taken() -> None:
 
 
 @pytest.mark.parametrize('scores', [[1.5, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2, 0.0], [0.5, 1.5], [1.0]])
-def test_a_choice_that_is_better_by_chance_only_is_undetermined(scores: list[float]) -> None:
+def test_a_choice_that_is_better_by_chance_only_is_undetermined(scores):
     config, found = KnownReplays([[0.0] * len(scores), scores]).search(ARRIVALS)
     assert config == CONFIG and found.chosen == {}
     assert found.undetermined['duration.arrival'].startswith('no other value tried is better by more than chance')
 
 
-def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings(monkeypatch):
     monkeypatch.setattr(race, 'PLAINLY_WORSE', 1e6)
     settings = [replace_values(CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(20)]
     quality = -np.abs(np.arange(20.0) - 13.0)[:, None] + 0.1 * np.random.default_rng(3).standard_normal((20, 40))
@@ -82,35 +75,7 @@ def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_record
     assert many.rounds[-1] == (2, race.MAX_RECORDINGS)
 
 
-def test_models_durations_arrivals_and_fading_are_tried_in_all_combinations() -> None:
-    reaches, fading = _reaches(CONFIG), replace_values(CONFIG, {'estimator.acceleration_time_s': 0.06})
-    for config, accelerations in ((CONFIG, {0.0}), (fading, {0.06, 0.0})):
-        tried = make_movement_settings(reaches, config)
-        assert tried[0] == config
-        assert len(set(tried)) == len(tried) == (1 + len(DURATIONS)) * 2 * len(accelerations)
-        assert {each.duration.model for each in tried} == {'fitts'}
-        assert {each.estimator.acceleration_time_s for each in tried} == accelerations
-        factors = {round(each.duration.fitts_a_s / CONFIG.duration.fitts_a_s, 6) for each in tried}
-        assert factors == {1.0, *DURATIONS}
-
-
-def _reaches(config: Config) -> list:
-    t = np.arange(0.0, 1.61, 0.02)
-    s = np.clip((t - 0.1) / 1.5, 0.0, 1.0)
-    path = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, None] * GOAL
-    return [recorded_hand(str(number), t, path, make_obstacles(), GOAL) for number in range(3)]
-
-
-def test_the_other_models_of_duration_come_with_their_constants_fitted() -> None:
-    assert not fit_other_models(_reaches(CONFIG), CONFIG)
-    given = replace_values(CONFIG, {'duration.model': 'fixed'})
-    assert [each.duration.model for each in fit_other_models(_reaches(CONFIG), given)] == ['fitts']
-    assert fit_duration(_reaches(CONFIG), given).estimates
-
-
-def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(tmp_path, monkeypatch):
     recordings = find_recordings(write_tables(tmp_path / 'data', count=2, hz=30.0))
     names = list(recordings)
     hopeless = replace_values(CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': math.inf})
@@ -121,12 +86,12 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
     assert np.array_equal(replays.score([CONFIG, hopeless], names, 'again'), scores[:, ::-1])
 
 
-def test_eta_is_lowered_only_if_that_is_allowed() -> None:
+def test_eta_is_lowered_only_if_that_is_allowed():
     assert {each.foc.eta for each in make_eta_settings(CONFIG, may_be_lower=False)} == {0.9, 0.95}
     assert {each.foc.eta for each in make_eta_settings(CONFIG, may_be_lower=True)} == {0.9, 0.95, 0.7, 0.5}
 
 
-def test_worse_positions_are_named_with_both_errors() -> None:
+def test_worse_positions_are_named_with_both_errors():
     comparison = {
         'class_gain': {'before': 0.5, 'after': 0.1},
         'error_m 0.25': {'before': 0.010, 'after': 0.011},
@@ -145,23 +110,16 @@ def test_worse_positions_are_named_with_both_errors() -> None:
         (None, (), False),
         (None, ('--allow', 'positions'), True),
         ('y', (), True),
-        ('Yes ', (), True),
         ('', (), False),
-        ('no', (), False),
     ],
 )
 def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    answer: str | None,
-    options: tuple[str, ...],
-    is_written: bool,
-) -> None:
+    tmp_path, monkeypatch, capsys, answer, options, is_written
+):
     worse = 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm\n'
     output, fit, asked = tmp_path / 'operator.yaml', Fit(CONFIG), []
 
-    def ask(question: str) -> str | None:
+    def ask(question):
         assert worse in capsys.readouterr().err and not output.exists()
         asked.append(question)
         return answer
@@ -189,9 +147,7 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
         ((None, None), None, None, None),
     ],
 )
-def test_a_lower_coverage_is_told_in_one_sentence(
-    held_out: tuple[float | None, float | None], before: float | None, after: float | None, words: str | None
-) -> None:
+def test_a_lower_coverage_is_told_in_one_sentence(held_out, before, after, words):
     fit = Fit(CONFIG, comparison={'inside_90': {'before': before, 'after': after}})
     fit.scores = {'inside_all_90': dict(zip(('as given', 'without the recording'), held_out, strict=True))}
     found = find_lower_coverage(fit)
@@ -204,7 +160,7 @@ LATE = 9.0 * (S**3 * (1 - S) ** 2)[:, None] * [1.0, 0.0]
 CANDIDATES = replace(TWO_CLASSES, covariance=np.tile(1e-8 * np.eye(2), (2, H, 1, 1)), duration_sensitivity=np.stack([LATE, LATE]))
 
 
-def _make_recordings(endpoint: float, spread: float) -> list:
+def _make_recordings(endpoint, spread):
     """Return twelve recordings of eight movements of 1 s each, with scattered ends and durations."""
     draws = np.random.default_rng(3)
     moved = [
@@ -216,7 +172,7 @@ def _make_recordings(endpoint: float, spread: float) -> list:
 
 
 @pytest.mark.parametrize(('endpoint', 'spread'), [(0.006, 0.0), (0.002, 0.3)])
-def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoint: float, spread: float) -> None:
+def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoint, spread):
     recordings = _make_recordings(endpoint, spread)
     found, scores = fit_widening(recordings, Config())
     assert found.undetermined == {} or set(found.undetermined) == {'foc.process_noise'}

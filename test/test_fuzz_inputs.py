@@ -2,16 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged recordings and tables: bits, cuts, and records left out or doubled end in words, and nothing is lost unsaid."""
 
-from __future__ import annotations
-
 import json
 import random
 import re
 import sqlite3
 import struct
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from bag_helpers import messages, write_mcap, write_parameters
@@ -34,7 +30,7 @@ WRITERS = (
 )
 
 
-def write_recording(folder: Path, source: random.Random) -> Path:
+def write_recording(folder, source):
     """Write a recording of a kind by chance into a new folder, and return its file."""
     folder.mkdir(parents=True)
     kind = source.randrange(6)
@@ -45,7 +41,7 @@ def write_recording(folder: Path, source: random.Random) -> Path:
     return folder / 'one.db3'
 
 
-def change_bytes(data: bytes, source: random.Random) -> bytes:
+def change_bytes(data, source):
     """Change bits, cut the end, or leave out or double a part."""
     start, size = source.randrange(len(data)), source.choice((1, 9, 200))
     kind = source.randrange(4)
@@ -59,7 +55,7 @@ def change_bytes(data: bytes, source: random.Random) -> bytes:
     return data[:start] + (data[start : start + size] * 2 if kind == 2 else b'') + data[start + size :]
 
 
-def list_records(data: bytes) -> Iterator[tuple[int, int]]:
+def list_records(data):
     """Yield begin and end of the records of an MCAP file."""
     place = 8
     while place < len(data) - 8:
@@ -68,7 +64,7 @@ def list_records(data: bytes) -> Iterator[tuple[int, int]]:
         place = end
 
 
-def change_records(file: Path, source: random.Random) -> None:
+def change_records(file, source):
     """Leave out or double one record."""
     is_doubled = source.random() < 0.5
     if file.suffix == '.mcap':
@@ -95,7 +91,7 @@ def change_records(file: Path, source: random.Random) -> None:
     database.close()
 
 
-def check_recording(folder: Path, number: int, capsys: pytest.CaptureFixture[str]) -> None:
+def check_recording(folder, number, capsys):
     source = random.Random(number)
     file = write_recording(folder / str(number), source)
     if source.random() < 0.5:
@@ -116,7 +112,7 @@ def check_recording(folder: Path, number: int, capsys: pytest.CaptureFixture[str
             assert len(list(reader)) >= len(WHOLE), number  # SQLite alone does not tell a doubled row from two
 
 
-def check_tables(folder: Path, number: int, capsys: pytest.CaptureFixture[str]) -> None:
+def check_tables(folder, number, capsys):
     source, tables = random.Random(number), folder / str(number)
     tables.mkdir()
     rows = [f'{name},{0.02 * i:.2f},{0.001 * i * i:.4f},0.1' for name in ('a', 'b') for i in range(20)]
@@ -144,6 +140,6 @@ CHECKS = {'recordings': check_recording, 'tables': check_tables}
 
 
 @pytest.mark.parametrize('kind', CHECKS)
-def test_damaged_inputs_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str) -> None:
+def test_damaged_inputs_end_in_words(tmp_path, capsys, kind):
     for number in range(FEW):
         CHECKS[kind](tmp_path, number, capsys)

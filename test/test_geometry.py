@@ -12,7 +12,6 @@ from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import (
     SMALLEST_DISTANCE,
-    Offset,
     find_limits,
     find_offset,
     measure_offsets,
@@ -24,7 +23,6 @@ from foc_ros.core.obstacles.shapes import (
     Capsule,
     Circle,
     Hull,
-    Shape,
     collect_obstacles,
     make_box_polygon,
     make_hull_polygon,
@@ -37,7 +35,7 @@ FINE = 20_001
 """Points on each edge in the brute-force search for the nearest one."""
 
 
-def random_polygon(generator: np.random.Generator) -> np.ndarray:
+def random_polygon(generator):
     """Return one vertex, two, a box at any angle, or the hull of some points, with its centre elsewhere than at zero."""
     kind = generator.integers(4)
     if kind < 2:
@@ -47,13 +45,13 @@ def random_polygon(generator: np.random.Generator) -> np.ndarray:
     return make_hull_polygon(generator.uniform(-0.1, 0.1, (generator.integers(3, 9), 2)))[1]
 
 
-def locate(polygon: np.ndarray, points: np.ndarray, spare: int = 3) -> Offset:
+def locate(polygon, points, spare=3):
     """Return where points (..., 2) are relative to a polygon, which its table holds with some unused vertices."""
     vertices = np.concatenate((polygon, np.zeros((spare, 2))))
     return find_offset(points[..., 0], points[..., 1], tabulate_edges(vertices, np.array(len(polygon))))
 
 
-def find_nearest(polygon: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, float, bool]:
+def find_nearest(polygon, point):
     """Return the nearest of many points of the boundary, the side of the point, and whether it is near a vertex."""
     shares = np.linspace(0.0, 1.0, FINE)[:, None]
     edges = [a + shares * (b - a) for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
@@ -106,7 +104,7 @@ def test_a_hull_is_convex_and_holds_its_points(seed):
     assert distance.max() < 1e-9
 
 
-def make_circle_of_points(corners: int) -> np.ndarray:
+def make_circle_of_points(corners):
     turns = 2 * np.pi * np.arange(corners) / corners
     return 0.1 * np.stack((np.cos(turns), np.sin(turns)), axis=1)
 
@@ -124,6 +122,15 @@ REFUSED = {
     'a hull of no points': (lambda: Hull(np.zeros((0, 2))), 'obstacle.points'),
     'a hull of 17 corners': (lambda: Hull(make_circle_of_points(17)), 'obstacle.points'),
     'an end in space': (lambda: Capsule((0, 0, 0), (0.1, 0), radius=0.1), 'obstacle.start'),
+    'a height that is not a number': (lambda: Circle((0, 0), 0.1, heights=(0.0, np.nan)), 'obstacle.heights: expected numbers'),
+    'one height only': (
+        lambda: Hull([(0, 0), (0.1, 0)], 0.1, heights=(0.1,)),
+        'obstacle.heights: expected finite numbers of shape',
+    ),
+    'heights in the wrong order': (
+        lambda: Circle((0, 0), 0.1, heights=(0.2, 0.1)),
+        'obstacle.heights: expected the lowest point below the highest',
+    ),
     'a velocity of one number': (lambda: Box((0, 0), size=(0.1, 0.1), velocity=(1.0,)), 'obstacle.velocity'),
 }
 
@@ -144,14 +151,14 @@ SHAPES = (
 )
 
 
-def measure_area(points: np.ndarray) -> float:
+def measure_area(points):
     (x, y), (after_x, after_y) = points.T, np.roll(points, -1, axis=0).T
     return float((x * after_y - y * after_x).sum() / 2.0)
 
 
 @pytest.mark.parametrize('shape', SHAPES, ids=repr)
 @pytest.mark.parametrize('growth', [0.0, 0.015])
-def test_every_point_is_at_the_radius_and_the_area_is_that_of_steiner(shape: Shape, growth: float) -> None:
+def test_every_point_is_at_the_radius_and_the_area_is_that_of_steiner(shape, growth):
     obstacles = collect_obstacles([shape])
     outline, radius = trace_obstacle(obstacles, 0, growth, points=400), shape.radius + growth
     np.testing.assert_array_equal(outline[0], outline[-1])
@@ -162,7 +169,7 @@ def test_every_point_is_at_the_radius_and_the_area_is_that_of_steiner(shape: Sha
 
 
 @given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=12), st.floats(1e-3, 0.1))
-def test_the_limits_are_those_of_the_outline(points: list[tuple[float, float]], radius: float) -> None:
+def test_the_limits_are_those_of_the_outline(points, radius):
     obstacles = collect_obstacles([Hull(points, radius), Circle((2.0, 2.0), radius=1.0)])
     low, high = find_limits(obstacles, np.array([0.01, 0.0]))
     outline = trace_obstacle(obstacles, 0, 0.01, points=2000)
@@ -177,7 +184,7 @@ points = arrays(np.float64, st.tuples(st.integers(0, 5), st.just(3)), elements=s
 @pytest.mark.parametrize(
     ('plane', 'position', 'height'), [('xy', (1.0, 2.0), 3.0), ('xz', (1.0, 3.0), 2.0), ('yz', (2.0, 3.0), 1.0)]
 )
-def test_axes_of_each_plane(plane: str, position: tuple[float, float], height: float) -> None:
+def test_axes_of_each_plane(plane, position, height):
     projected, above = project((1.0, 2.0, 3.0), plane)
     assert tuple(projected) == position
     assert above == height
@@ -185,7 +192,7 @@ def test_axes_of_each_plane(plane: str, position: tuple[float, float], height: f
 
 
 @given(points, st.sampled_from(PLANES))
-def test_lift_is_the_inverse_of_project(table: np.ndarray, plane: str) -> None:
+def test_lift_is_the_inverse_of_project(table, plane):
     positions, heights = project(table, plane)
     assert positions.shape == (len(table), 2)
     np.testing.assert_array_equal(lift(positions, heights, plane), table)

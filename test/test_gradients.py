@@ -8,9 +8,8 @@ from reach_helpers import bowed, reach, solved
 
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp import gradients
-from foc_ros.core.ocp.gradients import Gradients
 from foc_ros.core.ocp.margin import Contacts, Margins
-from foc_ros.core.ocp.problem import Problem, rest_to_goal
+from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.plant.plants import condense, discretise_damped_mass
 
 STEPS, GOAL, K = 24, (0.3, 0.02), 2.0
@@ -23,10 +22,9 @@ SHAPES: dict[str, list[Shape]] = {
     'hull': [Hull([(0.11, -0.03), (0.17, -0.04), (0.19, 0.0), (0.14, 0.02)], radius=0.01)],
 }
 STARTS = {'certain': np.zeros((6, 6)), 'uncertain': 1e-6 * (np.eye(6) + 0.3)}
-STRATEGIES = ('lv', 'hc', 'optimal', 'fixed', 'algorithm1')
 
 
-def make_problem(name: str, start: str = 'certain', tau: float = 1e-3) -> tuple[Problem, np.ndarray]:
+def make_problem(name, start='certain', tau=1e-3):
     """Return a problem, and a control (2N,) in units of `Horizon.gain` that passes near its obstacle."""
     obstacles = collect_obstacles(SHAPES[name])
     made = reach(obstacles, goal=GOAL, steps=STEPS, noise=(0.1, 0.15), initial_covariance=STARTS[start])
@@ -34,7 +32,7 @@ def make_problem(name: str, start: str = 'certain', tau: float = 1e-3) -> tuple[
     return made, solution.control.T.ravel() * made.horizon.gain
 
 
-def make_mass_problem(name: str) -> tuple[Problem, np.ndarray]:
+def make_mass_problem(name):
     """Return the same for a damped mass."""
     horizon = condense(discretise_damped_mass(1.0 / STEPS, 1.5, 4.0), STEPS)
     made = rest_to_goal(horizon, np.zeros(4), np.array(GOAL), collect_obstacles(SHAPES[name]), np.array([0.1, 0.15]), 0.9)
@@ -49,9 +47,7 @@ MADE = {
 EVERY = pytest.mark.parametrize('case', MADE)
 
 
-def linearise(
-    margins: Margins, control: np.ndarray, times: np.ndarray, k: float = K, slides: bool = True, is_free: bool = False
-) -> Gradients:
+def linearise(margins, control, times, k=K, slides=True, is_free=False):
     count = len(times)
     none = np.zeros(count, dtype=np.intp)
     controls, is_held = np.tile(control, (count, 1)), np.full(count, slides)
@@ -60,44 +56,39 @@ def linearise(
     )
 
 
-def list_minima(margins: Margins, control: np.ndarray) -> list[float]:
+def list_minima(margins, control):
     """Return the times of the local minima of a margin, to a tenth of a step."""
     times = np.arange(1.5, STEPS - 0.4, 0.1)
     values = linearise(margins, control, times).value
     return times[np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1].tolist()
 
 
-def find_least_factor(margins: Margins, control: np.ndarray, time: float) -> tuple[float, float]:
-    """Return the time near another at which the safety factor is least, and this factor."""
-    none, within, motion = np.zeros(21, dtype=np.intp), 0.3, margins.move(np.zeros(1, dtype=np.intp), control[None])
+def find_least(margins, control, time, is_free=False):
+    """Return the time near another at which the margin, or the safety factor that is free, is least, and its value then."""
+    none, within = np.zeros(21, dtype=np.intp), 0.3
+    motion = margins.move(np.zeros(1, dtype=np.intp), control[None])
     for _ in range(8):
         times = time + within * np.linspace(-1, 1, 21)
-        factors = margins.measure(Contacts(none, none, times), none, motion, np.zeros(21)).factor
-        time, within = float(times[factors.argmin()]), within / 5
-    return time, float(factors.min())
-
-
-def find_least(margins: Margins, control: np.ndarray, time: float, within: float = 0.3) -> tuple[float, float]:
-    """Return the time near another at which the margin is least, and this margin."""
-    for _ in range(8):
-        times = time + within * np.linspace(-1, 1, 21)
-        values = linearise(margins, control, times).value
+        if is_free:
+            values = margins.measure(Contacts(none, none, times), none, motion, np.zeros(21)).factor
+        else:
+            values = linearise(margins, control, times).value
         time, within = float(times[values.argmin()]), within / 5
     return time, float(values.min())
 
 
-def random_directions(control: np.ndarray, count: int = 3) -> np.ndarray:
+def random_directions(control, count=3):
     return np.abs(control).max() * np.random.default_rng(2).standard_normal((count, len(control)))
 
 
-def is_smooth(margins: Margins, control: np.ndarray, time: float) -> bool:
+def is_smooth(margins, control, time):
     """Return whether the nearest point is on one side or one corner around a time."""
     none, times = np.zeros(5, dtype=np.intp), time + np.linspace(-0.1, 0.1, 5)
     found = margins.measure(Contacts(none, none, times), none, margins.move(none[:1], control[None]), np.full(5, K))
     return len(set(found.is_on_edge.tolist())) == 1
 
 
-def check_derivatives(made: Gradients, control: np.ndarray, find, least: float, rate: float = 1.0, within: float = 1e-9) -> None:
+def check_derivatives(made, control, find, least, rate, within):
     """Compare the derivatives at a control with differences of `find`, a function of the control, times a rate."""
     for direction in 1e-3 * random_directions(control):
         more, less = (find(control + sign * direction) for sign in (1, -1))
@@ -124,38 +115,26 @@ def test_the_gradient_of_a_margin_is_its_derivative_at_any_time(case):
 
 
 @EVERY
-def test_the_hessian_is_that_of_the_least_margin_which_slides(case):
-    """Second differences of G(u) = min_t g(u, t), minus those that a unit of the multiplier adds to the Lagrangian."""
+@pytest.mark.parametrize('is_free', [False, True], ids=['margin', 'safety factor'])
+def test_the_hessian_is_that_of_the_least_margin_which_slides_or_of_the_least_safety_factor(case, is_free):
+    """Second differences of G(u) = min_t g(u, t), minus those that a unit of the multiplier adds to the Lagrangian.
+
+    Where the safety factor is free, those of min_t k(u, t), times the rate r by which a margin falls with k.
+    """
     make, *given = MADE[case]
     problem, control = make(*given)
     margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
     for near in list_minima(margins, control):
-        time, least = find_least(margins, control, near)
-        if not is_smooth(margins, control, time):
+        time, least = find_least(margins, control, near, is_free)
+        if not is_smooth(margins, control, time) or (is_free and (abs(time - near) > 0.29 or least <= 0.0)):
             continue
         seen += 1
-        made = linearise(margins, control, np.array([time]))
-        assert made.value[0] == pytest.approx(least, abs=1e-9)
-        check_derivatives(made, control, lambda moved, time=time: find_least(margins, moved, time)[1], least)
-    assert seen or 'box' in case or 'hull' in case, 'a circle has a least margin where it is smooth'
-
-
-@EVERY
-def test_where_the_safety_factor_is_free_the_hessian_is_that_of_the_least_one(case):
-    """Second differences of min_t k(u, t), times the rate r by which a margin falls with k."""
-    make, *given = MADE[case]
-    problem, control = make(*given)
-    margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
-    for near in list_minima(margins, control):
-        time, k = find_least_factor(margins, control, near)
-        if abs(time - near) > 0.29 or k <= 0.0 or not is_smooth(margins, control, time):
-            continue
-        seen += 1
-        made = linearise(margins, control, np.array([time]), k, is_free=True)
-        assert made.value[0] == pytest.approx(0.0, abs=1e-9)
-        factor = lambda moved, time=time: find_least_factor(margins, moved, time)[1]  # noqa: E731
-        check_derivatives(made, control, factor, k, made.stddev_rate[0], within=2e-9)
-    assert seen or 'circle' not in case, 'a circle has a least safety factor where it is smooth'
+        made = linearise(margins, control, np.array([time]), least if is_free else K, is_free=is_free)
+        assert made.value[0] == pytest.approx(0.0 if is_free else least, abs=1e-9)
+        rate, within = (made.stddev_rate[0], 2e-9) if is_free else (1.0, 1e-9)
+        find = lambda moved, time=time: find_least(margins, moved, time, is_free)[1]  # noqa: E731
+        check_derivatives(made, control, find, least, rate, within)
+    assert seen or 'circle' not in case, 'a circle has a least margin where it is smooth'
 
 
 @pytest.mark.parametrize('name', ['box', 'sharp box', 'hull', 'moving capsule'])

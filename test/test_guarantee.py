@@ -16,31 +16,33 @@ from varied_reaches import STEPS, VariedReach, feasible_reaches
 
 from foc_ros.core.obstacles.risk import RiskBound, count_events, k_of_eta
 from foc_ros.core.ocp.monte_carlo import monte_carlo, wilson
-from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.solution import Solution, Status
+from foc_ros.core.solution import Status
 
 REACHES = 70
 SAMPLES = 2000
 STRATEGIES: dict[str, tuple[Callable[[VariedReach], dict[str, object]], int]] = {
-    'lv': (lambda made: {'strategy': 'lv'}, 44),
-    'hc': (lambda made: {'strategy': 'hc'}, 47),
+    'lv': (lambda made: {'strategy': 'lv'}, 22),
+    'hc': (lambda made: {'strategy': 'hc'}, 23),
     'optimal': (lambda made: {'strategy': 'optimal'}, REACHES),
     'algorithm1, growth 10': (lambda made: {'strategy': 'algorithm1'}, 54),
     'algorithm1, growth 1.5': (lambda made: {'strategy': 'algorithm1', 'algorithm1_growth': 1.5}, 54),
     'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 54),
 }
-"""The settings of every strategy, and how many reaches it solves at least: fewer solved would be fewer checked."""
+"""The settings of every strategy, and how many reaches it solves at least: fewer solved would be fewer checked.
+
+`lv` and `hc`, which take many times as long, are asked for every second reach.
+"""
 COMPARISONS = len(STRATEGIES) * REACHES * STEPS * 4
 Z = NormalDist().inv_cdf(1 - 1e-3 / COMPARISONS)
 
 
-def largest_share_clear(problem: Problem, solution: Solution) -> float:
+def largest_share_clear(problem, solution):
     """Upper end of what the share of clear movements may be at the obstacle and step where most are not."""
     share = monte_carlo(problem, solution.control.T.ravel(), SAMPLES).step[0]
     return wilson(round(share * SAMPLES), SAMPLES, Z)[1]
 
 
-def promised(made: VariedReach, solution: Solution, strategy: str) -> float:
+def promised(made, solution, strategy):
     """The eta asked for; `fixed` is asked for none and promises the one it reports."""
     return solution.eta if strategy == 'fixed' else made.problem.eta
 
@@ -49,7 +51,7 @@ def promised(made: VariedReach, solution: Solution, strategy: str) -> float:
 def test_what_is_solved_stays_clear_as_often_as_promised(strategy):
     settings, least = STRATEGIES[strategy]
     checked = 0
-    for made in feasible_reaches(REACHES):
+    for made in feasible_reaches(REACHES)[:: 2 if strategy in ('lv', 'hc') else 1]:
         solution = solved(made.problem, made.guess, **settings(made))
         if solution.status is not Status.SOLVED or solution.eta == 0.0:
             continue
@@ -69,8 +71,7 @@ def test_a_mean_that_only_just_stays_clear_is_found_out():
     assert sum(largest_share_clear(each.problem, way) < each.problem.eta for each, way in zip(made, naive, strict=True)) >= 13
 
 
-@pytest.mark.parametrize('strategy', ['lv', 'hc'])
-def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised(strategy):
+def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised():
     """With Boole's inequality and the Gaussian bound; eta for each step alone does not promise it, and is found out."""
     checked, missed = 0, 0
     for made in feasible_reaches(REACHES)[::4]:
@@ -78,7 +79,7 @@ def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised
         for risk in ('path', 'step'):
             events = count_events(risk, len(made.problem.obstacles), made.problem.horizon.steps)
             problem = replace(made.problem, risk=RiskBound('gaussian', events))
-            solution = solved(problem, made.guess, strategy)
+            solution = solved(problem, made.guess, 'lv')
             if solution.status is Status.SOLVED:
                 share = monte_carlo(problem, solution.control.T.ravel(), SAMPLES).path[0]
                 shares[risk] = wilson(round(share * SAMPLES), SAMPLES, Z)[1]

@@ -2,14 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guidance: every part against a case with a known answer, and the public class."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import prediction_samples
 import pytest
-from guidance_samples import PERIOD
 from prediction_samples import outcome
 
 import foc_ros
@@ -28,19 +25,19 @@ from foc_ros.core.guidance.paths import (
     find_need,
 )
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.types import Array
 
 ROUND = make_obstacles([(0.1, 0.0)], [0.03])
 SETTINGS = GuidanceConfig(k_max=100.0, clearance=0.0)
+PERIOD = 0.005
+"""Of the updates [s]."""
 
 
-def prediction(*outcomes: PredictedCandidate, **changes: object) -> Prediction:
+def prediction(*outcomes, **changes):
     """Return a prediction of these outcomes, without obstacles if none are given."""
     return prediction_samples.prediction(*outcomes, **({'obstacles': make_obstacles()} | changes))
 
 
-def straight(label: str = 'goal0:', likelihood: float = 1.0, start: Array = (0.0, 0.0), end: Array = (0.3, 0.0), **rest: object):
+def straight(label='goal0:', likelihood=1.0, start=(0.0, 0.0), end=(0.3, 0.0), **rest):
     """Return a candidate along a straight line."""
     base = outcome(label, likelihood)
     mean = base.mean.copy()
@@ -48,7 +45,7 @@ def straight(label: str = 'goal0:', likelihood: float = 1.0, start: Array = (0.0
     return replace(base, solution=replace(base.solution, mean=mean, covariance=np.zeros((len(mean), 6, 6)), **rest))
 
 
-def guide_hand(config: Config, newest: Prediction, position: Array, velocity: Array, seconds: float = 0.15):
+def guide_hand(config, newest, position, velocity, seconds=0.15):
     """Return the output after a time in which the hand does not move, whatever velocity it reports."""
     state = GuidanceState()
     for tick in range(round(seconds / PERIOD)):
@@ -58,13 +55,13 @@ def guide_hand(config: Config, newest: Prediction, position: Array, velocity: Ar
 
 
 @pytest.mark.parametrize(('stddev', 'share'), [(1.0, 0.0), (0.1, 0.0), (0.02, 1.0), (0.001, 1.0), (1300**-0.5, 0.5)])
-def test_the_stiffness_is_linear_in_the_precision_between_its_bounds(stddev: float, share: float) -> None:
+def test_the_stiffness_is_linear_in_the_precision_between_its_bounds(stddev, share):
     variance = max(stddev**2 - POSITION_STDDEV**2, 0.0)
     stiffness = compute_stiffness(np.array([variance * np.eye(2)]), SETTINGS)
     assert stiffness[0] == pytest.approx(share * 100.0 * np.eye(2), abs=1e-3)
 
 
-def test_forces_that_agree_add_up_and_those_that_cancel_vanish() -> None:
+def test_forces_that_agree_add_up_and_those_that_cancel_vanish():
     none = np.zeros(2, dtype=bool)
     force, agreement = combine(np.array([0.7, 0.3]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
     assert (force[0], agreement) == (pytest.approx(1.3), 1.0)
@@ -77,20 +74,20 @@ def test_forces_that_agree_add_up_and_those_that_cancel_vanish() -> None:
 
 
 @pytest.mark.parametrize(('across', 'share'), [(0.0, 1.0), (0.5, 1.0), (-0.2, 0.6), (-0.5, 0.0), (-3.0, 0.0)])
-def test_a_force_yields_to_a_hand_that_accelerates_against_it(across: float, share: float) -> None:
+def test_a_force_yields_to_a_hand_that_accelerates_against_it(across, share):
     force = yield_to_hand(np.array([0.0, 2.0]), np.array([5.0, across]), 0.5)
     assert force == pytest.approx([0.0, 2.0 * share])
     assert yield_to_hand(np.array([0.0, 2.0]), np.array([0.0, across]), 0.0).tolist() == [0.0, 2.0]
 
 
-def test_a_hand_beside_its_only_path_is_drawn_to_it() -> None:
+def test_a_hand_beside_its_only_path_is_drawn_to_it():
     output = guide_hand(Config(guidance=SETTINGS), prediction(straight(), stamp_ns=0), (0.1, 0.01), (0.0, 0.0))
     assert output.force == pytest.approx([0.0, -1.0], abs=1e-6)
     assert output.reference == pytest.approx([0.1, 0.0], abs=1e-6)
     assert output.agreement == 1.0
 
 
-def test_the_mode_trajectory_keeps_the_force_along_the_path() -> None:
+def test_the_mode_trajectory_keeps_the_force_along_the_path():
     newest = prediction(straight(), stamp_ns=0)
     config = {mode: Config(guidance=replace(SETTINGS, mode=mode, lookahead_s=0.1)) for mode in ('path', 'trajectory')}
     forces = {mode: guide_hand(each, newest, (-0.01, 0.01), (0.001, 0.0)).force for mode, each in config.items()}
@@ -98,14 +95,14 @@ def test_the_mode_trajectory_keeps_the_force_along_the_path() -> None:
     assert forces['trajectory'][0] > 0.9
 
 
-def test_in_mode_path_the_force_neither_drives_nor_brakes_a_moving_hand() -> None:
+def test_in_mode_path_the_force_neither_drives_nor_brakes_a_moving_hand():
     velocity = np.array([0.3, 0.2])
     output = guide_hand(Config(guidance=SETTINGS), prediction(straight(), stamp_ns=0), (0.1, 0.01), velocity)
     assert np.hypot(*output.force) > 1.0
     assert abs(output.force @ velocity) < 0.05 * np.hypot(*output.force) * np.hypot(*velocity)
 
 
-def bent(label: str, likelihood: float, aside: float):
+def bent(label, likelihood, aside):
     """Return a candidate that begins along the first axis and bends aside."""
     base = straight(label, likelihood)
     mean = base.mean.copy()
@@ -113,7 +110,7 @@ def bent(label: str, likelihood: float, aside: float):
     return replace(base, solution=replace(base.solution, mean=mean))
 
 
-def test_a_hand_at_a_fork_is_left_alone() -> None:
+def test_a_hand_at_a_fork_is_left_alone():
     fork = prediction(bent('goal0:+1', 0.5, 0.1), bent('goal0:-1', 0.5, -0.1), stamp_ns=0)
     output = guide_hand(Config(guidance=SETTINGS), fork, (0.0, 0.0), (0.6, 0.0))
     assert output.force == pytest.approx([0.0, 0.0], abs=1e-6)
@@ -122,7 +119,7 @@ def test_a_hand_at_a_fork_is_left_alone() -> None:
     assert guide_hand(Config(guidance=SETTINGS), decided, (0.0, 0.0), (0.6, 0.0)).force[1] > 0.5
 
 
-def test_the_look_ahead_damps_movement_across_the_path() -> None:
+def test_the_look_ahead_damps_movement_across_the_path():
     newest, velocity = prediction(straight(), stamp_ns=0), (0.0, 0.05)
     settings = replace(SETTINGS, mode='trajectory', lookahead_s=0.1)
     output = guide_hand(Config(guidance=settings), newest, (0.0, 0.0), velocity)
@@ -131,7 +128,7 @@ def test_the_look_ahead_damps_movement_across_the_path() -> None:
     assert none.force == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
-def test_no_force_leads_across_an_obstacle_to_the_other_side() -> None:
+def test_no_force_leads_across_an_obstacle_to_the_other_side():
     need = find_need(GuidanceConfig(clearance=0.02, lookahead_s=0.2), ROUND, np.array([0.06, 0.045]), np.array([0.4, 0.0]))
     assert find_crossing(need, np.array([[0.0, 0.01], [0.0, -0.01], [0.01, 0.0]])).tolist() == [False, True, False]
     settings = replace(SETTINGS, clearance=0.02)
@@ -142,7 +139,7 @@ def test_no_force_leads_across_an_obstacle_to_the_other_side() -> None:
     assert guide_hand(Config(guidance=settings), other, position, velocity).force.tolist() == [0.0, 0.0]
 
 
-def test_a_hand_far_from_obstacles_is_left_alone_and_one_that_comes_too_near_is_turned_away() -> None:
+def test_a_hand_far_from_obstacles_is_left_alone_and_one_that_comes_too_near_is_turned_away():
     newest = prediction(bent('goal0:+0', 1.0, 0.2), stamp_ns=0, obstacles=ROUND)
     settings = replace(SETTINGS, clearance=0.02)
     far = guide_hand(Config(guidance=settings), newest, (0.0, 0.06), (0.3, 0.0))
@@ -151,7 +148,7 @@ def test_a_hand_far_from_obstacles_is_left_alone_and_one_that_comes_too_near_is_
     assert near.force[1] > 0.5
 
 
-def test_a_blended_command_is_never_faster_and_equals_the_command_without_authority() -> None:
+def test_a_blended_command_is_never_faster_and_equals_the_command_without_authority():
     output = guide_hand(Config(), prediction(straight(), stamp_ns=0), (0.0, 0.0), (0.0, 0.0))
     command = np.array([0.0, 0.1])
     blended = output.blend_command(command)
@@ -162,7 +159,7 @@ def test_a_blended_command_is_never_faster_and_equals_the_command_without_author
     assert output.blend_command(np.zeros(2)).tolist() == [0.0, 0.0]
 
 
-def test_mirrored_input_gives_mirrored_guidance() -> None:
+def test_mirrored_input_gives_mirrored_guidance():
     mirror = np.array([1.0, -1.0])
     forces = []
     for sign in (1.0, -1.0):
@@ -178,7 +175,7 @@ def test_mirrored_input_gives_mirrored_guidance() -> None:
     assert np.hypot(*forces[0]) > 0.01
 
 
-def test_the_public_class_checks_its_input_and_keeps_its_state() -> None:
+def test_the_public_class_checks_its_input_and_keeps_its_state():
     config = foc_ros.Config(guidance=SETTINGS)
     guidance, newest = foc_ros.Guidance(config), prediction(straight(), stamp_ns=0)
     guidance.update(0.0, (0.1, 0.03), (0.0, 0.0), newest)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals of the past: those that were reached more often than their distances lead to expect are likelier."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,37 +16,36 @@ BETA = CONFIG.likelihood.beta
 EXPECTED = 1.0 / (1.0 + ((0.25**2 + 0.15**2) / (0.2**2 + 0.1**2)) ** BETA)
 """Probability of the far goal by the distances from `HOME`."""
 BOX = np.array([[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]])
-Place = tuple[float, float]
 
 
 class Session:
     """A hand that moves from place to place, rests there, and is asked where it will go next."""
 
-    def __init__(self, goals: list[Place], names: tuple[str, ...] = (), **values: object) -> None:
+    def __init__(self, goals, names=(), **values):
         self.pipeline, self.tick, self.place = Pipeline(CONFIG.with_values(values), is_timed=False), 0, np.array(HOME)
         self.announce(goals, names)
         self.move(HOME)
 
-    def announce(self, goals: list[Place], names: tuple[str, ...] = ()) -> None:
+    def announce(self, goals, names=()):
         obstacles = make_obstacles(np.array(goals), 1e-3, ids=names, polygons=[BOX] * len(goals)) if names else make_obstacles()
         self.pipeline.set_obstacles('cloud', obstacles, None, 'world')
         self.pipeline.set_goals(np.array(goals), 'world')
 
-    def move(self, target: Place) -> None:
+    def move(self, target):
         start = self.place
         for s in np.clip(np.linspace(0.0, 1.6, 96), 0.0, 1.0):
             self.place = start + (np.array(target) - start) * (10 * s**3 - 15 * s**4 + 6 * s**5)
             self.pipeline.add_hand_sample(HandSample(round(self.tick * NANOSECONDS / 100), self.place, 0.0, 'world'))
             self.tick += 1
 
-    def return_home(self) -> None:
+    def return_home(self):
         """Let the hand appear at home again, as with a clutch: the way back is no reach."""
         self.pipeline.set_engaged(False)
         self.place, self.tick = np.array(HOME), self.tick + 2000
         self.pipeline.set_engaged(True)
         self.move(HOME)
 
-    def share(self, goal: int) -> float:
+    def share(self, goal):
         self.pipeline.add_hand_sample(HandSample(round(self.tick * NANOSECONDS / 100), self.place, 0.0, 'world'))
         self.tick += 1
         prediction = self.pipeline.predict()
@@ -56,12 +53,12 @@ class Session:
         return sum(each.likelihood for each in prediction.candidates if each.candidate.goal == goal)
 
 
-def odds(share: float) -> float:
+def odds(share):
     return share / (1.0 - share)
 
 
 @pytest.mark.parametrize('past_goals', [0.0, 1.0, 3.0])
-def test_a_goal_that_was_reached_more_often_than_expected_gets_likelier(past_goals: float) -> None:
+def test_a_goal_that_was_reached_more_often_than_expected_gets_likelier(past_goals):
     session = Session([NEAR, FAR], **{'likelihood.past_goals': past_goals})
     before = session.share(1)
     assert before == pytest.approx(EXPECTED, rel=0.05)
@@ -73,7 +70,7 @@ def test_a_goal_that_was_reached_more_often_than_expected_gets_likelier(past_goa
     assert odds(session.share(1)) / odds(before) == pytest.approx(weights[1] / weights[0], rel=0.1)
 
 
-def test_habits_follow_the_object_and_not_its_place() -> None:
+def test_habits_follow_the_object_and_not_its_place():
     session = Session([NEAR, FAR], ('cup', 'jug'))
     before = session.share(0), session.share(1)
     for _ in range(3):
@@ -85,7 +82,7 @@ def test_habits_follow_the_object_and_not_its_place() -> None:
     assert session.share(1) == pytest.approx(before[0], rel=0.05)  # goals that are no objects are others
 
 
-def test_a_goal_elsewhere_is_another_one() -> None:
+def test_a_goal_elsewhere_is_another_one():
     session = Session([NEAR, FAR])
     before = session.share(1)
     session.move(FAR)
@@ -98,7 +95,7 @@ def test_a_goal_elsewhere_is_another_one() -> None:
     assert odds(session.share(1)) < 0.7 * odds(known)
 
 
-def test_a_movement_that_ends_far_from_all_goals_says_nothing_and_a_reset_forgets() -> None:
+def test_a_movement_that_ends_far_from_all_goals_says_nothing_and_a_reset_forgets():
     session = Session([NEAR, FAR])
     before = session.share(1)
     session.move((0.1, -0.06))
@@ -112,7 +109,7 @@ def test_a_movement_that_ends_far_from_all_goals_says_nothing_and_a_reset_forget
     assert session.share(1) == pytest.approx(before)
 
 
-def test_reaches_are_expected_to_end_where_the_earlier_ones_did() -> None:
+def test_reaches_are_expected_to_end_where_the_earlier_ones_did():
     goals = [NEAR, (NEAR[0], NEAR[1] - 0.05)]
     session = Session(goals, **{'likelihood.past_goals': 1e-6})
     for _ in range(6):

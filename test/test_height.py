@@ -11,12 +11,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 import foc_ros
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.height import predict_height, reach_along_axis
-from foc_ros.core.obstacle_table import Obstacles, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.plant.covariance import SharedCovariances
 from foc_ros.core.predict import build_problem, predict
-from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 
@@ -28,19 +27,19 @@ GOAL = np.array([[0.4, 0.0]])
 START = np.array([0.1, 0.2, -0.5])
 
 
-def hand_at(height: float, *, moving: bool = True) -> HandState:
+def hand_at(height, *, moving=True):
     """Return a hand at the origin of the plane that knows its state well."""
     onset = {'onset_ns': 0, 'onset_position': np.zeros(2)} if moving else {}
     return HandState(0, np.zeros(6), 1e-8 * np.eye(6), height, height_mean=np.array([height, 0.0, 0.0]), **onset)
 
 
-def boxes(*heights: tuple[float, float], x: float = 0.2, velocity: float = 0.0) -> Obstacles:
+def boxes(*heights, x=0.2, velocity=0.0):
     """Return circles beside each other, with their lowest and highest points."""
     centres = [[x, 0.06 * row] for row in range(len(heights))]
     return make_obstacles(centres, 0.02, 0.0, velocity=[velocity, 0.0], heights=heights)
 
 
-def predict_over(obstacles: Obstacles, height: float, goal_height: float, **changes: object) -> Prediction:
+def predict_over(obstacles, height, goal_height, **changes):
     """Return the prediction of a hand at a height that goes to a goal at another one."""
     config = replace_values(CONFIG, PRECISE | {name.replace('__', '.'): value for name, value in changes.items()})
     return predict(config, hand_at(height), obstacles, GOAL, NO_TRACKS, goal_heights=np.array([goal_height]))[0]
@@ -138,21 +137,6 @@ def test_an_obstacle_is_cleared_on_the_way_to_every_goal_or_blocks():
         prediction = predict(config, hand_at(0.3), table, goals, NO_TRACKS, goal_heights=np.array(heights))[0]
         assert prediction.cleared == (expected,)
         assert {each.height.mean[-1, 0].round(9) for each in prediction.candidates} == set(heights)
-
-
-@pytest.mark.parametrize(
-    ('heights', 'words'),
-    [
-        ((0.0, float('nan')), 'obstacle.heights: expected numbers'),
-        ((0.1,), 'obstacle.heights: expected finite numbers of shape'),
-        ((0.2, 0.1), 'obstacle.heights: expected the lowest point below the highest'),
-    ],
-)
-@pytest.mark.parametrize('shape', [foc_ros.Circle, foc_ros.Hull])
-def test_wrong_heights_of_a_shape_are_refused(shape, heights, words):
-    place = (0.1, 0.0) if shape is foc_ros.Circle else [(0.1, 0.0), (0.2, 0.0)]
-    with pytest.raises(foc_ros.SceneError, match=words):
-        shape(place, radius=0.02, heights=heights)
 
 
 def test_a_predictor_with_heights_predicts_and_clears():

@@ -16,7 +16,7 @@ from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import MessageError
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.prediction import HeightTrajectory, Prediction
+from foc_ros.core.prediction import HeightTrajectory
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import CollisionTable, MarkerTable, decode_detections
@@ -33,17 +33,17 @@ COLUMNS = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'size_z', 'vx', '
 CONFIG = replace_values(Config(), {'budget_s': 0.0, 'foc.steps': 20, 'foc.endpoint_stddev': 0.0})
 
 
-def in_space(point: tuple[float, ...], plane: str) -> list[float]:
+def in_space(point, plane):
     """Return x, y, z of a point that is given by its position in the plane and its height."""
     return [point[place] for place in PLANES[plane]]
 
 
-def table(*rows: tuple[float, ...]) -> np.ndarray:
+def table(*rows):
     return obstacle_table([(*row, *(0.0,) * (len(COLUMNS) - len(row))) for row in rows], COLUMNS)
 
 
 @pytest.mark.parametrize('plane', PLANES)
-def test_the_size_of_a_row_gives_its_heights(plane: str) -> None:
+def test_the_size_of_a_row_gives_its_heights(plane):
     rows = [(*in_space((0.1, 0.0, 0.5), plane), 0.02, size) for size in (0.2, 0.0)]
     climbing = (*rows[0][:4], 0.2, *in_space((0.0, 0.0, 0.1), plane))
     passing = (*rows[0][:4], 0.2, *in_space((0.1, 0.0, 0.0), plane))
@@ -52,7 +52,7 @@ def test_the_size_of_a_row_gives_its_heights(plane: str) -> None:
     assert obstacles.corners.tolist() == [1] * 4
 
 
-def test_a_wrong_size_is_refused_and_one_that_is_not_finite_is_dropped() -> None:
+def test_a_wrong_size_is_refused_and_one_that_is_not_finite_is_dropped():
     with pytest.raises(MessageError, match=r'size_z\[1\]: expected a number in \[0, 10000\] m, got -0.1'):
         decode_point_cloud(cloud(TYPES, table((0, 0, 0, 0.1, 0.1), (1, 0, 0, 0.1, -0.1))), 'xy')
     decoded = decode_point_cloud(cloud(TYPES, table((0, 0, 0, 0.1, np.nan), (1, 0, 0, 0.1, 0.1))), 'xy')
@@ -60,7 +60,7 @@ def test_a_wrong_size_is_refused_and_one_that_is_not_finite_is_dropped() -> None
 
 
 @pytest.mark.parametrize('plane', PLANES)
-def test_markers_say_their_heights(plane: str) -> None:
+def test_markers_say_their_heights(plane):
     place = in_space((0.1, 0.0, 0.5), plane)
     turned = {'x': np.sin(np.pi / 8), 'w': np.cos(np.pi / 8)} if plane == 'xy' else {'w': 1.0}
     kinds = [(CUBE, (0.2, 0.2, 0.2), turned), (CYLINDER, (0.1, 0.1, 0.3), {'w': 1.0}), (SPHERE, (0.1, 0.1, 0.3), {'w': 1.0})]
@@ -75,7 +75,7 @@ def test_markers_say_their_heights(plane: str) -> None:
     assert MarkerTable().obstacles(SECOND).heights.shape == (0, 2)
 
 
-def test_objects_and_detections_say_their_heights() -> None:
+def test_objects_and_detections_say_their_heights():
     tilted = {'x': np.sin(np.pi / 8), 'w': np.cos(np.pi / 8)}
     parts = (1, (0.4, 0.2, 0.1), (0, 0, 0.5)), (2, (0.05,), (0, 0, 0.5)), (3, (0.4, 0.02), (0, 0, 0.5))
     heights = CollisionTable().with_message(collision_object(*parts)).obstacles('xy', 0.0).heights
@@ -88,14 +88,14 @@ def test_objects_and_detections_say_their_heights() -> None:
     assert decode_detections(detections(), 'xy', 0.0).obstacles.heights.shape == (0, 2)
 
 
-def make_transform(angle: float, z: float) -> Transform:
+def make_transform(angle, z):
     """Return a rotation about the x axis, and a shift along z."""
     quaternion = pose_stamped(TYPES, (0, 0, 0)).pose.orientation
     quaternion.x, quaternion.w = float(np.sin(angle / 2)), float(np.cos(angle / 2))
     return Transform(compute_rotation(quaternion), np.array([0.0, 0.0, z]))
 
 
-def test_a_transform_moves_heights_and_must_not_tilt_them() -> None:
+def test_a_transform_moves_heights_and_must_not_tilt_them():
     message = cloud(TYPES, table((0.1, 0.0, 0.5, 0.02, 0.2)), frame_id='camera')
     for angle, middle in ((0.0, 1.5), (np.pi, 0.5)):
         moved = decode_point_cloud(message, 'xy', lambda _, angle=angle: ('world', make_transform(angle, 1.0)))
@@ -105,7 +105,7 @@ def test_a_transform_moves_heights_and_must_not_tilt_them() -> None:
 
 
 @cache
-def predict_in(plane: str) -> Prediction:
+def predict_in(plane):
     """Return the last prediction for a hand that goes down between a high, a low and a tall obstacle."""
     intake = Intake(Pipeline(replace_values(CONFIG, {'plane': plane})))
     rows = ((0.2, 0.0, 0.5), 0.02, 0.2), ((0.2, 0.06, 0.1), 0.02, 0.04), ((0.2, -0.06, 0.3), 0.02, 0.0)
@@ -121,7 +121,7 @@ def predict_in(plane: str) -> Prediction:
 
 
 @pytest.mark.parametrize('plane', PLANES)
-def test_every_plane_has_the_same_heights(plane: str) -> None:
+def test_every_plane_has_the_same_heights(plane):
     expected, made = predict_in('xy'), predict_in(plane)
     assert made.cleared == expected.cleared == (True, True, False)
     for one, other in zip(made.candidates, expected.candidates, strict=True):
@@ -143,7 +143,7 @@ def test_every_plane_has_the_same_heights(plane: str) -> None:
         assert_array_equal(rows[''.join(sorted(axis + normal))], 0.0)
 
 
-def sample() -> Prediction:
+def sample():
     """Return a prediction by hand, with a height that rises."""
     covariance = np.zeros((STEPS + 1, 3, 3))
     covariance[:, 0, 0] = np.linspace(0.0, 0.03, STEPS + 1) ** 2
@@ -152,7 +152,7 @@ def sample() -> Prediction:
 
 
 @pytest.mark.parametrize('plane', PLANES)
-def test_path_and_markers_rise(plane: str) -> None:
+def test_path_and_markers_rise(plane):
     given = sample()
     (candidate,) = given.candidates
     assert candidate.height is not None
@@ -170,7 +170,7 @@ def test_path_and_markers_rise(plane: str) -> None:
     assert_allclose([each.scale.z for each in ellipses], 2.0 * candidate.height.stddev[1:])
 
 
-def test_json_has_the_height_where_it_is_predicted() -> None:
+def test_json_has_the_height_where_it_is_predicted():
     (encoded,) = encode_prediction(sample())['candidates']
     assert_allclose(encoded['height'], np.linspace(0.2, 0.4, STEPS + 1))
     assert_allclose(encoded['height_velocity'], 1.0)
@@ -179,7 +179,7 @@ def test_json_has_the_height_where_it_is_predicted() -> None:
     assert not {name for name in without if name.startswith('height')}
 
 
-def test_a_replay_counts_what_was_cleared() -> None:
+def test_a_replay_counts_what_was_cleared():
     answer = Summary(samples=3, predictions=2, solved=2, cleared_by_height=5).answer({}, 1.0)
     assert answer['cleared_by_height'] == 5
     assert facts(answer)['obstacles cleared by height'] == '5 over all predictions'

@@ -116,7 +116,7 @@ def test_a_wall_of_three_hundred_obstacles_is_noted():
 ABEAM = make_obstacles([[0.5, 0.0]], 0.1, ids=('post',))
 
 
-def bowed(amplitude: float, m: int = 101) -> np.ndarray:
+def bowed(amplitude, m=101):
     share = np.linspace(0.0, 1.0, m)
     return np.column_stack([share, amplitude * np.sin(np.pi * share)])
 

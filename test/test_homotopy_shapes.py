@@ -4,8 +4,7 @@
 
 import numpy as np
 import pytest
-from homotopy_scenes import AVOIDING, CLEARANCE, GOAL, avoiding, find
-from homotopy_shapes import HAND, make_box, random_shapes, shortest_by_pattern, turn
+from homotopy_scenes import AVOIDING, CLEARANCE, GOAL, HAND, avoiding, find, make_box, random_shapes, shortest_by_pattern, turn
 
 from foc_ros.core.classes import find_path_sides, scene
 from foc_ros.core.obstacle_table import make_obstacles
@@ -41,9 +40,9 @@ def compare(obstacles, seed, clearance=CLEARANCE):
         assert expected[sides] * (1 - 1e-3) <= length <= expected[sides] * (1 + TOLERANCE), f'scene {seed}: {sides}'
 
 
-@pytest.mark.parametrize('batch', range(3))
+@pytest.mark.parametrize('batch', range(2))
 def test_brute_force_finds_no_class_that_the_search_misses(batch):
-    for seed in range(20 * batch, 20 * (batch + 1)):
+    for seed in range(15 * batch, 15 * (batch + 1)):
         compare(make_scene(seed), seed)
 
 
@@ -60,9 +59,8 @@ def make_aligned_scene(seed):
             return obstacles
 
 
-@pytest.mark.parametrize('batch', range(2))
-def test_brute_force_finds_no_class_that_the_search_misses_where_edges_lie_on_one_line(batch):
-    for seed in range(30 * batch, 30 * (batch + 1)):
+def test_brute_force_finds_no_class_that_the_search_misses_where_edges_lie_on_one_line():
+    for seed in range(30):
         compare(make_aligned_scene(seed), seed, 0.0041)
 
 
@@ -202,7 +200,7 @@ def test_the_search_ends_at_the_largest_number_of_states_and_says_so(monkeypatch
     assert [one.label for one in few.candidates] == [one.label for one in whole.candidates][: len(few.candidates)]
 
 
-TICKS = 150
+TICKS = 100
 
 
 def count_changes(centre, radius, goals, hand=(0.0, 0.0), k=4, remember=True):
@@ -230,8 +228,8 @@ def count_changes(centre, radius, goals, hand=(0.0, 0.0), k=4, remember=True):
 )
 def test_candidates_stay_under_noise(centre, radius, k):
     loose = count_changes(centre, radius, (0.3, 0.0), k=k, remember=False)
-    assert loose > 40, 'the scene is no test'
-    assert count_changes(centre, radius, (0.3, 0.0), k=k) <= 8
+    assert loose > 25, 'the scene is no test'
+    assert count_changes(centre, radius, (0.3, 0.0), k=k) <= 5
 
 
 def test_a_clearly_better_class_replaces_one_that_was_there():

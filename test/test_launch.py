@@ -1,26 +1,29 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The launch files: what they declare, and what they start where `launch_ros` is installed."""
+"""Launch files, layouts of viewers, and the permissions of a secured graph; and the bounds of files from outside."""
 
-from __future__ import annotations
-
+import json
 import os
 import runpy
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import xml.etree.ElementTree as ET
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import pytest
 import ros_helpers
-from ros_helpers import Graph
+import yaml
 
 from foc_ros.core.config import list_parameters
+from foc_ros.core.errors import RecordingError
+from foc_ros.io import csv_tables as tables
+from foc_ros.io import documents
+from foc_ros.io.documents import read_document
 from foc_ros.io.topics import TYPES
+from foc_ros.ros.messages.encode_prediction import LIKELIHOOD_COLUMNS, OUTPUTS
 
 ROOT = Path(__file__).parents[1]
 STARTER = (
@@ -41,7 +44,7 @@ STARTER = (
 class Recorded:
     """In place of a class of launch: keeps what it was made with."""
 
-    def __init__(self, *given: Any, **named: Any) -> None:
+    def __init__(self, *given, **named):
         self.given, self.named = given, named
 
 
@@ -57,7 +60,7 @@ NAMES = {
 
 
 @pytest.fixture
-def described(monkeypatch: pytest.MonkeyPatch) -> Any:
+def described(monkeypatch):
     """Return a function that runs a launch file with substitutes for launch, and returns its names and its description."""
     for name, classes in NAMES.items():
         module = ModuleType(name)
@@ -65,18 +68,18 @@ def described(monkeypatch: pytest.MonkeyPatch) -> Any:
             setattr(module, each, type(each, (Recorded,), {}))
         monkeypatch.setitem(sys.modules, name, module)
 
-    def run(name: str) -> tuple[dict[str, Any], list[Any]]:
+    def run(name):
         names = runpy.run_path(str(ROOT / 'launch' / f'{name}.launch.py'))
         return names, names['generate_launch_description']().given[0]
 
     return run
 
 
-def arguments(actions: list[Any]) -> dict[str, str]:
+def arguments(actions):
     return {each.given[0]: each.named['default_value'] for each in actions if type(each).__name__ == 'DeclareLaunchArgument'}
 
 
-def test_every_input_and_only_known_parameters_are_arguments(described: Any) -> None:
+def test_every_input_and_only_known_parameters_are_arguments(described):
     names, actions = described('foc')
     declared = arguments(actions)
     assert set(TYPES) <= set(declared)
@@ -92,7 +95,7 @@ def test_every_input_and_only_known_parameters_are_arguments(described: Any) -> 
 
 
 @pytest.mark.parametrize('name', ['two_arms', 'foc_rviz'])
-def test_included_files_are_given_arguments_that_they_have(described: Any, name: str) -> None:
+def test_included_files_are_given_arguments_that_they_have(described, name):
     known = arguments(described('foc')[1])
     _, actions = described(name)
     included = [each for each in actions if type(each).__name__ == 'IncludeLaunchDescription']
@@ -102,7 +105,7 @@ def test_included_files_are_given_arguments_that_they_have(described: Any, name:
         assert {argument for argument, _ in each.named.get('launch_arguments', [])} <= set(known)
 
 
-def test_rviz_is_remapped_to_every_topic_of_its_configuration(described: Any) -> None:
+def test_rviz_is_remapped_to_every_topic_of_its_configuration(described):
     _, actions = described('foc_rviz')
     remapped = {source for source, _ in actions[-1].named['remappings']}
     lines = (ROOT / 'config' / 'foc.rviz').read_text('utf-8').splitlines()
@@ -110,7 +113,7 @@ def test_rviz_is_remapped_to_every_topic_of_its_configuration(described: Any) ->
 
 
 @pytest.fixture
-def prefix(tmp_path: Path) -> Path:
+def prefix(tmp_path):
     """Return a prefix in which the package is found as pip and colcon install it."""
     index = tmp_path / 'share' / 'ament_index' / 'resource_index' / 'packages'
     index.mkdir(parents=True)
@@ -121,7 +124,7 @@ def prefix(tmp_path: Path) -> Path:
 
 
 @contextmanager
-def launched(ros: Graph, prefix: Path, name: str, *given: str) -> Iterator[subprocess.Popen[str]]:
+def launched(ros, prefix, name, *given):
     environment = ros.environment | {
         'AMENT_PREFIX_PATH': os.pathsep.join([str(prefix), os.environ['AMENT_PREFIX_PATH']]),
         'PATH': os.pathsep.join([str(Path(sys.executable).parent), os.environ['PATH']]),
@@ -138,11 +141,11 @@ def launched(ros: Graph, prefix: Path, name: str, *given: str) -> Iterator[subpr
     assert 'process has finished cleanly' in output, output
 
 
-def names_of(node: Any) -> set[str]:
+def names_of(node):
     return {f'{namespace.rstrip("/")}/{name}' for name, namespace in node.get_node_names_and_namespaces()}
 
 
-def test_one_node_is_launched_with_its_topics_and_parameters(ros: Graph, prefix: Path) -> None:
+def test_one_node_is_launched_with_its_topics_and_parameters(ros, prefix):
     ros_helpers.require_ros()
     pytest.importorskip('launch_ros', reason='optional message package: launch_ros')
     from rcl_interfaces.srv import GetParameters
@@ -158,7 +161,7 @@ def test_one_node_is_launched_with_its_topics_and_parameters(ros: Graph, prefix:
         assert (values[0].string_value, values[1].double_value, values[2].bool_value) == ('xz', 50.0, True)
 
 
-def test_two_arms_share_the_obstacles(ros: Graph, prefix: Path) -> None:
+def test_two_arms_share_the_obstacles(ros, prefix):
     ros_helpers.require_ros()
     pytest.importorskip('launch_ros', reason='optional message package: launch_ros')
     watcher = ros.node('watcher')
@@ -166,3 +169,92 @@ def test_two_arms_share_the_obstacles(ros: Graph, prefix: Path) -> None:
         ros.spin_until(lambda: {'/left/foc', '/right/foc'} <= names_of(watcher), 'the nodes', 60.0)
         topics = {'/MTML/measured_cp': 1, '/MTMX/measured_cp': 1, '/obstacles': 2, '/left/goals': 1, '/right/goals': 1}
         ros.spin_until(lambda: {name: watcher.count_subscribers(name) for name in topics} == topics, 'the topics', 60.0)
+
+
+CONFIG = ROOT / 'config'
+TOPICS = {f'/{name}': kind for name, kind in TYPES.items()} | {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()}
+SHOWN = {
+    'MarkerArray': 'MarkerArray',
+    'PointCloud2': 'PointCloud2',
+    'Path': 'Path',
+    'Pose': 'PoseStamped',
+    'PoseArray': 'PoseArray',
+}
+
+
+def test_rviz_shows_every_output_it_can_display():
+    displays = yaml.safe_load((CONFIG / 'foc.rviz').read_text('utf-8'))['Visualization Manager']['Displays']
+    shown = {}
+    for display in displays:
+        if 'Topic' in display:
+            shown[display['Topic']['Value']] = SHOWN[display['Class'].split('/')[1]]
+    assert {'/foc/prediction', '/foc/path', '/foc/markers', '/hand_pose', '/goals'} == set(shown)
+    assert all(TOPICS[topic].endswith(f'/{kind}') for topic, kind in shown.items())
+    cloud = next(each for each in displays if each['Class'].endswith('/PointCloud2'))
+    assert cloud['Channel Name'] == 'likelihood'
+
+
+def leaves(layout):
+    if isinstance(layout, str):
+        yield layout
+    else:
+        for side in ('first', 'second'):
+            yield from leaves(layout[side])
+
+
+def test_foxglove_shows_topics_of_the_node_in_its_panels():
+    layout = json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
+    assert set(leaves(layout['layout'])) == set(layout['configById'])
+    scene = layout['configById']['3D!foc']
+    assert {'/foc/prediction', '/foc/path', '/foc/markers'} <= set(scene['topics']) <= set(TOPICS)
+    assert scene['topics']['/foc/prediction']['colorField'] == 'likelihood'
+    assert TOPICS[scene['publish']['poseTopic']] == 'geometry_msgs/msg/PoseStamped'
+    for i, line in enumerate(layout['configById']['Plot!likelihoods']['paths']):
+        assert line['value'] == f'/foc/likelihoods.data[{i * len(LIKELIHOOD_COLUMNS)}]'
+
+
+PERMISSIONS = ROOT / 'config' / 'sros2_policy.xml'
+
+
+def sparse(file, size):
+    with file.open('wb') as opened:
+        opened.truncate(size)
+    return file
+
+
+def test_a_document_larger_than_any_scene_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match='expected at most 5,000,000 bytes'):
+        read_document(sparse(tmp_path / 'large.yaml', documents.MAX_BYTES + 1))
+
+
+def test_a_table_larger_than_any_recording_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match='expected at most 1,000,000,000 bytes, got 1,000,000,001'):
+        next(tables.read_rows(sparse(tmp_path / 'large.csv', tables.MAX_BYTES + 1), ('t_s',)))
+
+
+def allowed(kind, action):
+    profile = ET.parse(PERMISSIONS).getroot().find(".//profile[@node='foc']")
+    groups = [each for each in profile.findall(kind) if each.get(action) == 'ALLOW']
+    return {each.text.strip() for group in groups for each in group}
+
+
+def test_the_permissions_are_those_that_the_node_needs(ros):
+    """The node needs all of them, and no others; the topic of a goal from its first prediction on."""
+    from foc_ros.ros.endpoints import MOST_GOAL_TOPICS
+    from foc_ros.ros.node import FocNode
+
+    node = ros.add(FocNode(context=ros.context))
+
+    def names(found):
+        return {name.replace('/foc/', '~/') if name.startswith('/foc/') else name.removeprefix('/') for name, _ in found}
+
+    goals = {f'~/goal_likelihood/goal{row}' for row in range(MOST_GOAL_TOPICS)}
+    published = names(node.get_publisher_names_and_types_by_node('foc', '/')) | goals
+    subscribed = names(node.get_subscriber_names_and_types_by_node('foc', '/'))
+    services = names(node.get_service_names_and_types_by_node('foc', '/'))
+    absolute = {'rosout', 'parameter_events', 'diagnostics', 'clock'}
+    assert allowed('topics', 'publish') == {f'/{name}' if name in absolute else name for name in published}
+    # the node subscribes to the clock if use_sim_time is set
+    assert allowed('topics', 'subscribe') - {'/clock'} == {f'/{name}' if name in absolute else name for name in subscribed}
+    assert allowed('services', 'reply') == services
+    assert allowed('services', 'request') == set()

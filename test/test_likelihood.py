@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Likelihoods: from ratios of costs, over the time until a choice, by the next row of obstacles, and of classes that miss eta."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -27,17 +25,17 @@ ANY_COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
 BETA = st.floats(0.0, 100.0)
 
 
-def with_beta(beta: float) -> LikelihoodConfig:
+def with_beta(beta):
     return LikelihoodConfig(beta=beta)
 
 
-def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs() -> None:
+def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs():
     p = compute_likelihoods(np.array([1.0, 4.0, 9.0]), with_beta(0.5))
     np.testing.assert_allclose(p, np.array([6.0, 3.0, 2.0]) / 11.0, rtol=1e-14)
 
 
 @given(ANY_COSTS, BETA)
-def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs: list[float], beta: float) -> None:
+def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs, beta):
     p = compute_likelihoods(np.array(costs), with_beta(beta))
     assert np.all((p >= 0.0) & (p <= 1.0))
     assert p.sum() == pytest.approx(1.0)
@@ -45,7 +43,7 @@ def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs: list[flo
 
 
 @pytest.mark.parametrize('wrong', [-1.0, np.nan, np.inf])
-def test_a_negative_or_infinite_cost_is_refused_by_name(wrong: float) -> None:
+def test_a_negative_or_infinite_cost_is_refused_by_name(wrong):
     with pytest.raises(InputError, match=r'costs\[1\]: expected a finite number >= 0'):
         compute_likelihoods(np.array([1.0, wrong]), with_beta(0.5))
 
@@ -53,16 +51,16 @@ def test_a_negative_or_infinite_cost_is_refused_by_name(wrong: float) -> None:
 THREE_COSTS = np.array([1.0, 2.0, 5.0])
 
 
-def make_config(lookahead_s: float) -> LikelihoodConfig:
+def make_config(lookahead_s):
     return LikelihoodConfig(beta=2.0, planning_horizon_s=0.0, lookahead_s=lookahead_s)
 
 
-def make_branch_times(after_s: float) -> BranchTimes:
+def make_branch_times(after_s):
     return BranchTimes(np.where(np.eye(3, dtype=bool), np.inf, after_s), np.arange(3))
 
 
 @pytest.mark.parametrize('after_s', [0.0, 0.3, 2.0])
-def test_the_exponent_of_a_choice_fades_with_the_time_until_the_choice(after_s: float) -> None:
+def test_the_exponent_of_a_choice_fades_with_the_time_until_the_choice(after_s):
     fading = LikelihoodConfig(beta=2.0 * np.exp(-after_s / 0.7))
     np.testing.assert_allclose(
         compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(after_s)),
@@ -72,7 +70,7 @@ def test_the_exponent_of_a_choice_fades_with_the_time_until_the_choice(after_s: 
 
 
 @pytest.mark.parametrize(('horizon_s', 'share'), [(1000.0, 0.0), (4.0, norm.cdf(-math.log(2.0) / 0.5)), (2.0, 0.5), (0.0, 1.0)])
-def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s: float, share: float) -> None:
+def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s, share):
     planned, ahead = (
         compute_likelihoods(THREE_COSTS, make_config(0.7)),
         compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(1.0)),
@@ -94,11 +92,11 @@ FIVE_COSTS = np.array([1.0, 2.0, 3.0, 2.5, 4.0])
 CONFIG = replace(LikelihoodConfig(), beta=2.0, planning_horizon_s=0.0, weaving=1.5)
 
 
-def make_hand(x: float) -> HandState:
+def make_hand(x):
     return HandState(0, np.array([x, 0.0, 0.3, 0.0, 0.0, 0.0]), np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 
 
-def test_the_next_row_is_the_first_open_one_ahead() -> None:
+def test_the_next_row_is_the_first_open_one_ahead():
     found = find_decisions(SIDES, GOAL, OBSTACLES, make_hand(0.0), GOALS)
     gap = found.next_gap
     assert gap[1] == gap[2] and len(set(gap.tolist())) == 4
@@ -108,21 +106,21 @@ def test_the_next_row_is_the_first_open_one_ahead() -> None:
     assert beyond.next_gap[0] != beyond.next_gap[4] and not beyond.woven.any()
 
 
-def test_gaps_keep_their_weight_and_share_it_evenly() -> None:
+def test_gaps_keep_their_weight_and_share_it_evenly():
     decisions = Decisions(np.array([0, 1, 1, 2, 3]), np.arange(5), np.zeros(5, dtype=np.intp))
     near, p = compute_likelihoods(FIVE_COSTS, CONFIG), compute_likelihoods(FIVE_COSTS, CONFIG, decisions=decisions)
     np.testing.assert_allclose(np.bincount(decisions.next_gap, p), np.bincount(decisions.next_gap, near))
     assert p[1] == pytest.approx(p[2])
 
 
-def test_goals_of_one_way_are_compared_in_full_and_share_its_weight_however_many_they_are() -> None:
+def test_goals_of_one_way_are_compared_in_full_and_share_its_weight_however_many_they_are():
     decisions = Decisions(np.zeros(5, dtype=np.intp), np.array([0, 0, 1, 1, 2]), np.zeros(5, dtype=np.intp))
     p = compute_likelihoods(FIVE_COSTS, CONFIG, decisions=decisions)
     assert p[0] / p[1] == pytest.approx((FIVE_COSTS[1] / FIVE_COSTS[0]) ** CONFIG.beta)
     np.testing.assert_allclose(np.bincount(decisions.way, p), np.full(3, 1.0 / 3.0))
 
 
-def test_weaving_costs_a_factor() -> None:
+def test_weaving_costs_a_factor():
     straight = Decisions(np.arange(5), np.arange(5), np.zeros(5, dtype=np.intp))
     p, woven = (
         compute_likelihoods(FIVE_COSTS, CONFIG, decisions=each) for each in (straight, straight._replace(woven=np.eye(5)[3]))

@@ -2,13 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bad input, silence, unfit endpoints and internal errors: the node reports them, publishes nothing wrong, and goes on."""
 
-from __future__ import annotations
-
 import math
 import re
-from collections.abc import Iterator
 from itertools import islice
-from typing import Any
 
 import ros_required  # noqa: F401
 import pytest
@@ -23,7 +19,7 @@ from rclpy.qos import (
     QoSProfile,
     qos_profile_sensor_data,
 )
-from ros_helpers import Graph, graph
+from ros_helpers import graph
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
@@ -64,17 +60,17 @@ BAD_INPUTS = {
 class Log:
     """A logger that stores its lines."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.lines: list[str] = []
 
-    def warning(self, line: str, **_: Any) -> None:
+    def warning(self, line, **_):
         self.lines.append(line)
 
     error = warning
 
 
 @pytest.fixture(scope='module')
-def working() -> Iterator[Bench]:
+def working():
     """Yield a node that predicts, for the tests of this module that change nothing; `poses` are those of its movement."""
     with graph() as created:
         bench = begin(created)
@@ -83,7 +79,7 @@ def working() -> Iterator[Bench]:
 
 
 @pytest.mark.parametrize('case', BAD_INPUTS)
-def test_bad_input_is_refused_with_its_reason_and_changes_nothing(working: Bench, case: str) -> None:
+def test_bad_input_is_refused_with_its_reason_and_changes_nothing(working, case):
     role, message, words = BAD_INPUTS[case]
     working.move(islice(working.poses, 2))
     log = working.node._loggers[role] = Log()
@@ -101,7 +97,7 @@ def test_bad_input_is_refused_with_its_reason_and_changes_nothing(working: Bench
     working.wait_for('prediction', count + 1)
 
 
-def test_bytes_that_are_no_message_are_dropped(working: Bench) -> None:
+def test_bytes_that_are_no_message_are_dropped(working):
     count = len(working.received['prediction'])
     for role in ('hand_pose', 'obstacles'):
         working.publishers[role].publish(b'\0\1\0\0junk')
@@ -111,7 +107,7 @@ def test_bytes_that_are_no_message_are_dropped(working: Bench) -> None:
     assert 'count internal_errors' not in figures(working.health())
 
 
-def test_dropped_rows_are_reported_and_the_newest_valid_scene_of_the_queue_is_used(ros: Graph) -> None:
+def test_dropped_rows_are_reported_and_the_newest_valid_scene_of_the_queue_is_used(ros):
     bench = Bench(ros)
     bench.deliver('obstacles', cloud(TYPES, obstacle_table([*ROWS, (NAN, 0, 0, 1)]), 10 * SECOND))
     status = bench.health()
@@ -128,7 +124,7 @@ def test_dropped_rows_are_reported_and_the_newest_valid_scene_of_the_queue_is_us
     assert figures(bench.health())['obstacles refused'] == '1 of 4', 'the two that were replaced are not taken'
 
 
-def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
+def test_a_scene_that_is_not_renewed_stops_predictions(ros):
     """And one stamp in the future is reported, after which valid poses continue the movement."""
     bench = begin(ros, scene__timeout_s=500.0, estimator__gap_s=60.0, rate_hz=0.1)
     bench.move(pose_stamped(TYPES, (0, 0, 0), (10 + 100 * i) * SECOND) for i in range(9))
@@ -139,7 +135,7 @@ def test_a_scene_that_is_not_renewed_stops_predictions(ros: Graph) -> None:
     assert stamps(bench.wait_for('prediction', 7))[-1] == 11 * SECOND
 
 
-def test_silent_sources_stop_predictions_until_they_are_received_or_removed(ros: Graph, clock: Any) -> None:
+def test_silent_sources_stop_predictions_until_they_are_received_or_removed(ros, clock):
     """Unstamped obstacles have no age, so only the silence of their source shows that it has stopped."""
     bench, poses = Bench(ros, scene__timeout_s=1.0), iter(hand_path(30))
     scene = cloud(TYPES, obstacle_table(ROWS), 0)
@@ -170,7 +166,7 @@ def test_silent_sources_stop_predictions_until_they_are_received_or_removed(ros:
     bench.wait_for('prediction', 3)
 
 
-def test_a_silent_hand_is_told_and_one_whose_poses_wait_is_not_silent(ros: Graph, clock: Any) -> None:
+def test_a_silent_hand_is_told_and_one_whose_poses_wait_is_not_silent(ros, clock):
     bench, (first, second) = begin(ros, estimator__hand_timeout_s=0.3), hand_path(2)
     bench.move([first])
     bench.wait_for('prediction', 1)
@@ -187,7 +183,7 @@ def test_a_silent_hand_is_told_and_one_whose_poses_wait_is_not_silent(ros: Graph
 
 
 @pytest.mark.parametrize('is_moving', [True, False])
-def test_stamps_that_repeat_are_no_silence(ros: Graph, clock: Any, is_moving: bool) -> None:
+def test_stamps_that_repeat_are_no_silence(ros, clock, is_moving):
     """As of a clock of whole seconds, and of a driver that repeats its last message."""
     bench = begin(ros, 2, estimator__hand_timeout_s=0.05)
     for i in range(1, 12):
@@ -199,7 +195,7 @@ def test_stamps_that_repeat_are_no_silence(ros: Graph, clock: Any, is_moving: bo
     assert 'stamps repeat: 11 of 13 poses have that of the pose before' in status.message
 
 
-def test_a_pose_without_data_is_a_lost_hand(ros: Graph, clock: Any) -> None:
+def test_a_pose_without_data_is_a_lost_hand(ros, clock):
     bench = begin(ros, 2, estimator__hand_timeout_s=0.05)
     for i in range(1, 12):
         lost = pose_stamped(TYPES, (0.0, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns + i * SECOND // 50)
@@ -211,7 +207,7 @@ def test_a_pose_without_data_is_a_lost_hand(ros: Graph, clock: Any) -> None:
     assert re.match(r'no prediction: no hand_pose could be used for .* the tracker has lost the hand', status.message)
 
 
-def test_a_hand_that_does_not_move_is_told(ros: Graph) -> None:
+def test_a_hand_that_does_not_move_is_told(ros):
     bench = begin(ros)
     bench.move(pose_stamped(TYPES, (0.01, 0.0, 0.0), 10 * SECOND + i * SECOND // 10) for i in range(15))
     bench.wait_for('prediction', 1)
@@ -219,7 +215,7 @@ def test_a_hand_that_does_not_move_is_told(ros: Graph) -> None:
     assert status.level == OK and status.message == 'predicting; the hand does not move: the same position for 1.4 s'
 
 
-def test_no_prediction_is_made_from_a_late_pose(ros: Graph) -> None:
+def test_no_prediction_is_made_from_a_late_pose(ros):
     bench = begin(ros, estimator__hand_timeout_s=5.0)
     now_s = bench.node.get_clock().now().nanoseconds / SECOND
     bench.move(hand_path(1, start_s=now_s))
@@ -231,10 +227,8 @@ def test_no_prediction_is_made_from_a_late_pose(ros: Graph) -> None:
 
 
 @pytest.mark.parametrize('where', ['begin', 'predict', 'encode_outputs'])
-def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(
-    ros: Graph, monkeypatch: pytest.MonkeyPatch, where: str
-) -> None:
-    def broken(*_: Any) -> None:
+def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(ros, monkeypatch, where):
+    def broken(*_):
         raise ZeroDivisionError('made for this test')
 
     bench, poses, log = begin(ros), hand_path(6), Log()
@@ -254,7 +248,7 @@ def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(
     assert bench.health().level != ERROR
 
 
-def test_quality_of_service_is_overridden_topic_by_topic(ros: Graph) -> None:
+def test_quality_of_service_is_overridden_topic_by_topic(ros):
     overrides = {
         'obstacles.subscription.depth': 3,
         'obstacle_markers.subscription.reliability': 'best_effort',
@@ -270,7 +264,7 @@ def test_quality_of_service_is_overridden_topic_by_topic(ros: Graph) -> None:
 
 
 @pytest.mark.parametrize('is_early', [True, False])
-def test_obstacles_are_heard_from_a_best_effort_publisher(ros: Graph, is_early: bool) -> None:
+def test_obstacles_are_heard_from_a_best_effort_publisher(ros, is_early):
     """Or, with another durability, those that were published once before the node was there."""
     latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
     perception, message = ros.node('perception'), cloud(TYPES, obstacle_table(ROWS), 10 * SECOND)
@@ -279,7 +273,7 @@ def test_obstacles_are_heard_from_a_best_effort_publisher(ros: Graph, is_early: 
     early = Parameter('qos_overrides./obstacles.subscription.durability', value='transient_local')
     node = ros.add(module.FocNode(context=ros.context, parameter_overrides=[early] if is_early else []))
 
-    def is_heard() -> bool:
+    def is_heard():
         if not is_early:
             publisher.publish(message)
         return 'cloud' in node.pipeline.scene.sources
@@ -288,7 +282,7 @@ def test_obstacles_are_heard_from_a_best_effort_publisher(ros: Graph, is_early: 
     assert len(node.pipeline.scene.obstacles(0)) == len(ROWS)
 
 
-def test_a_publisher_that_cannot_be_heard_is_named(ros: Graph) -> None:
+def test_a_publisher_that_cannot_be_heard_is_named(ros):
     bench, perception = Bench(ros, outputs=[]), ros.node('perception')
     silent = PublisherEventCallbacks(use_default_callbacks=False)
     publisher = perception.create_publisher(MarkerArray, 'obstacle_markers', qos_profile_sensor_data, event_callbacks=silent)
@@ -304,7 +298,7 @@ def test_a_publisher_that_cannot_be_heard_is_named(ros: Graph) -> None:
     assert bench.health().message == 'no prediction: no hand pose yet'
 
 
-def test_a_subscription_that_cannot_receive_an_output_is_named(ros: Graph) -> None:
+def test_a_subscription_that_cannot_receive_an_output_is_named(ros):
     bench = Bench(ros, outputs=[])
     ros.node('listener').create_subscription(Path, 'foc/path', lambda _: None, 1)
     policies = {

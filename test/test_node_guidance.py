@@ -2,14 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guidance of the node: its topics, its clutch, its diagnostics, and its rate while a prediction takes long."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import threading
 import time
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import ros_required  # noqa: F401
@@ -19,7 +15,6 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, Wrench, WrenchStamped
 from message_helpers import SECOND, pose_stamped
 from node_helpers import TYPES, Bench, figures
 from rclpy.parameter import Parameter
-from ros_helpers import Graph
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
 
@@ -33,7 +28,7 @@ GUIDED = {'guidance.enabled': True, 'guidance.clearance': 0.0, 'rate_hz': 25.0}
 LOAD_S = 0.03
 
 
-def bow(tick: int) -> tuple[float, float, float]:
+def bow(tick):
     """Return a hand that passes the obstacle on the left, a little to and fro, and comes back after 1.2 s, again and again."""
     t = 0.01 * tick
     return 0.1 * abs((t + 1.2) % 2.4 - 1.2), 0.03 * np.sin(5.0 * t), 0.1
@@ -42,7 +37,7 @@ def bow(tick: int) -> tuple[float, float, float]:
 class Guided(Bench):
     """A bench with the outputs of guidance, and a scene; `wrenches`: with the time at which each arrived [s]."""
 
-    def __init__(self, ros: Graph, **parameters: Any) -> None:
+    def __init__(self, ros, **parameters):
         super().__init__(ros, outputs=('prediction', 'markers'), **GUIDED | parameters)
         self.tick = 0
         self.wrenches: list[tuple[float, Any]] = []
@@ -56,10 +51,10 @@ class Guided(Bench):
         self.publish_scene()
 
     @property
-    def forces(self) -> np.ndarray:
+    def forces(self):
         return np.array([[each.wrench.force.x, each.wrench.force.y, each.wrench.force.z] for _, each in self.wrenches])
 
-    def drive(self, count: int) -> None:
+    def drive(self, count):
         """Move the hand on in real time, 100 poses a second."""
         due = time.monotonic()
         for _ in range(count):
@@ -70,19 +65,19 @@ class Guided(Bench):
             while time.monotonic() < due:
                 self.ros.executor.spin_once(timeout_sec=0.001)
 
-    def drive_until(self, condition: Callable[[], bool], what: str) -> None:
+    def drive_until(self, condition, what):
         """Move the hand on until a condition holds; fail after 20 s."""
         deadline = time.monotonic() + 20.0
         while not condition():
             assert time.monotonic() < deadline, f'waited 20 s for: {what}'
             self.drive(5)
 
-    def feel_force(self) -> None:
+    def feel_force(self):
         """Move the hand on until it feels a new force."""
         count = len(self.wrenches)
         self.drive_until(lambda: len(self.wrenches) > count and bool(self.forces[count:].any()), 'a force')
 
-    def answer(self, x: float, y: float, frame_id: str = 'world') -> Any:
+    def answer(self, x, y, frame_id='world'):
         """Return what the node makes of an operator's velocity command."""
         message = TwistStamped()
         message.header.frame_id = frame_id
@@ -94,17 +89,17 @@ class Guided(Bench):
         return self.guided['twist'][-1].twist
 
 
-def begin(ros: Graph, **parameters: Any) -> Guided:
+def begin(ros, **parameters):
     bench = Guided(ros, **parameters)
     bench.drive(60)
     bench.feel_force()
     return bench
 
 
-def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_guidance_updates_only_while_it_is_enabled(ros, monkeypatch):
     updates, update = [], guidance.GuidanceLoop.update
 
-    def count(self: guidance.GuidanceLoop, now_s: float) -> None:
+    def count(self, now_s):
         updates.append(now_s)
         update(self, now_s)
 
@@ -121,7 +116,7 @@ def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pyte
     bench.node.set_parameters([Parameter('guidance.enabled', value=False)])
     ros.spin_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
 
-    def is_over() -> bool:
+    def is_over():
         updates.clear()
         ros.spin_for(0.1)
         return not updates
@@ -131,7 +126,7 @@ def test_guidance_updates_only_while_it_is_enabled(ros: Graph, monkeypatch: pyte
     assert not updates
 
 
-def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
+def test_the_outputs_agree_with_each_other(ros):
     bench = begin(ros, **{'guidance.unstamped': True})
     bench.drive(40)
     wrench = bench.wrenches[-1][1]
@@ -151,13 +146,13 @@ def test_the_outputs_agree_with_each_other(ros: Graph) -> None:
     assert 0.0 <= float(values['agreement']) <= 1.0 and 0.0 < float(values['tank_J']) <= 0.5
 
 
-def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros: Graph) -> None:
+def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros):
     bench = begin(ros)
     bench.node._engage(SetBool.Request(data=False), SetBool.Response())
     # how long that takes is measured by scripts/stress.py rates
     bench.drive_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice')
 
-    def is_silent() -> bool:
+    def is_silent():
         before = len(bench.wrenches)
         bench.drive(20)
         return len(bench.wrenches) == before
@@ -176,7 +171,7 @@ def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros: Graph) -> N
     assert bench.node._guidance.loop._thread is None, 'the thread has ended'
 
 
-def test_a_silent_hand_is_released(ros: Graph) -> None:
+def test_a_silent_hand_is_released(ros):
     bench = begin(ros)
     ros.spin_until(lambda: figures(bench.health())['guidance'] == 'stale', 'the hand is stale')
     ros.spin_until(lambda: not bench.forces[-1].any(), 'the force is zero')
@@ -184,10 +179,10 @@ def test_a_silent_hand_is_released(ros: Graph) -> None:
     assert not bench.forces[-1].any()
 
 
-def test_commands_are_blended_and_pass_unchanged_without_guidance(ros: Graph) -> None:
+def test_commands_are_blended_and_pass_unchanged_without_guidance(ros):
     bench = begin(ros)
 
-    def is_blended() -> bool:
+    def is_blended():
         """Whether guidance turns a command now; it never makes it faster, nor changes what is not in the plane."""
         twist = bench.answer(0.0, 0.1)
         assert np.hypot(twist.linear.x, twist.linear.y) <= 0.1 + 1e-9
@@ -202,17 +197,17 @@ def test_commands_are_blended_and_pass_unchanged_without_guidance(ros: Graph) ->
     assert bench.answer(0.0, 0.1).linear.x == 0.0
 
 
-def test_neither_a_slow_prediction_nor_an_error_stops_guidance(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_neither_a_slow_prediction_nor_an_error_stops_guidance(ros, monkeypatch):
     """The prediction keeps the global lock for 30 ms; there are more forces than predictions."""
     run, guide, failures = pipelines.PredictionTask.run, guidance.guide, list[Exception]()
 
-    def run_slowly(task: pipelines.PredictionTask) -> Any:
+    def run_slowly(task):
         end = time.monotonic() + LOAD_S
         while time.monotonic() < end:
             sum(range(100))
         return run(task)
 
-    def fail_once(*arguments: object) -> Any:
+    def fail_once(*arguments):
         if failures:
             raise failures.pop()
         return guide(*arguments)
@@ -235,47 +230,20 @@ def test_neither_a_slow_prediction_nor_an_error_stops_guidance(ros: Graph, monke
 PRIORITY_CONFIG = Config().with_values({'guidance.enabled': True, 'guidance.realtime_priority': 7})
 
 
-def run_in_thread(function: Callable[[], Any]) -> Any:
-    """Return what a function returns in a thread of its own."""
-    with ThreadPoolExecutor(1) as threads:
-        return threads.submit(function).result(10.0)
-
-
-def get_policy() -> tuple[int, int]:
-    """Return policy and priority of this thread."""
-    return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getparam(0).sched_priority
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
+def wait_until(condition):
     end = time.monotonic() + 10.0
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.001)
 
 
-def make_loop(warn: Callable[[str], None] = lambda _: None) -> GuidanceLoop:
+def make_loop(warn=lambda _: None):
     return GuidanceLoop(PRIORITY_CONFIG, lambda *_: None, lambda _: None, warn)
 
 
-def test_the_priority_holds_for_the_thread_alone_and_can_be_given_back() -> None:
-    loop, ordinary = make_loop(), (os.SCHED_OTHER, 0)
-
-    def set_and_back() -> list[tuple[int, int]]:
-        loop._set_priority(7)
-        found = [get_policy(), run_in_thread(get_policy)]
-        loop._set_priority(0)
-        return [*found, get_policy()]
-
-    found = run_in_thread(set_and_back)
-    if found[0] == ordinary:
-        pytest.skip('this user may not set a real-time priority (rtprio)')
-    assert found == [(os.SCHED_FIFO, 7), ordinary, ordinary]
-    assert get_policy() == ordinary
-
-
 @pytest.mark.parametrize('error', [PermissionError(1, 'Operation not permitted'), AttributeError('not on this system')])
-def test_a_priority_that_is_not_permitted_is_told_once(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
-    def refuse(*_: object) -> None:
+def test_a_priority_that_is_not_permitted_is_told_once(monkeypatch, error):
+    def refuse(*_):
         raise error
 
     monkeypatch.setattr(os, 'sched_setscheduler', refuse)
@@ -288,14 +256,14 @@ def test_a_priority_that_is_not_permitted_is_told_once(monkeypatch: pytest.Monke
     assert all(word in told[0] for word in ('50', 'not permitted', 'rtprio', 'guidance.realtime_priority'))
 
 
-def test_the_thread_of_guidance_has_it_while_guidance_is_enabled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_thread_of_guidance_has_it_while_guidance_is_enabled(monkeypatch):
     asked: list[tuple[str, int]] = []
     monkeypatch.setattr(
         os, 'sched_setscheduler', lambda _, __, to: asked.append((threading.current_thread().name, to.sched_priority))
     )
     loop = make_loop()
 
-    def wait_for(*priorities: int) -> None:
+    def wait_for(*priorities):
         wait_until(lambda: asked == [('guidance', each) for each in priorities])
 
     loop.start()
@@ -309,11 +277,11 @@ def test_the_thread_of_guidance_has_it_while_guidance_is_enabled(monkeypatch: py
         loop.stop()
 
 
-def test_a_late_update_leaves_the_processor_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_late_update_leaves_the_processor_to_others(monkeypatch):
     """The thread has a priority before all others, so that it must sleep between updates that take longer than their period."""
     updates: list[tuple[float, float]] = []
 
-    def update_slowly(_: GuidanceLoop, now_s: float) -> None:
+    def update_slowly(_, now_s):
         time.sleep(0.02)  # four periods
         updates.append((now_s, time.monotonic()))
 

@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The managed node: it predicts only while it is active; clutch, reset and parameters take effect between two predictions."""
 
-from __future__ import annotations
-
 import math
 import threading
-from collections.abc import Iterator
 from typing import Any
 
 import ros_required  # noqa: F401
@@ -27,7 +24,7 @@ from node_helpers import (
     list_labels,
     stamps,
 )
-from ros_helpers import Graph, graph
+from ros_helpers import graph
 from std_srvs.srv import SetBool, Trigger
 
 from foc_ros.core import pipeline as computation
@@ -36,19 +33,19 @@ from foc_ros.core.deadline import Deadline
 from foc_ros.ros import endpoints, health
 
 
-def predicted(bench: Bench, poses: list[Any]) -> int:
+def predicted(bench, poses):
     """Return how many predictions are made from poses."""
     before = int(figures(bench.health()).get('count predictions', 0))
     bench.move(poses)
     return int(figures(bench.health()).get('count predictions', 0)) - before
 
 
-def told(bench: Bench) -> tuple[bytes, str]:
+def told(bench):
     status = bench.health()
     return status.level, status.message
 
 
-def test_a_managed_node_waits_for_configuration_and_activation(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_managed_node_waits_for_configuration_and_activation(ros, monkeypatch):
     """A manager asks for transitions by label or by number; a configuration that failed can be repeated."""
     bench = Bench(ros, outputs=[], connected=False, autostart=False)
     assert bench.state == 'unconfigured'
@@ -70,7 +67,7 @@ def test_a_managed_node_waits_for_configuration_and_activation(ros: Graph, monke
     assert bench.state == 'unconfigured'
 
 
-def test_clutch_and_deactivation_keep_the_scene_and_reset_forgets_the_movement(ros: Graph) -> None:
+def test_clutch_and_deactivation_keep_the_scene_and_reset_forgets_the_movement(ros):
     bench, poses = begin(ros), hand_path(30)
     engage = lambda data: bench.call(SetBool, 'engage', data=data)  # noqa: E731
     assert predicted(bench, poses[:4]) == 2
@@ -96,7 +93,7 @@ def test_clutch_and_deactivation_keep_the_scene_and_reset_forgets_the_movement(r
     assert stamps(bench.wait_for('prediction', 5))[-1] == round(9.9 * SECOND)
 
 
-def test_cleaning_up_forgets_all_but_the_parameters(ros: Graph) -> None:
+def test_cleaning_up_forgets_all_but_the_parameters(ros):
     bench = begin(ros, 2, outputs=[], foc__eta=0.7)
     bench.send('hand_pose', *hand_path(50))
     bench.send('obstacles', cloud(TYPES, obstacle_table(ROWS), 10 * SECOND))
@@ -113,7 +110,7 @@ def test_cleaning_up_forgets_all_but_the_parameters(ros: Graph) -> None:
     assert predicted(bench, hand_path(2)) == 1
 
 
-def test_an_impossible_transition_is_refused_by_an_answer(ros: Graph) -> None:
+def test_an_impossible_transition_is_refused_by_an_answer(ros):
     bench = begin(ros, outputs=[])
     for label in ('activate', 'cleanup', 'no such transition'):
         assert not bench.change(label)
@@ -127,7 +124,7 @@ def test_an_impossible_transition_is_refused_by_an_answer(ros: Graph) -> None:
     assert bench.health().message == 'finalized: nothing is predicted'
 
 
-def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) -> None:
+def test_parameters_change_together_and_without_a_missed_prediction(ros):
     bench, poses = begin(ros), hand_path(20)
     bench.move(poses[:10])
     assert bench.set(foc__eta=0.7, likelihood__beta=1, homotopy__max_candidates=1).successful
@@ -141,7 +138,7 @@ def test_parameters_change_together_and_without_a_missed_prediction(ros: Graph) 
 
 
 @pytest.fixture(scope='module')
-def unchanged() -> Iterator[Bench]:
+def unchanged():
     """Yield a node whose parameters no test changes."""
     with graph() as created:
         yield Bench(created, outputs=[])
@@ -159,7 +156,7 @@ def unchanged() -> Iterator[Bench]:
         ({'foc__strategy': None}, 'cannot be undeclared'),
     ],
 )
-def test_a_refused_value_changes_nothing_and_names_the_reason(unchanged: Bench, values: dict[str, Any], words: str) -> None:
+def test_a_refused_value_changes_nothing_and_names_the_reason(unchanged, values, words):
     before = unchanged.node.pipeline.config
     result = unchanged.set(rate_hz=25.0, **values)
     assert not result.successful
@@ -171,31 +168,31 @@ def test_a_refused_value_changes_nothing_and_names_the_reason(unchanged: Bench, 
 class Gate:
     """In place of `predict`: waits until it is opened, then predicts. Attributes: deadlines, of the calls."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.deadlines: list[Any] = []
         self._real, self._open = computation.predict, threading.Event()
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments):
         self.deadlines.append(next(each for each in arguments if isinstance(each, Deadline)))
         assert self._open.wait(60.0)
         return self._real(*arguments)
 
-    def open(self) -> None:
+    def open(self):
         self._open.set()
 
-    def close(self) -> None:
+    def close(self):
         self._open.clear()
 
 
 @pytest.fixture
-def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
+def gate(monkeypatch):
     made = Gate()
     monkeypatch.setattr(computation, 'predict', made)
     yield made
     made.open()
 
 
-def begin_to_predict(ros: Graph, gate: Gate, **options: Any) -> tuple[Bench, list[Any]]:
+def begin_to_predict(ros, gate, **options):
     """Return a bench whose node computes a prediction, and the poses after the one from which it does."""
     bench, (first, *others) = begin(ros, **options), hand_path(20)
     bench.send('hand_pose', first)
@@ -203,13 +200,13 @@ def begin_to_predict(ros: Graph, gate: Gate, **options: Any) -> tuple[Bench, lis
     return bench, others
 
 
-def end(bench: Bench, gate: Gate) -> None:
+def end(bench, gate):
     gate.open()
     bench.ros.spin_until(lambda: not bench.node.is_busy, 'the end of the prediction')
     bench.ros.spin_for(0.1)
 
 
-def test_services_and_diagnostics_answer_during_a_prediction(ros: Graph, gate: Gate, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_services_and_diagnostics_answer_during_a_prediction(ros, gate, monkeypatch):
     monkeypatch.setattr(health, 'BUSY_S', 0.0)
     bench, poses = begin_to_predict(ros, gate, estimator__hand_timeout_s=60.0)
     assert bench.call(SetBool, 'engage', data=True).success
@@ -223,7 +220,7 @@ def test_services_and_diagnostics_answer_during_a_prediction(ros: Graph, gate: G
     assert stamps(bench.wait_for('prediction', 2)) == expected, 'the next one is made from the newest pose'
 
 
-def test_a_prediction_that_is_too_old_at_its_end_is_withheld(ros: Graph, gate: Gate, clock: Any) -> None:
+def test_a_prediction_that_is_too_old_at_its_end_is_withheld(ros, gate, clock):
     bench, poses = begin_to_predict(ros, gate, estimator__hand_timeout_s=0.3)
     clock.now_s += 0.4
     bench.take('hand_pose', poses[0])
@@ -248,7 +245,7 @@ INTERRUPTIONS = {
 
 
 @pytest.mark.parametrize('name', INTERRUPTIONS)
-def test_nothing_that_was_computed_before_is_published_after(ros: Graph, gate: Gate, name: str) -> None:
+def test_nothing_that_was_computed_before_is_published_after(ros, gate, name):
     bench, _ = begin_to_predict(ros, gate)
     INTERRUPTIONS[name](bench)
     assert gate.deadlines[0].has_passed, 'the computation is asked to end'
@@ -257,7 +254,7 @@ def test_nothing_that_was_computed_before_is_published_after(ros: Graph, gate: G
     assert figures(bench.health())['count predict_abandoned'] == '1'
 
 
-def test_new_parameters_hold_from_the_next_prediction_on(ros: Graph, gate: Gate) -> None:
+def test_new_parameters_hold_from_the_next_prediction_on(ros, gate):
     bench, poses = begin_to_predict(ros, gate)
     bench.take('hand_pose', poses[0])
     assert bench.set(homotopy__max_candidates=1).successful
@@ -267,7 +264,7 @@ def test_new_parameters_hold_from_the_next_prediction_on(ros: Graph, gate: Gate)
     assert stamps(bench.received['prediction']) == stamps(poses[:1])
 
 
-def test_the_budget_is_the_deadline_of_a_live_prediction_and_so_is_the_end_of_the_node(ros: Graph, gate: Gate) -> None:
+def test_the_budget_is_the_deadline_of_a_live_prediction_and_so_is_the_end_of_the_node(ros, gate):
     bench, poses = begin_to_predict(ros, gate, budget_s=0.05)
     assert gate.deadlines[0].left_s < 0.05
     end(bench, gate)

@@ -2,11 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node publishes the predictions of a replay, to the last bit, when a bag's raw messages are sent over DDS."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 import ros_helpers
@@ -18,7 +13,6 @@ from bag_helpers import TYPES as BAG_TYPES  # noqa: E402
 from message_helpers import cloud, obstacle_table, pose_array  # noqa: E402
 from node_helpers import TYPES, Bench, figures  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
 
 from foc_ros.analysis.replay import Replay  # noqa: E402
 from foc_ros.core.classes.library import is_same_recording  # noqa: E402
@@ -26,13 +20,13 @@ from foc_ros.core.config import Config, flatten, replace_values  # noqa: E402
 from foc_ros.io.bags import BagReader  # noqa: E402
 from foc_ros.ros.messages.encode_prediction import encode_outputs  # noqa: E402
 
-SECONDS = 0.3
-LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 30, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
-LEARNING = {'experience.learning': 'online', 'foc.steps': 20, 'homotopy.max_candidates': 2}
+SECONDS = 0.2
+LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 20, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
+LEARNING = {'experience.learning': 'online', 'rate_hz': 10.0, 'foc.steps': 20, 'homotopy.max_candidates': 2}
 NO_LIMITS = {'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0, 'budget_s': 0.0}
 
 
-def messages_in_space() -> list[tuple[str, int, Any]]:
+def messages_in_space():
     """Return a reach that goes down to a goal, over a low obstacle and past one of any height."""
     columns = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'size_z')]
     scene = obstacle_table([(0.15, 0.0, 0.02, 0.03, 0.04), (0.2, 0.02, 0.0, 0.02, 0.0)], columns)
@@ -57,13 +51,13 @@ CASES = {
 """Parameters, and the messages of a recording."""
 
 
-def sent(message: Any) -> Any:
+def sent(message):
     """Return the message after serialisation, with its float32 fields rounded."""
     return deserialize_message(serialize_message(message), type(message))
 
 
 @pytest.mark.parametrize('case', CASES)
-def test_the_node_publishes_what_replay_computes(ros: Graph, tmp_path: Path, case: str) -> None:
+def test_the_node_publishes_what_replay_computes(ros, tmp_path, case):
     config, make_messages = CASES[case]
     config = replace_values(config, NO_LIMITS)
     bench, replay, expected = Bench(ros, **flatten(config)), Replay(config), []

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Outputs of the node: their content, their time, and their agreement with the pipeline."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import ros_required  # noqa: F401
@@ -26,7 +23,6 @@ from node_helpers import (
     stamps,
 )
 from process_helpers import Player, ended, parameters, running
-from ros_helpers import Graph
 from std_msgs.msg import Float64
 
 from foc_ros.ros import health, node
@@ -34,7 +30,7 @@ from foc_ros.ros.endpoints import MOST_GOAL_TOPICS
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 
-def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros: Graph) -> None:
+def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros):
     bench, (first, *poses) = Bench(ros), hand_path(3)
     assert 'no hand pose yet' in bench.health().message
     bench.move([first])
@@ -52,9 +48,7 @@ def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_rep
 
 
 @pytest.mark.parametrize('is_fresh', [True, False])
-def test_an_overloaded_node_predicts_from_the_newest_pose_and_counts_the_others(
-    ros: Graph, monkeypatch: pytest.MonkeyPatch, is_fresh: bool
-) -> None:
+def test_an_overloaded_node_predicts_from_the_newest_pose_and_counts_the_others(ros, monkeypatch, is_fresh):
     """Dropped cycles are counted; they are reported as a fault only if the predictions are not fresh."""
     monkeypatch.setattr(health, 'BUSY_S', 60.0 if is_fresh else 0.0)
     bench, poses = begin(ros, 1), hand_path(41)
@@ -70,7 +64,7 @@ def test_an_overloaded_node_predicts_from_the_newest_pose_and_counts_the_others(
     assert int(values['count predictions']) == 2
 
 
-def test_a_looping_bag_restarts_the_movement(ros: Graph) -> None:
+def test_a_looping_bag_restarts_the_movement(ros):
     bench, poses = begin(ros), hand_path(8, rate_hz=10.0)
     for turn in range(2):
         bench.move(poses)
@@ -83,7 +77,7 @@ def test_a_looping_bag_restarts_the_movement(ros: Graph) -> None:
     assert status.level == OK, status.message
 
 
-def test_only_subscribed_outputs_are_encoded(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_subscribed_outputs_are_encoded(ros, monkeypatch):
     asked: list[list[str]] = []
     monkeypatch.setattr(node, 'encode_outputs', lambda *args: asked.append(list(args[-1])) or encode_outputs(*args))
     bench = begin(ros, 1, outputs=['likelihoods'])
@@ -91,7 +85,7 @@ def test_only_subscribed_outputs_are_encoded(ros: Graph, monkeypatch: pytest.Mon
     assert asked == [['likelihoods']]
 
 
-def test_diagnostics_contain_rates_ages_times_and_candidates(ros: Graph) -> None:
+def test_diagnostics_contain_rates_ages_times_and_candidates(ros):
     bench = begin(ros, 10)
     bench.wait_for('prediction', 5)
     status = bench.health()
@@ -109,7 +103,7 @@ def test_diagnostics_contain_rates_ages_times_and_candidates(ros: Graph) -> None
     assert likelihoods.sum() == pytest.approx(1.0)
 
 
-def test_diagnostics_are_published_once_a_second_even_while_simulated_time_stands_still(ros: Graph) -> None:
+def test_diagnostics_are_published_once_a_second_even_while_simulated_time_stands_still(ros):
     bench = Bench(ros, outputs=[], ticking=True, use_sim_time=True)
     assert 10**9 in [timer.timer_period_ns for timer in bench.node.timers]
     ros.spin_until(lambda: len(bench.diagnostics) >= 2, 'diagnostics')
@@ -121,13 +115,13 @@ def test_diagnostics_are_published_once_a_second_even_while_simulated_time_stand
 PREFIX = '/foc/goal_likelihood/'
 
 
-def list_goal_topics(bench: Bench) -> list[str]:
+def list_goal_topics(bench):
     own = bench.node.get_name(), bench.node.get_namespace()
     found = bench.node.get_publisher_names_and_types_by_node(*own)
     return sorted(name.removeprefix(PREFIX) for name, _ in found if name.startswith(PREFIX))
 
 
-def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros: Graph) -> None:
+def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros):
     bench = Bench(ros, outputs=('likelihoods', 'likelihoods_by_name'))
     assert not list_goal_topics(bench), 'no goal yet'
     heard = [ros.collect(bench.player, Float64, f'foc/goal_likelihood/goal{row}') for row in range(2)]
@@ -162,8 +156,8 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros: Graph) -> None:
     bench.deliver('goals', pose_array(TYPES, [(0.3, 0.01 * row, 0.1) for row in range(MOST_GOAL_TOPICS + 2)]))
     count = len(bench.received['likelihoods_by_name'])
     bench.move([next(poses) for _ in range(4)])
-    assert len(list_goal_topics(bench)) == MOST_GOAL_TOPICS
     goals, _ = bench.wait_for('likelihoods_by_name', count + 1)[-1].status
+    assert len(list_goal_topics(bench)) == MOST_GOAL_TOPICS
     assert len({each.key for each in goals.values} - {'unknown', 'other'}) == MOST_GOAL_TOPICS + 2
     bench.change('deactivate', 'cleanup')
     assert not list_goal_topics(bench)
@@ -176,7 +170,7 @@ UNTIMED = 'budget_s:=0.0'
 
 
 @pytest.fixture
-def player(ros: Graph) -> Iterator[Player]:
+def player(ros):
     """Yield the player of a node that knows the scene, and stop the node; its text on standard error is `errors`."""
     made = Player(ros)
     with running(ros, *parameters(*LIGHT, *RELIABLE, UNTIMED)) as process:
@@ -187,7 +181,7 @@ def player(ros: Graph) -> Iterator[Player]:
         yield made
 
 
-def check(player: Player, least: int) -> None:
+def check(player, least):
     """Stop the node, and check that it took every pose, predicted often enough, and complained of nothing."""
     player.ros.spin_until(lambda: player.figure('hand_pose refused') == f'0 of {player.sent}', 'all poses in the diagnostics')
     assert player.stop()[0] == 0
@@ -201,7 +195,7 @@ def check(player: Player, least: int) -> None:
     assert [each.message for each in told if not re.fullmatch(r'predicting|hand_superseded \d+', each.message)] == []
 
 
-def test_ten_thousand_obstacles_at_50_hz(player: Player) -> None:
+def test_ten_thousand_obstacles_at_50_hz(player):
     """Every pose is received, predictions are made from the newest, and the level is OK."""
     flood = cloud(TYPES, obstacle_table(CROWD), 10 * SECOND)
     player.play_in_time(3.0, 100.0, lambda i: i % 2 or player.publishers['obstacles'].publish(flood))
@@ -211,13 +205,13 @@ def test_ten_thousand_obstacles_at_50_hz(player: Player) -> None:
     assert int(player.figure('note culled') or 0) > 9000
 
 
-def test_poses_at_1_khz(player: Player) -> None:
+def test_poses_at_1_khz(player):
     player.play_in_time(2.0, 1000.0)
     assert player.sent == 2000
     check(player, 15)
 
 
-def test_bad_poses_at_1_khz_write_few_lines_to_the_log(player: Player) -> None:
+def test_bad_poses_at_1_khz_write_few_lines_to_the_log(player):
     nowhere: Any = pose_stamped(TYPES, (float('nan'), 0.0, 0.0), 10 * SECOND)
     player.play_in_time(2.0, 0.0, lambda _: [player.publishers['hand_pose'].publish(nowhere) for _ in range(10)])
     player.ros.spin_until(lambda: player.figure('hand_pose refused') == '2000 of 2000', 'all poses in the diagnostics')

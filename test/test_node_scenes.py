@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Extreme scenes and faults of a robot cell: the outputs of a running node and the level of its diagnostics."""
 
-from __future__ import annotations
-
 import math
 import resource
 import signal
@@ -32,7 +30,6 @@ from node_helpers import (
     list_labels,
     stamps,
 )
-from ros_helpers import Graph
 from rosgraph_msgs.msg import Clock
 
 from foc_ros.core.config import Config
@@ -71,7 +68,7 @@ CASES = {
 
 
 @pytest.mark.parametrize('name', CASES)
-def test_the_outputs_and_the_level_of_an_extreme_scene(ros: Graph, name: str) -> None:
+def test_the_outputs_and_the_level_of_an_extreme_scene(ros, name):
     case = CASES[name]
     bench = Bench(ros, **case.parameters)
     bench.publish_scene(case.rows, case.goals)
@@ -98,7 +95,7 @@ def test_the_outputs_and_the_level_of_an_extreme_scene(ros: Graph, name: str) ->
     assert (rows[:, 3] >= bench.node.pipeline.config.foc.eta - 1e-5).sum() >= len(solved)
 
 
-def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros: Graph) -> None:
+def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros):
     """Three messages of many markers for each pose: every pose is received, and predictions continue."""
     kept = enumerate(CROWD[:400])
     flood = marker_array(TYPES, *[marker(TYPES, row[:3], (0.008,) * 3, id=i, stamp_ns=10 * SECOND) for i, row in kept])
@@ -114,7 +111,7 @@ def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros: Graph) -> None:
     assert int(values['note culled']) > 300
 
 
-def test_goals_and_frames_that_change_with_every_pose(ros: Graph) -> None:
+def test_goals_and_frames_that_change_with_every_pose(ros):
     bench, poses = begin(ros), hand_path(20)
     for i, pose in enumerate(poses):
         bench.deliver('goals', pose_array(TYPES, [(0.3, 0.02 * (j - i % 3), 0.0) for j in range(1 + i % 3)]))
@@ -135,12 +132,12 @@ def test_goals_and_frames_that_change_with_every_pose(ros: Graph) -> None:
     assert len(bench.received['prediction']) == 14
 
 
-def test_a_clock_that_jumps_forward_and_back(ros: Graph) -> None:
+def test_a_clock_that_jumps_forward_and_back(ros):
     """A simulation is restarted twice: predictions are made from poses stamped with its time only."""
     bench = begin(ros, outputs=['prediction'], use_sim_time=True, estimator__hand_timeout_s=60.0)
     clock = bench.player.create_publisher(Clock, '/clock', 10)
 
-    def now(seconds: float) -> None:
+    def now(seconds):
         message = Clock(clock=pose_stamped(TYPES, (0, 0, 0), round(seconds * SECOND)).header.stamp)
         clock.publish(message)
         ros.spin_until(lambda: bench.node.get_clock().now().nanoseconds == round(seconds * SECOND), f'clock at {seconds} s')
@@ -159,7 +156,7 @@ def test_a_clock_that_jumps_forward_and_back(ros: Graph) -> None:
     assert 'the hand pose is 290 s older than the time of the node' in status.message
 
 
-def test_several_nodes_of_one_process_are_independent(ros: Graph) -> None:
+def test_several_nodes_of_one_process_are_independent(ros):
     benches = [Bench(ros, namespace=name, outputs=['prediction']) for name in ('left', 'right', 'third')]
     for i, bench in enumerate(benches):
         bench.publish_scene(rows=ROWS[:1] * (i > 0))
@@ -173,7 +170,7 @@ def test_several_nodes_of_one_process_are_independent(ros: Graph) -> None:
         assert (status.level, figures(status)['obstacles of cloud']) == (OK, str(int(i > 0)))
 
 
-def test_a_disk_that_is_full_ends_the_output_bag_in_one_line(tmp_path: Path) -> None:
+def test_a_disk_that_is_full_ends_the_output_bag_in_one_line(tmp_path):
     bag = write_bag(tmp_path / 'reach')
     command = [sys.executable, '-m', 'foc_ros', 'replay', str(bag), '--output', str(tmp_path / 'out')]
     result = subprocess.run(
@@ -196,9 +193,7 @@ def test_a_disk_that_is_full_ends_the_output_bag_in_one_line(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(('name', 'strategy'), [('64 on the hand', 'lv'), ('N = 400', 'hc'), ('64 goals x 64', 'lv')])
-def test_the_node_keeps_its_promises_in_a_hostile_scene(
-    ros: Graph, monkeypatch: pytest.MonkeyPatch, name: str, strategy: str
-) -> None:
+def test_the_node_keeps_its_promises_in_a_hostile_scene(ros, monkeypatch, name, strategy):
     """The script `stress.py` judges times too; a machine that runs other tests meanwhile cannot."""
     monkeypatch.syspath_prepend(ROOT / 'scripts')
     monkeypatch.setenv('ROS_DOMAIN_ID', str(ros.domain))

@@ -6,13 +6,10 @@ the path that the hand takes rises.
 `python test/test_notebook.py` stores the outputs anew.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -26,7 +23,7 @@ CELL_S = 280
 """Time limit of a cell: seconds, and minutes on a busy machine."""
 
 
-def execute(folder: Path, *more: str) -> Any:
+def execute(folder, *more):
     """Return the notebook with the outputs of its cells, and of cells that are appended, run in a folder."""
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     notebook.cells += [nbformat.v4.new_code_cell(source) for source in more]
@@ -35,7 +32,7 @@ def execute(folder: Path, *more: str) -> Any:
     return notebook
 
 
-def list_outputs(notebook: Any) -> list[str]:
+def list_outputs(notebook):
     """Return the text of each output, and the type of each picture."""
     outputs = [output for cell in notebook.cells for output in cell.get('outputs', ())]
     assert not [output for output in outputs if output['output_type'] == 'error' or output.get('name') == 'stderr']
@@ -46,7 +43,7 @@ def list_outputs(notebook: Any) -> list[str]:
 
 
 @pytest.mark.timeout(2 * CELL_S)
-def test_the_notebook_runs_and_keeps_its_outputs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_notebook_runs_and_keeps_its_outputs(monkeypatch, tmp_path):
     for name in ('IPYTHONDIR', 'JUPYTER_RUNTIME_DIR', 'MPLCONFIGDIR'):
         monkeypatch.setenv(name, str(tmp_path / name))
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join([str(NOTEBOOK.parents[1]), os.environ.get('PYTHONPATH', '')]))
@@ -58,7 +55,7 @@ def test_the_notebook_runs_and_keeps_its_outputs(monkeypatch: pytest.MonkeyPatch
     assert last > max(first, 0.9)
 
 
-def store() -> None:
+def store():
     """Write the notebook with its outputs, without what differs from one machine to the next."""
     notebook = execute(NOTEBOOK.parent)
     notebook.metadata.language_info = {'name': 'python'}

@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One driver: the library, a replay, the node's intake and the page predict the same, bit for bit, and all of them learn."""
 
-from __future__ import annotations
-
 import pickle
-from pathlib import Path
 from threading import Event
 
 import numpy as np
@@ -24,14 +21,14 @@ from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 
 CONFIG = replace_values(
-    Config(), {'rate_hz': 1000.0, 'budget_s': 0.0, 'foc.steps': 15, 'homotopy.max_candidates': 4, 'experience.learning': 'online'}
+    Config(), {'rate_hz': 1000.0, 'budget_s': 0.0, 'foc.steps': 10, 'homotopy.max_candidates': 3, 'experience.learning': 'online'}
 )
 PERIOD_S, SLOW_S, JUMP = 0.1, 2.2, 12
 SCENE = [(0.15, 0.01, 0.0, 0.03, 0.002, 7), (0.22, -0.04, 0.0, 0.02, 0.001, 9)]
 GOAL = [(0.3, 0.0, 0.0), (0.3, 0.08, 0.0)]
 
 
-def positions() -> list[tuple[int, np.ndarray]]:
+def positions():
     """Return stamps and positions of two slow reaches with a rest at both ends, and a jump of the tracker on the way."""
     found = []
     for number in range(2):
@@ -46,7 +43,7 @@ def positions() -> list[tuple[int, np.ndarray]]:
 
 
 @pytest.fixture(scope='module')
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bag(tmp_path_factory):
     items = [
         ('/obstacles', START_NS, encode_obstacles(TYPES, START_NS, FRAME, SCENE)),
         ('/goals', START_NS, encode_goals(TYPES, START_NS, FRAME, np.array(GOAL))),
@@ -56,14 +53,14 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope='module')
-def replayed(bag: Path) -> tuple[list[Prediction], Pipeline]:
+def replayed(bag):
     replay = Replay(replace_values(CONFIG, {'scene.timeout_s': 0.0}))
     with BagReader(bag) as reader:
         made = [each.prediction for each in replay.steps(reader) if each.prediction is not None]
     return made, replay.pipeline
 
 
-def strip(prediction: Prediction) -> bytes:
+def strip(prediction):
     """Return all of a prediction but wall times, and the name of its frame, as bytes."""
     solutions = [{**vars(each.solution), 'solve_s': 0.0} for each in prediction.candidates]
     others = [(each.label, each.likelihood, each.cost, each.age_s, each.way) for each in prediction.candidates]
@@ -73,7 +70,7 @@ def strip(prediction: Prediction) -> bytes:
     )
 
 
-def test_all_samples_but_the_jump_are_predicted_and_the_operator_is_learnt(replayed: tuple[list[Prediction], Pipeline]) -> None:
+def test_all_samples_but_the_jump_are_predicted_and_the_operator_is_learnt(replayed):
     made, pipeline = replayed
     assert len(made) == len(positions()) - 1
     learnt = pipeline.learnt
@@ -81,7 +78,7 @@ def test_all_samples_but_the_jump_are_predicted_and_the_operator_is_learnt(repla
     assert pipeline.adapted_config.duration.fitts_b_s > 1.1 * CONFIG.duration.fitts_b_s
 
 
-def test_the_library_predicts_what_a_replay_does(bag: Path, replayed: tuple[list[Prediction], Pipeline]) -> None:
+def test_the_library_predicts_what_a_replay_does(bag, replayed):
     with BagReader(bag) as reader:
         scene = next(each.scene for each in Replay(CONFIG).steps(reader) if each.prediction is not None)
     predictor = foc_ros.Predictor(replace_values(CONFIG, {'frame_id': FRAME}))
@@ -99,7 +96,7 @@ def test_the_library_predicts_what_a_replay_does(bag: Path, replayed: tuple[list
     assert predictor.adapted_config.duration == replayed[1].adapted_config.duration
 
 
-def test_the_intake_of_the_node_predicts_what_a_replay_does(bag: Path, replayed: tuple[list[Prediction], Pipeline]) -> None:
+def test_the_intake_of_the_node_predicts_what_a_replay_does(bag, replayed):
     intake, made = Intake(Pipeline(replace_values(CONFIG, {'scene.timeout_s': 0.0}))), []
     with BagReader(bag) as reader:
         for item in reader:
@@ -113,12 +110,12 @@ def test_the_intake_of_the_node_predicts_what_a_replay_does(bag: Path, replayed:
     assert [strip(each) for each in made] == [strip(each) for each in replayed[0]]
 
 
-def test_the_page_predicts_what_a_replay_does(bag: Path, replayed: tuple[list[Prediction], Pipeline]) -> None:
+def test_the_page_predicts_what_a_replay_does(bag, replayed):
     from foc_ros.play.predictor import Predictor
 
     received, arrived = list[Prediction](), Event()
 
-    def receive(outcome: object) -> None:
+    def receive(outcome):
         if isinstance(outcome, Prediction):
             received.append(outcome)
             arrived.set()

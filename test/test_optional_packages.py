@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node needs what `package.xml` names and nothing else; whatever needs more says in one sentence what is missing."""
 
-from __future__ import annotations
-
 import ast
+import json
 import os
 import re
 import signal
@@ -15,26 +14,32 @@ from pathlib import Path
 
 import pytest
 import ros_helpers
-from ros_helpers import Graph
 
 ROOT = Path(__file__).parents[1]
 OPTIONAL = ('cyclopts', 'distributed', 'jinja2', 'joblib', 'matplotlib', 'mcap', 'pydantic', 'rich', 'rosbags', 'tornado')
 """Packages that are blocked below: as where only package.xml was installed."""
-BLOCK = f"""
-import sys
+ROS = ('rclpy', 'ament_index_python', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', '*_msgs')
+BLOCK = """
+import importlib.util, sys
+from fnmatch import fnmatchcase
 
 class Blocker:
+    names = {names!r}
+
+    def blocks(self, name):
+        return any(fnmatchcase(name.partition('.')[0], each) for each in self.names)
+
     def find_spec(self, name, path=None, target=None):
-        if name.partition('.')[0] in {OPTIONAL!r}:
+        if self.blocks(name):
             raise ModuleNotFoundError(f'{{name}} is blocked', name=name.partition('.')[0])
 
-sys.meta_path.insert(0, Blocker())
-import importlib.util
-find, importlib.util.find_spec = importlib.util.find_spec, lambda name: None if name in {OPTIONAL!r} else find(name)
+blocker = Blocker()
+sys.meta_path.insert(0, blocker)
+find, importlib.util.find_spec = importlib.util.find_spec, lambda name: None if blocker.blocks(name) else find(name)
 """
 
 
-def read_requirements() -> dict[str, set[str]]:
+def read_requirements():
     """Return the names of what setup.py requires: `''` for all, otherwise by extra, in small letters."""
     setup = ast.parse((ROOT / 'setup.py').read_text('utf-8'))
     constants = {node.targets[0].id: node.value for node in setup.body if isinstance(node, ast.Assign)}
@@ -43,7 +48,7 @@ def read_requirements() -> dict[str, set[str]]:
     lists = {'': given['install_requires']}
     lists |= {key.value: value for key, value in zip(given['extras_require'].keys, given['extras_require'].values, strict=True)}
 
-    def read(node: ast.expr) -> set[str]:
+    def read(node):
         if isinstance(node, ast.Name):
             return read(constants[node.id])
         if isinstance(node, ast.Starred):
@@ -55,56 +60,40 @@ def read_requirements() -> dict[str, set[str]]:
     return {extra: read(value) for extra, value in lists.items()}
 
 
-def list_keys() -> set[str]:
+def list_keys():
     """Return the keys of package.xml for Python packages as names of the package index."""
     keys = {node.text for node in ET.parse(ROOT / 'package.xml').getroot().findall('exec_depend')}
     names = {key.removeprefix('python3-').removesuffix('-pip') for key in keys if key.startswith('python3-')}
     return {name.replace('yaml', 'pyyaml') for name in names}
 
 
-def test_package_xml_and_the_optional_packages_are_all_requirements() -> None:
+def test_package_xml_and_the_optional_packages_are_all_requirements():
     required = read_requirements()
     assert list_keys() == {'numpy', 'piqp', 'pyyaml', 'qpsolvers', 'scipy'}
     assert not list_keys() & set(OPTIONAL)
     assert required[''] | required['report'] | required['play'] | required['cluster'] == list_keys() | set(OPTIONAL)
 
 
-def test_only_the_solvers_have_keys_of_pip() -> None:
+def test_only_the_solvers_have_keys_of_pip():
     """A release on the build farm, which installs nothing by pip, lacks these two and nothing else."""
     keys = {node.text for node in ET.parse(ROOT / 'package.xml').getroot() if node.tag.endswith('depend')}
     assert {key for key in keys if key.endswith('-pip')} == {'python3-piqp-pip', 'python3-qpsolvers-pip'}
 
 
-def run(program: str) -> subprocess.CompletedProcess[str]:
-    """Run a program in a Python without the optional packages."""
-    return subprocess.run([sys.executable, '-c', BLOCK + program], capture_output=True, text=True, timeout=100, check=False)
+def run(program, names=OPTIONAL):
+    """Run a program in a Python in which packages cannot be imported."""
+    command = [sys.executable, '-c', BLOCK.format(names=names) + program]
+    return subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
 
 
-def test_the_blocked_packages_cannot_be_imported() -> None:
-    tries = ''.join(f'try:\n    import {name}\nexcept ModuleNotFoundError as error:\n    print(error)\n' for name in OPTIONAL)
-    assert run(tries).stdout.splitlines() == [f'{name} is blocked' for name in OPTIONAL]
-
-
-def test_a_command_names_the_packages_that_it_needs() -> None:
+def test_a_command_names_the_packages_that_it_needs():
     result = run("from foc_ros.__main__ import main\nsys.exit(main(['solve', 'scene.yaml']))")
     assert result.returncode == 2
     names = 'cyclopts joblib mcap pydantic rich rosbags'
     assert result.stderr == f'foc_ros: this command needs packages that are not installed: pip install {names}\n'
 
 
-def test_a_recording_and_a_picture_name_the_packages_that_they_need() -> None:
-    programs = {
-        "list(foc_ros.replay('x.mcap'))": 'pip install mcap rosbags',
-        'foc_ros.solve((0.0, 0.0), (0.3, 0.0)).plot()': "pip install 'foc_ros[report]'",
-    }
-    for program, words in programs.items():
-        result = run(f'import foc_ros\ntry:\n    {program}\nexcept foc_ros.FocError as error:\n    print(error)')
-        assert result.returncode == 0, result.stderr
-        assert len(result.stdout.splitlines()) == 1
-        assert words in result.stdout
-
-
-def test_predictions_and_guidance_work_without_them() -> None:
+def test_predictions_and_guidance_work_without_them_and_what_needs_them_says_so():
     program = """
 import foc_ros
 predictor = foc_ros.Predictor(foc_ros.Config())
@@ -115,19 +104,49 @@ for tick in range(31):
     prediction = predictor.update(t=t, position=(t**3, 0.1 * t**2))
 print(len(prediction.candidates))
 foc_ros.Guidance(foc_ros.Config())
+for use in (lambda: list(foc_ros.replay('x.mcap')), foc_ros.solve((0.0, 0.0), (0.3, 0.0)).plot):
+    try:
+        use()
+    except foc_ros.FocError as error:
+        print(error)
+for name in OPTIONAL:
+    try:
+        __import__(name)
+    except ModuleNotFoundError as error:
+        print(error)
 """
-    result = run(program)
+    result = run(f'OPTIONAL = {OPTIONAL!r}{program}')
     assert result.returncode == 0, result.stderr
-    assert int(result.stdout) == 2
+    count, replay, plot, *blocked = result.stdout.splitlines()
+    assert count == '2' and 'pip install mcap rosbags' in replay and "pip install 'foc_ros[report]'" in plot
+    assert blocked == [f'{name} is blocked' for name in OPTIONAL]
+
+
+def test_the_core_needs_neither_ros_nor_rosbags_and_a_replay_no_ros(tmp_path):
+    (tmp_path / 'slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 0.5, foc.steps: 10}}', 'utf-8')
+    program = f"""
+import importlib, pkgutil
+import foc_ros.core
+for module in pkgutil.walk_packages(foc_ros.core.__path__, 'foc_ros.core.'):
+    importlib.import_module(module.name)
+assert 'foc_ros.core.predict' in sys.modules
+blocker.names = {ROS!r}
+from foc_ros.cli.main import main
+arguments = ['replay', 'foc_ros/recordings/reaching.mcap', '--json', '--params', {str(tmp_path / 'slow.yaml')!r}]
+sys.exit(main(arguments))
+"""
+    result = run(program, ROS + OPTIONAL)
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)['summary']['predictions'] >= 10
 
 
 @pytest.mark.parametrize('name', ['foc_node', 'node'])
-def test_the_node_predicts_without_them(ros: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_the_node_predicts_without_them(ros, tmp_path, monkeypatch, name):
     """Started as by `ros2 run` and `ros2 launch`, by a file in `lib/foc_ros`."""
     ros_helpers.require_ros()
     from process_helpers import ended, predict_once, running
 
-    (tmp_path / 'sitecustomize.py').write_text(BLOCK)
+    (tmp_path / 'sitecustomize.py').write_text(BLOCK.format(names=OPTIONAL))
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join([str(tmp_path), str(ROOT)]), prepend=os.pathsep)
     command = [sys.executable, str(ROOT / 'scripts' / 'ros2_run' / name)]
     with running(ros, command=command) as process:

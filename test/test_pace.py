@@ -2,9 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Expected durations follow the operator's movements: causally, equally for equal input, and until a reset."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +17,7 @@ from foc_ros.core.learning.pace import Pace
 from foc_ros.core.learning.recordings import PRIOR_COUNT
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.prediction import PredictedCandidate
 from foc_ros.core.solution import Candidate, Solution, Status
 from foc_ros.core.types import NANOSECONDS, HandSample, HandState
 from foc_ros.ros.health import Freshness, Monitor
@@ -31,13 +28,13 @@ FAR_GOAL = np.array([[0.4, 0.0]])
 STEP_NS = NANOSECONDS // 50
 
 
-def reach(duration_s: float, distance: float = 0.4) -> np.ndarray:
+def reach(duration_s, distance=0.4):
     """Return positions at 50 Hz of a minimum-jerk reach along x, at rest for 0.6 s before and after."""
     s = np.clip((np.arange(0.0, duration_s + 1.2, 0.02) - 0.6) / duration_s, 0.0, 1.0)
     return np.outer(distance * (10 * s**3 - 15 * s**4 + 6 * s**5), [1.0, 0.0])
 
 
-def follow(pipeline: Pipeline, *movements: np.ndarray, goal: np.ndarray = FAR_GOAL) -> Pipeline:
+def follow(pipeline, *movements, goal=FAR_GOAL):
     """Pass movements, and back to the start in between by a jump of time, to a pipeline."""
     for positions in movements:
         pipeline.set_goals(goal, 'world')
@@ -48,7 +45,7 @@ def follow(pipeline: Pipeline, *movements: np.ndarray, goal: np.ndarray = FAR_GO
 
 
 @pytest.mark.parametrize('factor', [0.6, 1.0, 2.0, 3.0])
-def test_the_factor_approaches_that_of_the_operator(factor: float) -> None:
+def test_the_factor_approaches_that_of_the_operator(factor):
     duration_s = factor * compute_movement_time(0.4, CONFIG.duration)
     pipeline = follow(Pipeline(CONFIG), *[reach(duration_s)] * 3)
     assert pipeline.learnt.pace.movements >= 2
@@ -57,7 +54,7 @@ def test_the_factor_approaches_that_of_the_operator(factor: float) -> None:
     assert pipeline.adapted_config.duration == scale_durations(CONFIG.duration, found)
 
 
-def test_an_operator_who_passes_the_goals_is_recognised() -> None:
+def test_an_operator_who_passes_the_goals_is_recognised():
     """The hand crosses the goal at the constant speed with which it came, and stops beyond it."""
     there = np.arange(0.0, 0.4, 0.02 * 0.2)
     beyond = 0.4 + 0.2 * 0.05 * (1.0 - np.exp(-np.arange(0.0, 0.5, 0.02) / 0.05))
@@ -67,13 +64,13 @@ def test_an_operator_who_passes_the_goals_is_recognised() -> None:
     assert pipeline.adapted_config.duration.arrival == 'passing'
 
 
-def test_without_a_movement_nothing_changes() -> None:
+def test_without_a_movement_nothing_changes():
     pipeline = follow(Pipeline(CONFIG), np.zeros((100, 2)))
     assert pipeline.learnt.pace.movements == 0 and pipeline.learnt.pace.find_best(CONFIG.duration) == ('rest', 1.0)
     assert pipeline.adapted_config is CONFIG
 
 
-def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
+def test_equal_samples_give_equal_factors_and_a_reset_forgets_them():
     one, other = (follow(Pipeline(CONFIG), reach(4.0), reach(3.5), reach(4.2)) for _ in range(2))
     np.testing.assert_array_equal(one.learnt.pace.losses, other.learnt.pace.losses)
     assert one.learnt.pace.movements > 0
@@ -82,7 +79,7 @@ def test_equal_samples_give_equal_factors_and_a_reset_forgets_them() -> None:
     np.testing.assert_array_equal(one.learnt.pace.losses, Pace().losses)
 
 
-def test_it_can_be_switched_off_and_new_durations_begin_anew() -> None:
+def test_it_can_be_switched_off_and_new_durations_begin_anew():
     off = replace_values(CONFIG, {'duration.adaptation': 'none'})
     assert follow(Pipeline(off), reach(4.0), reach(4.0)).learnt.pace.movements == 0
     pipeline = follow(Pipeline(CONFIG), reach(4.0), reach(4.0))
@@ -97,7 +94,7 @@ FIXED = {'duration.adaptation': 'none'}
 DISPERSION_CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4} | FIXED)
 
 
-def make_candidate(likelihood: float = 1.0, duration_s: float = 2.0, place: Sequence[float] = (0.0, 0.0)) -> PredictedCandidate:
+def make_candidate(likelihood=1.0, duration_s=2.0, place=(0.0, 0.0)):
     """Return a candidate that stays at a place with a standard deviation of `STDDEV` along each axis."""
     mean, covariance = np.zeros((9, 6)), np.tile(STDDEV**2 * np.eye(6), (9, 1, 1))
     mean[:, :2] = place
@@ -105,13 +102,13 @@ def make_candidate(likelihood: float = 1.0, duration_s: float = 2.0, place: Sequ
     return PredictedCandidate(Candidate('goal0', 0, (), mean[:, :2], 0.0), solution, {}, 1.0, likelihood)
 
 
-def place_hand(stamp_ns: int, position: Sequence[float]) -> HandState:
+def place_hand(stamp_ns, position):
     """Return a moving hand at a position."""
     mean = np.array([*position, 0.0, 0.0, 0.0, 0.0])
     return HandState(stamp_ns, mean, np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 
 
-def judge(ahead_s: float, factor: float, duration_s: float, count: int = 60) -> Dispersion:
+def judge(ahead_s, factor, duration_s, count=60):
     """Return what is learnt if the hand is beside the candidate by `factor` standard deviations in 2D some time later."""
     generator, dispersion, candidates = np.random.default_rng(3), Dispersion(), [make_candidate(duration_s=duration_s)]
     for position in factor * STDDEV * generator.standard_normal((count, 2)):
@@ -124,7 +121,7 @@ def judge(ahead_s: float, factor: float, duration_s: float, count: int = 60) -> 
 
 @pytest.mark.parametrize('factor', [0.25, 3.0])
 @pytest.mark.parametrize(('ahead_s', 'duration_s', 'share'), [(0.25, 10.0, 0.025), (1.0, 2.0, 0.5), (1.0, 0.8, 1.0)])
-def test_the_factor_of_gaussian_errors_is_recovered(factor: float, ahead_s: float, duration_s: float, share: float) -> None:
+def test_the_factor_of_gaussian_errors_is_recovered(factor, ahead_s, duration_s, share):
     dispersion = judge(ahead_s, factor, duration_s)
     assert dispersion.errors == 60
     near, far = dispersion.factors
@@ -133,7 +130,7 @@ def test_the_factor_of_gaussian_errors_is_recovered(factor: float, ahead_s: floa
         assert near == pytest.approx(1.0, abs=0.1)
 
 
-def reach_around(pipeline: Pipeline, start_s: float, until_s: float = 1.6) -> list[Prediction]:
+def reach_around(pipeline, start_s, until_s=1.6):
     """Pass a reach_around around an obstacle through a pipeline that predicts; return the predictions."""
     pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03, 0.001), int(start_s * NANOSECONDS), 'world')
     pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
@@ -148,7 +145,7 @@ def reach_around(pipeline: Pipeline, start_s: float, until_s: float = 1.6) -> li
     return made
 
 
-def test_factors_scale_the_covariance_and_nothing_else() -> None:
+def test_factors_scale_the_covariance_and_nothing_else():
     off = {'covariance.adaptation': 'none'}
     plain = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off)), 1.0)
     scaled = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off | {'covariance.near': 2.0, 'covariance.far': 2.0})), 1.0)
@@ -165,7 +162,7 @@ def test_factors_scale_the_covariance_and_nothing_else() -> None:
     assert at_rest[0] and at_rest[-1] and not all(at_rest), 'the hand rests before and after the reach'
 
 
-def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off() -> None:
+def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off():
     pipeline = Pipeline(DISPERSION_CONFIG)
     reach_around(pipeline, 1.0)
     assert (
@@ -195,14 +192,14 @@ TURNS = [0.1, 0.0] - 0.2 * np.column_stack([each(np.pi * np.linspace(0.0, 11.0, 
 """A circle through the goal, around which a path goes five and a half times."""
 
 
-def move_along(path: np.ndarray, seconds: float = 1.5, rest_s: float = 0.4, after_s: float = 0.4) -> np.ndarray:
+def move_along(path, seconds=1.5, rest_s=0.4, after_s=0.4):
     """Return positions at 100 Hz of a minimum-jerk movement along a path, at rest before and after."""
     s = np.clip((np.arange(0.0, seconds + rest_s + after_s, STEP_S) - rest_s) / seconds, 0.0, 1.0)
     along, at = 10 * s**3 - 15 * s**4 + 6 * s**5, np.linspace(0.0, 1.0, len(path))
     return np.column_stack([np.interp(along, at, axis) for axis in path.T])
 
 
-def follow_paths(pipeline: Pipeline, *paths: np.ndarray, goals: np.ndarray = GOAL, is_predicting: bool = False) -> list:
+def follow_paths(pipeline, *paths, goals=GOAL, is_predicting=False):
     """Pass movements to a pipeline, with a gap in time before each; return the predictions."""
     predictions = []
     for positions in paths:
@@ -216,11 +213,11 @@ def follow_paths(pipeline: Pipeline, *paths: np.ndarray, goals: np.ndarray = GOA
     return predictions
 
 
-def likelihood_above(prediction) -> float:
+def likelihood_above(prediction):
     return sum(each.likelihood for each in prediction.candidates if dict(each.candidate.sides).get(OBSTACLES.ids[0]) == 1)
 
 
-def test_a_repeated_way_becomes_more_likely() -> None:
+def test_a_repeated_way_becomes_more_likely():
     ways = [move_along(ABOVE)] * 4
     first, last = [], []
     for learning_ in ('none', 'online'):
@@ -235,7 +232,7 @@ def test_a_repeated_way_becomes_more_likely() -> None:
     assert last[1] == pytest.approx((prior * last[0] + 3.0) / (prior + 3.0), abs=0.02)
 
 
-def test_a_movement_is_learnt_when_it_has_ended() -> None:
+def test_a_movement_is_learnt_when_it_has_ended():
     pipeline, path = Pipeline(MOVEMENT_CONFIG), move_along(ABOVE, after_s=2.0)
     ended = round((0.4 + 1.5) / STEP_S)
     follow_paths(pipeline, path[:ended])
@@ -249,7 +246,7 @@ def test_a_movement_is_learnt_when_it_has_ended() -> None:
     assert len(found.states) == pytest.approx((0.4 + 1.5 + learning.AROUND_S) / learning.STEP_S, abs=8)
 
 
-def test_a_rest_on_the_way_is_part_of_a_movement_and_one_at_a_goal_ends_it() -> None:
+def test_a_rest_on_the_way_is_part_of_a_movement_and_one_at_a_goal_ends_it():
     halfway = ABOVE[: len(ABOVE) // 2 + 1]
     paused = np.concatenate([move_along(halfway, after_s=0.1), move_along(ABOVE[len(ABOVE) // 2 :], rest_s=0.1)[1:]])
     pipeline = Pipeline(MOVEMENT_CONFIG)
@@ -274,7 +271,7 @@ def test_a_rest_on_the_way_is_part_of_a_movement_and_one_at_a_goal_ends_it() -> 
     ],
     ids=['no goal reached', 'short', 'long', 'no goals'],
 )
-def test_what_is_no_demonstration_is_refused(path: np.ndarray, goals: np.ndarray, reason: str) -> None:
+def test_what_is_no_demonstration_is_refused(path, goals, reason):
     pipeline = Pipeline(MOVEMENT_CONFIG)
     follow_paths(pipeline, path, goals=goals)
     movements = pipeline.learnt.movements.finish()
@@ -282,7 +279,7 @@ def test_what_is_no_demonstration_is_refused(path: np.ndarray, goals: np.ndarray
     assert len(movements.states) <= MOST_STATES
 
 
-def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library() -> None:
+def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library():
     given = follow_one(ABOVE)
     for forget in (Pipeline.reset, lambda each: each.reconfigure(MOVEMENT_CONFIG.with_values({'estimator.jerk_density': 3.0}))):
         pipeline = Pipeline(MOVEMENT_CONFIG, [given])
@@ -294,13 +291,13 @@ def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library(
         assert not pipeline.learnt.movements.learnt and pipeline._library.recordings == (given,)
 
 
-def follow_one(path: np.ndarray):
+def follow_one(path):
     pipeline = Pipeline(MOVEMENT_CONFIG)
     follow_paths(pipeline, move_along(path), np.zeros((2, 2)))
     return pipeline.learnt.movements.learnt[0]
 
 
-def test_the_diagnostics_count_movements() -> None:
+def test_the_diagnostics_count_movements():
     intake = Intake(Pipeline(MOVEMENT_CONFIG))
     follow_paths(intake.pipeline, move_along(ABOVE), move_along(0.7 * BELOW), np.zeros((2, 2)))
     health = Monitor(intake, Freshness(), 0.0).report(1.0, 'active', None, 0.0, [])

@@ -14,7 +14,6 @@ import xml.etree.ElementTree as ET
 import zipfile
 from email.parser import HeaderParser
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -30,7 +29,7 @@ SOURCES = ('.py', '.mcap', '.css', '.html', '.js')
 
 
 @pytest.fixture(scope='module')
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+def wheel(tmp_path_factory):
     """Build a wheel from a copy of the sources, without network access."""
     setuptools = pytest.importorskip('setuptools', '70.1', reason='setuptools 70.1 is needed to build a wheel')
     source, target = tmp_path_factory.mktemp('source') / 'foc_ros', tmp_path_factory.mktemp('wheel')
@@ -42,11 +41,11 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
 
 
 @pytest.fixture(scope='module')
-def package_xml() -> ET.Element:
+def package_xml():
     return ET.parse(ROOT / 'package.xml').getroot()
 
 
-def test_package_xml_agrees_with_the_wheel(package_xml: ET.Element, wheel: zipfile.ZipFile) -> None:
+def test_package_xml_agrees_with_the_wheel(package_xml, wheel):
     metadata = HeaderParser().parsestr(wheel.read(next(n for n in wheel.namelist() if n.endswith('/METADATA'))).decode())
     text = {child.tag: child.text for child in package_xml}
     assert package_xml.get('format') == '3'
@@ -61,7 +60,7 @@ def test_package_xml_agrees_with_the_wheel(package_xml: ET.Element, wheel: zipfi
     assert package_xml.findtext('export/build_type') == 'ament_python'
 
 
-def test_package_xml_names_every_message_package(package_xml: ET.Element) -> None:
+def test_package_xml_names_every_message_package(package_xml):
     keys = {node.text for node in package_xml.findall('exec_depend')}
     used = set()
     for file in (ROOT / 'foc_ros').rglob('*.py'):
@@ -71,14 +70,14 @@ def test_package_xml_names_every_message_package(package_xml: ET.Element) -> Non
     assert used - {'builtin_interfaces'} - optional <= keys
 
 
-def test_own_rosdep_rules_are_used(package_xml: ET.Element) -> None:
+def test_own_rosdep_rules_are_used(package_xml):
     rules = yaml.safe_load((ROOT / 'rosdep' / 'foc_ros.yaml').read_text('utf-8'))
     keys = {node.text for node in package_xml if node.tag.endswith('depend')}
     assert set(rules) <= keys
     assert rules['python3-piqp-pip']['ubuntu'] == {'pip': {'packages': ['piqp']}}
 
 
-def test_wheel_contains_all_files_of_the_program(wheel: zipfile.ZipFile) -> None:
+def test_wheel_contains_all_files_of_the_program(wheel):
     names = set(wheel.namelist())
     data = f'foc_ros-{foc_ros.__version__}.data/data/'
     assert f'{data}share/ament_index/resource_index/packages/foc_ros' in names
@@ -93,7 +92,7 @@ def test_wheel_contains_all_files_of_the_program(wheel: zipfile.ZipFile) -> None
     assert not [name for name in names if name.startswith(('test', 'scripts', 'benchmarks'))]
 
 
-def test_ros2_run_finds_every_command(wheel: zipfile.ZipFile) -> None:
+def test_ros2_run_finds_every_command(wheel):
     """`ros2 run` starts files of lib/foc_ros: one executable per command, which is not on PATH."""
     scripts = {Path(info.filename).name: info for info in wheel.infolist() if '.data/data/lib/foc_ros/' in info.filename}
     assert set(scripts) == {*list_commands(), 'foc_node'}
@@ -103,7 +102,7 @@ def test_ros2_run_finds_every_command(wheel: zipfile.ZipFile) -> None:
 
 
 @pytest.mark.parametrize('script', sorted((ROOT / 'scripts' / 'ros2_run').iterdir()), ids=lambda script: script.name)
-def test_ros2_run_starts_the_command(script: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ros2_run_starts_the_command(script, monkeypatch, capsys):
     monkeypatch.setattr(sys, 'argv', [str(script), '--help'])
     with pytest.raises(SystemExit) as ended:
         runpy.run_path(str(script), run_name='__main__')
@@ -111,7 +110,7 @@ def test_ros2_run_starts_the_command(script: Path, monkeypatch: pytest.MonkeyPat
     assert f'Usage: foc_ros {script.name.replace("foc_node", "node")}' in capsys.readouterr().out
 
 
-def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path: Path) -> None:
+def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path):
     """Run one of the scripts as `ros2 run` does: in a process of its own, from any directory."""
     paths = os.pathsep.join([str(Path(foc_ros.__file__).parents[1]), *filter(None, [os.environ.get('PYTHONPATH')])])
     command = [sys.executable, ROOT / 'scripts' / 'ros2_run' / 'solve', '--help']
@@ -121,7 +120,7 @@ def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path: Path) 
     assert ' solve ' in result.stdout
 
 
-def test_an_executable_runs_in_the_python_of_its_environment(tmp_path: Path) -> None:
+def test_an_executable_runs_in_the_python_of_its_environment(tmp_path):
     """`lib/foc_ros` of a virtual environment that is not activated; without a Python in the environment, that of the PATH."""
     script, interpreter = tmp_path / 'lib' / 'foc_ros' / 'foc_node', tmp_path / 'bin' / 'python3'
     for each in (script, interpreter):
@@ -134,7 +133,7 @@ def test_an_executable_runs_in_the_python_of_its_environment(tmp_path: Path) -> 
     assert result.stdout == f'{script} --ros-args\n'
 
 
-def test_no_file_contains_a_path_of_one_machine() -> None:
+def test_no_file_contains_a_path_of_one_machine():
     listed = subprocess.run(['git', 'ls-files', '-z'], cwd=ROOT, capture_output=True, check=False)
     if listed.returncode:
         pytest.skip('not a git checkout: the list of files is unknown')
@@ -150,30 +149,19 @@ CONDA = {'matplotlib-base': 'matplotlib'}
 """Packages whose names on conda-forge differ."""
 
 
-def read_yaml(name: str) -> Any:
+def read_yaml(name):
     return yaml.safe_load((ROOT / name).read_text('utf-8'))
 
 
-def test_pixi_names_the_package_the_channels_and_the_platforms() -> None:
-    workspace, package = PIXI['workspace'], ET.parse(ROOT / 'package.xml').getroot()
-    assert {key: workspace[key] for key in ('name', 'version', 'license', 'description')} == {
-        key: package.findtext(key) for key in ('name', 'version', 'license', 'description')
-    }
-    assert workspace['version'] == foc_ros.__version__
+def test_pixi_names_the_package_and_installs_what_package_xml_and_setup_py_name(package_xml):
+    """Python packages of conda-forge are requirements with the same bounds; all others are installed with foc_ros itself."""
+    workspace, keys = PIXI['workspace'], {node.text for node in package_xml.findall('exec_depend')}
+    assert all(workspace[key] == package_xml.findtext(key) for key in ('name', 'version', 'license', 'description'))
     assert workspace['channels'] == ['robostack-jazzy', 'conda-forge'], 'RoboStack has to come first'
-    assert workspace['platforms'] == ['linux-64', 'linux-aarch64', 'osx-arm64']
-
-
-def test_pixi_has_every_ros_package_of_package_xml() -> None:
-    keys = {node.text for node in ET.parse(ROOT / 'package.xml').getroot().findall('exec_depend')}
     wanted = {f'ros-jazzy-{key.replace("_", "-")}' for key in keys if not key.startswith('python3-')}
     found = {name for name in PIXI['dependencies'] if name.startswith('ros-jazzy-')}
     assert wanted <= found
-    assert {name for name in found - wanted if not name.startswith('ros-jazzy-ros2')} == set(), 'not a command line of ROS'
-
-
-def test_pixi_has_the_python_packages_of_setup_py() -> None:
-    """Those of conda-forge are requirements with the same bounds; all others are installed with foc_ros itself."""
+    assert all(name.startswith('ros-jazzy-ros2') for name in found - wanted), 'not a command line of ROS'
     text = (ROOT / 'setup.py').read_text('utf-8')
     bounds = {name.lower(): bound for name, bound in re.findall(r"'([\w-]+)(>=[\d.]+)'", text)}
     (package,) = PIXI['pypi-dependencies'].values()
@@ -188,9 +176,7 @@ def test_pixi_has_the_python_packages_of_setup_py() -> None:
             assert bound == bounds[CONDA.get(name, name)], name
 
 
-def test_the_tasks_of_pixi_are_commands() -> None:
-    from foc_ros.cli.main import list_commands
-
+def test_the_tasks_of_pixi_are_commands():
     for task in PIXI['tasks'].values():
         program, command = task.split()
         assert program == 'foc_ros' and command in list_commands()
@@ -198,7 +184,7 @@ def test_the_tasks_of_pixi_are_commands() -> None:
     assert launch[:3] == ['ros2', 'launch', 'foc_ros'] and (ROOT / 'launch' / launch[3]).exists()
 
 
-def test_the_workflow_runs_what_decides_over_a_change() -> None:
+def test_the_workflow_runs_what_decides_over_a_change():
     jobs = read_yaml('.github/workflows/ci.yml')['jobs']
     assert {'run': '.ci/run'} in jobs['all']['steps']
     assert (ROOT / '.ci' / 'run').stat().st_mode & 0o111
@@ -210,7 +196,7 @@ def test_the_workflow_runs_what_decides_over_a_change() -> None:
     assert f'Python {first} to {last}' in (ROOT / 'Makefile').read_text('utf-8')
 
 
-def test_the_hooks_are_those_of_make_lint() -> None:
+def test_the_hooks_are_those_of_make_lint():
     (repository,) = read_yaml('.pre-commit-config.yaml')['repos']
     assert repository['repo'] == 'local'
     hooks = {hook['entry'].replace(' --force-exclude', '') for hook in repository['hooks']}
@@ -222,7 +208,7 @@ needs_make = pytest.mark.skipif(shutil.which('make') is None, reason='make is no
 
 
 @pytest.fixture
-def clone(tmp_path: Path) -> Path:
+def clone(tmp_path):
     """Return a folder with the files that `make setup` reads."""
     folder = tmp_path / 'clone'
     folder.mkdir()
@@ -231,7 +217,7 @@ def clone(tmp_path: Path) -> Path:
     return folder
 
 
-def make(clone: Path, *arguments: str, path: Path | None = None) -> subprocess.CompletedProcess[str]:
+def make(clone, *arguments, path=None):
     """Run make; path: a folder in which programs are found first."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(('MAKE', 'MFLAGS', 'VIRTUAL_ENV'))}
     environment['PATH'] = os.pathsep.join([*([] if path is None else [str(path)]), environment['PATH']])
@@ -239,7 +225,7 @@ def make(clone: Path, *arguments: str, path: Path | None = None) -> subprocess.C
     return subprocess.run(command, cwd=clone, env=environment, capture_output=True, text=True, timeout=100, check=False)
 
 
-def write_program(file: Path, text: str) -> Path:
+def write_program(file, text):
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(f'#!/bin/sh\n{text}\n')
     file.chmod(0o755)
@@ -247,7 +233,7 @@ def write_program(file: Path, text: str) -> Path:
 
 
 @needs_make
-def test_a_python_that_is_not_there_is_named(clone: Path) -> None:
+def test_a_python_that_is_not_there_is_named(clone):
     result = make(clone, 'setup', 'PYTHON=no_such_python')
     assert result.returncode != 0
     assert 'make: there is no no_such_python; choose another, as in make setup PYTHON=python3.12\n' in result.stderr
@@ -255,7 +241,7 @@ def test_a_python_that_is_not_there_is_named(clone: Path) -> None:
 
 
 @needs_make
-def test_an_inactive_shim_of_pyenv_is_named_with_what_to_do(clone: Path, tmp_path: Path) -> None:
+def test_an_inactive_shim_of_pyenv_is_named_with_what_to_do(clone, tmp_path):
     shim = write_program(tmp_path / 'shims' / 'python3.99', 'exit 127')
     write_program(tmp_path / 'shims' / 'pyenv', 'echo 3.99.1')
     result = make(clone, 'setup', 'PYTHON=python3.99', path=shim.parent)
@@ -266,7 +252,7 @@ def test_an_inactive_shim_of_pyenv_is_named_with_what_to_do(clone: Path, tmp_pat
 
 
 @needs_make
-def test_an_old_python_is_refused_before_anything_is_made(clone: Path, tmp_path: Path) -> None:
+def test_an_old_python_is_refused_before_anything_is_made(clone, tmp_path):
     old = write_program(tmp_path / 'bin' / 'python3', 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.10.2;; esac')
     result = make(clone, 'setup', f'PYTHON={old}')
     assert result.returncode != 0
@@ -274,7 +260,7 @@ def test_an_old_python_is_refused_before_anything_is_made(clone: Path, tmp_path:
     assert not (clone / '.venv').exists()
 
 
-def list_recipe(clone: Path, target: str) -> str:
+def list_recipe(clone, target):
     """Return what a target would run."""
     result = make(clone, '--dry-run', target)
     assert result.returncode == 0, result.stderr
@@ -282,46 +268,31 @@ def list_recipe(clone: Path, target: str) -> str:
 
 
 @needs_make
-def test_it_says_what_it_does(clone: Path) -> None:
-    told = re.findall(r'echo [\'"](setup: \w+)', list_recipe(clone, 'setup'))
+def test_setup_says_what_it_does_and_linters_and_peers_are_installed_by_their_targets_only(clone):
+    recipes = {target: list_recipe(clone, target) for target in ('setup', 'lint', 'doc', 'bench')}
+    told = re.findall(r'echo [\'"](setup: \w+)', recipes['setup'])
     assert told == ['setup: creating', 'setup: installing', 'setup: ready']
-    assert 'setup: ready; next: make demo' in list_recipe(clone, 'setup')
-
-
-@needs_make
-def test_linters_and_peers_are_installed_by_their_targets_only(clone: Path) -> None:
-    extras = {target: re.findall(r"'\.\[([\w,]+)\]'", list_recipe(clone, target)) for target in ('setup', 'lint', 'doc', 'bench')}
+    assert 'setup: ready; next: make demo' in recipes['setup']
     setup = 'ros,report,play,test'
+    extras = {target: re.findall(r"'\.\[([\w,]+)\]'", recipe) for target, recipe in recipes.items()}
     assert extras == {'setup': [setup], 'lint': [setup, 'lint'], 'doc': [setup, 'doc'], 'bench': [setup, 'bench']}
 
 
 COMMANDS = ['make setup', 'make demo']
 
 
-def parse_dockerfile() -> list[dict[str, str]]:
-    dockerfile_parse = pytest.importorskip('dockerfile_parse', reason='dockerfile-parse is not installed')
-    parser = dockerfile_parse.DockerfileParser(str(ROOT / 'Dockerfile'), cache_content=True, env_replace=False)
-    return [each for each in parser.structure if each['instruction'] != 'COMMENT']
-
-
-def test_the_readme_starts_the_demo_by_two_commands() -> None:
+def test_readme_image_and_development_container_start_the_demo_by_the_same_two_commands():
     section = (ROOT / 'README.md').read_text('utf-8').partition('## Try it')[2]
     assert re.search(r'```console\n(.*?)```', section, re.DOTALL).group(1).splitlines() == COMMANDS
-
-
-def test_the_image_is_built_and_started_by_the_same_commands() -> None:
-    instructions = parse_dockerfile()
-    assert [each['instruction'] for each in instructions] == ['FROM', 'RUN', 'WORKDIR', 'COPY', 'RUN', 'CMD']
-    assert re.fullmatch(r'python:3\.1[12]-slim-bookworm', instructions[0]['value'])
-    assert instructions[4]['value'] == COMMANDS[0]
-    assert ' '.join(json.loads(instructions[5]['value'])) == COMMANDS[1]
-
-
-def test_the_development_container_runs_the_same_commands() -> None:
     container = json.loads((ROOT / '.devcontainer' / 'devcontainer.json').read_text('utf-8'))
     assert [container['postCreateCommand'], container['postAttachCommand']] == COMMANDS
     assert re.fullmatch(r'mcr\.microsoft\.com/devcontainers/python:3\.1[12]-bookworm', container['image'])
-    assert set(container) == {'name', 'image', 'postCreateCommand', 'postAttachCommand'}
+    dockerfile_parse = pytest.importorskip('dockerfile_parse', reason='dockerfile-parse is not installed')
+    parser = dockerfile_parse.DockerfileParser(str(ROOT / 'Dockerfile'), cache_content=True, env_replace=False)
+    instructions = [each for each in parser.structure if each['instruction'] != 'COMMENT']
+    assert [each['instruction'] for each in instructions] == ['FROM', 'RUN', 'WORKDIR', 'COPY', 'RUN', 'CMD']
+    assert re.fullmatch(r'python:3\.1[12]-slim-bookworm', instructions[0]['value'])
+    assert [instructions[4]['value'], ' '.join(json.loads(instructions[5]['value']))] == COMMANDS
 
 
 HEADER = ['SPDX-FileCopyrightText: 2026 the foc_ros developers', 'SPDX-License-Identifier: Apache-2.0']
@@ -329,7 +300,7 @@ COMMENTS = {'.py': '#', '.sh': '#', '.js': '//', '': '#'}
 """How a comment begins, by the ending of the file; without one, only what begins with `#!` is a source."""
 
 
-def list_sources() -> list[Path]:
+def list_sources():
     """Return the sources that git knows; a link to another file is none."""
     listed = subprocess.run(['git', 'ls-files', '-z', '--cached'], cwd=ROOT, capture_output=True, text=True, check=False)
     if listed.returncode:
@@ -339,73 +310,10 @@ def list_sources() -> list[Path]:
     return [file for file in files if file.suffix or file.read_bytes()[:2] == b'#!']
 
 
-def test_every_source_begins_with_its_licence() -> None:
+def test_every_source_begins_with_its_licence():
     sources = list_sources()
     assert {'setup.py', 'run', 'player.js', 'colcon_check', '__main__.py'} <= {file.name for file in sources}
     for file in sources:
         lines = [line for line in file.read_text('utf-8').splitlines()[:3] if not line.startswith('#!')]
         header = [f'{COMMENTS[file.suffix]} {line}' for line in HEADER]
         assert lines[:2] == header, f'{file.relative_to(ROOT)} does not begin with {HEADER}'
-
-
-BLOCKED = ('rclpy', 'ament_index_python', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs')
-
-BLOCK = f"""
-import sys
-
-class Blocker:
-    def find_spec(self, name, path=None, target=None):
-        root = name.partition('.')[0]
-        if root in BLOCKED or root.endswith('_msgs'):
-            raise ModuleNotFoundError(f'{{name}} is blocked', name=name)
-
-BLOCKED = {{*{BLOCKED!r}}}
-sys.meta_path.insert(0, Blocker())
-"""
-
-IMPORT_ALL = """
-import importlib, pkgutil
-import foc_ros.core
-names = [module.name for module in pkgutil.walk_packages(foc_ros.core.__path__, 'foc_ros.core.')]
-for name in names:
-    importlib.import_module(name)
-assert 'foc_ros.core.predict' in names, names
-"""
-
-PREDICT = """
-import numpy as np
-from foc_ros.core.config import Config
-from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.predict import predict
-from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.types import HandState
-hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
-scene = make_obstacles([[0.15, 0.0]], [0.03], 0.002)
-prediction, _ = predict(Config(), hand, scene, np.array([[0.3, 0.0]]), NO_TRACKS)
-sides = sorted(outcome.sides['0'] for outcome in prediction.solved_candidates)
-assert sides == [-1, 1], sides
-"""
-
-
-def run(program: str, *blocked: str) -> subprocess.CompletedProcess[str]:
-    """Run a program in a Python in which ROS and the packages `blocked` cannot be imported."""
-    block = BLOCK + f'BLOCKED |= {set(blocked)!r}\n' if blocked else BLOCK
-    return subprocess.run([sys.executable, '-c', block + program], capture_output=True, text=True, timeout=100, check=False)
-
-
-def test_core_imports_and_predicts_without_ros_and_rosbags() -> None:
-    result = run(IMPORT_ALL + PREDICT, 'rosbags', 'rich', 'matplotlib')
-    assert result.returncode == 0, result.stderr
-
-
-def test_replay_runs_without_ros(tmp_path: Path) -> None:
-    (tmp_path / 'slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}', 'utf-8')
-    program = f"""
-from foc_ros.cli.main import main
-from importlib.resources import files
-bag = files('foc_ros') / 'recordings' / 'reaching.mcap'
-sys.exit(main(['replay', str(bag), '--params', {str(tmp_path / 'slow.yaml')!r}, '--json']))
-"""
-    result = run(program)
-    assert result.returncode == 0, result.stderr
-    assert json.loads(result.stdout)['summary']['predictions'] >= 20

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`examples/paper`: the trends appear, the files hold the numbers, and an output that cannot be written is rejected."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -16,7 +14,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from checks import check_trends
 from paper import perform
-from studies import PAPER_ETA, QUICK, RatioCurve, Studies
+from studies import PAPER_ETA, QUICK, RatioCurve
 
 from foc_ros import Status
 
@@ -25,17 +23,17 @@ FILES = {f'study{number}.{suffix}' for number in range(1, 8) for suffix in ('png
 
 
 @pytest.fixture(scope='module')
-def output(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def output(tmp_path_factory):
     return tmp_path_factory.mktemp('paper') / 'new' / 'output'
 
 
 @pytest.fixture(scope='module')
-def found(output: Path) -> Studies:
+def found(output):
     """Compute all studies on the coarse grid, from end to end."""
     return perform(output, QUICK)
 
 
-def ratio(found: Studies, number: int) -> RatioCurve:
+def ratio(found, number):
     """Return the continuous ratio of a study, solved at every eta."""
     first = found[number].ratios[0]
     for curve in (first.numerator, first.denominator):
@@ -43,13 +41,13 @@ def ratio(found: Studies, number: int) -> RatioCurve:
     return first
 
 
-def test_every_trend_is_checked_and_holds(found: Studies) -> None:
+def test_every_trend_is_checked_and_holds(found):
     checked = check_trends(found)
     assert [each.study for each in checked] == [1, 2, 3, 4, 5, 6, 7]
     assert [each.study for each in checked if not each.holds] == []
 
 
-def test_a_missing_trend_is_reported(found: Studies) -> None:
+def test_a_missing_trend_is_reported(found):
     """Where the numbers of H1 and H2, and of LV and HC, are exchanged, no statement about them holds."""
     changed = dict(found)
     for number in (3, 4, 5):
@@ -60,7 +58,7 @@ def test_a_missing_trend_is_reported(found: Studies) -> None:
     assert {3, 4, 5} <= {each.study for each in checked if not each.holds}
 
 
-def test_files_hold_the_computed_numbers(found: Studies, output: Path) -> None:
+def test_files_hold_the_computed_numbers(found, output):
     assert {file.name for file in output.iterdir()} == FILES
     numbers = json.loads((output / 'numbers.json').read_text('utf-8'))
     for name, number, paper in (('LV', 5, 0.33), ('HC', 6, 0.67)):
@@ -72,7 +70,7 @@ def test_files_hold_the_computed_numbers(found: Studies, output: Path) -> None:
     assert f'{ratio(found, 5).at(PAPER_ETA):.2f} at 0.9615' in lines[6] and '0.33 at 0.9615' in lines[6]
 
 
-def test_output_that_cannot_be_written_exits_2_before_anything_is_computed(tmp_path: Path) -> None:
+def test_output_that_cannot_be_written_exits_2_before_anything_is_computed(tmp_path):
     file = tmp_path / 'file'
     file.write_text('mine', encoding='utf-8')
     command = [sys.executable, str(EXAMPLE / 'paper.py'), '--output', str(file)]

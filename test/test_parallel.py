@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 import worker_tasks
+from test_evaluate import evaluate, write_three
 
 from foc_ros.analysis.parallel import Failure, open_workers, run
 from foc_ros.cli.main import app
-from foc_ros.cli.options import Study
 from foc_ros.core.errors import InputError, RecordingError
 
 ITEMS = [(f'r{number}', number) for number in range(8)]
@@ -23,14 +23,14 @@ SQUARES = [(name, number**2) for name, number in ITEMS]
 LIMIT_S = 60.0
 
 
-def parse_study(*given: str) -> Study:
+def parse_study(*given):
     """Return the options of a study, as a command reads them."""
     _, bound, _ = app.parse_args(['simulate', *given], exit_on_error=False, print_error=False)
     return bound.arguments['study']
 
 
 @pytest.mark.parametrize('count', [None, 1, 2, 3])
-def test_results_come_in_order_and_an_exception_is_the_failure_of_its_item_whatever_the_workers(count: int | None) -> None:
+def test_results_come_in_order_and_an_exception_is_the_failure_of_its_item_whatever_the_workers(count):
     with nullcontext() if count is None else open_workers(count):
         assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
         found = dict(run(worker_tasks.faulty, ITEMS[:4]))
@@ -39,49 +39,64 @@ def test_results_come_in_order_and_an_exception_is_the_failure_of_its_item_whate
     assert found['r2'].reason.startswith("KeyError: 'two' (worker_tasks.py:")
 
 
-def test_the_cluster_gives_the_same_results(cluster_address: str) -> None:
-    with open_workers(1, cluster_address):
-        assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
+@pytest.fixture(scope='module')
+def cluster_address():
+    """Yield the address of a Dask cluster of two worker processes on this machine."""
+    dask = pytest.importorskip('dask', reason='the extra cluster is not installed')
+    distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
+    # a task is given up after its second death, not its fourth: the test is shorter
+    settings = {'distributed.scheduler.allowed-failures': 1, 'distributed.worker.multiprocessing-method': 'spawn'}
+    with (
+        dask.config.set(settings),
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=':0') as cluster,
+    ):
+        yield cluster.scheduler_address
 
 
-def check_that_only_the_deadly_fail(error: str) -> None:
+def test_an_evaluation_is_the_same_with_one_worker_with_two_and_on_a_cluster(tmp_path, cluster_address):
+    data = write_three(tmp_path / 'data')
+    answers = [evaluate(data, workers=each) for each in ('--workers=1', '--workers=2', f'--scheduler={cluster_address}')]
+    assert answers[0] == answers[1] == answers[2]
+
+
+def check_that_only_the_deadly_fail(error):
     found = dict(run(worker_tasks.deadly, ITEMS))
     failure = Failure(f'its worker process was lost ({error})')
     assert found == {name: failure if name in ('r3', 'r5') else square for name, square in SQUARES}
 
 
 @pytest.mark.parametrize('count', [2])
-def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(count: int) -> None:
+def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(count):
     with open_workers(count):
         check_that_only_the_deadly_fail('TerminatedWorkerError')
 
 
-def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else(cluster_address: str) -> None:
+def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else(cluster_address):
     with open_workers(1, cluster_address):
         check_that_only_the_deadly_fail('KilledWorker')
 
 
-def test_an_argument_that_cannot_be_loaded_is_the_failure_of_its_item() -> None:
+def test_an_argument_that_cannot_be_loaded_is_the_failure_of_its_item():
     with open_workers(2):
         found = dict(run(worker_tasks.squared, [('bad', worker_tasks.Unloadable()), ('good', 2)]))
     assert found['good'] == 4 and isinstance(found['bad'], Failure)
 
 
-def test_an_exception_that_leaves_the_context_ends_the_work() -> None:
+def test_an_exception_that_leaves_the_context_ends_the_work():
     began = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         _run_interrupted()
     assert time.monotonic() - began < LIMIT_S / 2.0
 
 
-def _run_interrupted() -> None:
+def _run_interrupted():
     with open_workers(2):
         for found in run(worker_tasks.sleepy, [('short', 0.0), ('long', LIMIT_S), ('later', LIMIT_S)]):
             assert found == ('short', 0.0)
             raise KeyboardInterrupt
 
 
-def start_workers(tmp_path: Path) -> tuple[subprocess.Popen[str], list[int]]:
+def start_workers(tmp_path):
     """Return a command that waits for two workers, and the processes of these."""
     script = f"""if __name__ == '__main__':
         import worker_tasks
@@ -97,7 +112,7 @@ def start_workers(tmp_path: Path) -> tuple[subprocess.Popen[str], list[int]]:
     return process, [int(each.name) for each in tmp_path.iterdir()]
 
 
-def wait_for_the_end(workers: list[int]) -> None:
+def wait_for_the_end(workers):
     assert len(workers) == 2
     deadline = time.monotonic() + LIMIT_S / 2.0
     while any(Path(f'/proc/{each}').exists() for each in workers) and time.monotonic() < deadline:
@@ -105,14 +120,14 @@ def wait_for_the_end(workers: list[int]) -> None:
     assert not any(Path(f'/proc/{each}').exists() for each in workers)
 
 
-def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+def test_workers_end_with_a_parent_that_is_killed(tmp_path):
     process, workers = start_workers(tmp_path)
     process.kill()
     process.communicate()
     wait_for_the_end(workers)
 
 
-def test_an_interrupt_of_the_terminal_ends_command_and_workers(tmp_path: Path) -> None:
+def test_an_interrupt_of_the_terminal_ends_command_and_workers(tmp_path):
     process, workers = start_workers(tmp_path)
     os.killpg(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=LIMIT_S)
@@ -121,7 +136,7 @@ def test_an_interrupt_of_the_terminal_ends_command_and_workers(tmp_path: Path) -
     assert 'Warning' not in errors and errors.count('Traceback') == 1
 
 
-def test_a_scheduler_that_is_not_there_or_has_no_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_or_has_no_workers_is_refused(monkeypatch):
     distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
     monkeypatch.setattr('foc_ros.analysis.parallel.CONNECT_S', 0.3)
     for address in ('tcp://127.0.0.1:9', 'nonsense://host'):
@@ -134,7 +149,7 @@ def test_a_scheduler_that_is_not_there_or_has_no_workers_is_refused(monkeypatch:
             pass
 
 
-def test_a_scheduler_that_dies_ends_the_run_in_words() -> None:
+def test_a_scheduler_that_dies_ends_the_run_in_words():
     distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
     local = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=':0')
     with local as cluster, open_workers(1, cluster.scheduler_address):

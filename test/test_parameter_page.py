@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """doc/parameters.md and config/foc.yaml agree with the configuration; `python test/test_parameter_page.py` renews both."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
-from foc_ros.core.config import Config, Parameter, list_parameters
+from foc_ros.core.config import Config, list_parameters
 from foc_ros.ros.parameters import dump_parameter_file
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -28,7 +26,7 @@ TABLE = """
 """
 
 
-def page() -> str:
+def page():
     """Return the page: a section for each group, in the order of the configuration."""
     text, group = HEAD, None
     for parameter in list_parameters():
@@ -40,13 +38,13 @@ def page() -> str:
     return text
 
 
-def _describe_group(group: str) -> str:
+def _describe_group(group):
     """Return the first sentence of the docstring of a group's class."""
     document = type(getattr(Config(), group) if group else Config()).__doc__ or ''
     return document.strip().splitlines()[0]
 
 
-def _build_row(parameter: Parameter) -> str:
+def _build_row(parameter):
     """Return the row of a parameter; its unit stands behind its range."""
     bound = parameter.bound
     choices = tuple(bound.choices)
@@ -59,17 +57,17 @@ def _build_row(parameter: Parameter) -> str:
     return f'| `{parameter.name}` | {default} | {span} | {meaning} |\n'
 
 
-def test_the_page_is_current() -> None:
+def test_the_page_is_current():
     assert PAGE.read_text('utf-8') == page(), REMEDY
     for parameter in list_parameters():
         assert f'| `{parameter.name}` |' in page()
 
 
-def test_the_parameter_file_is_current() -> None:
+def test_the_parameter_file_is_current():
     assert FILE.read_text('utf-8') == dump_parameter_file(Config()), REMEDY
 
 
-def test_every_parameter_is_read_somewhere() -> None:
+def test_every_parameter_is_read_somewhere():
     """A parameter that no code reads would be accepted and ignored."""
     code = ' '.join(file.read_text('utf-8') for file in (ROOT / 'foc_ros').rglob('*.py') if file.name != 'config.py')
     unread = [parameter.name for parameter in list_parameters() if not re.search(rf'\.{parameter.name.split(".")[-1]}\b', code)]

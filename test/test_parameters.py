@@ -2,19 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters of the config classes in the parameter file and on the node."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import re
 import warnings
-from pathlib import Path
-from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from ros_helpers import Graph
 
 from foc_ros.core.config import Config, list_parameters, replace_values
 from foc_ros.core.errors import FocError, FocWarning, ParameterError, RecordingError
@@ -22,13 +17,13 @@ from foc_ros.ros import parameters as module
 from foc_ros.ros.parameters import check_parameter_files, dump_parameter_file, load_parameter_file
 
 
-def load(folder: Path, text: str) -> Config:
+def load(folder, text):
     file = folder / 'params.yaml'
     file.write_text(text, 'utf-8')
     return load_parameter_file(file)
 
 
-def values_of(parameter: Any) -> st.SearchStrategy[Any]:
+def values_of(parameter):
     bound = parameter.bound
     if bound.choices:
         return st.sampled_from(tuple(bound.choices))
@@ -41,8 +36,9 @@ def values_of(parameter: Any) -> st.SearchStrategy[Any]:
     return st.floats(bound.low, bound.high)
 
 
+@settings(max_examples=40)
 @given(st.fixed_dictionaries({}, optional={parameter.name: values_of(parameter) for parameter in list_parameters()}))
-def test_every_configuration_is_read_as_it_was_written(tmp_path_factory: pytest.TempPathFactory, values: dict[str, Any]) -> None:
+def test_every_configuration_is_read_as_it_was_written(tmp_path_factory, values):
     config = replace_values(Config(), values)
     assert load(tmp_path_factory.getbasetemp(), dump_parameter_file(config)) == config
 
@@ -51,14 +47,14 @@ def test_every_configuration_is_read_as_it_was_written(tmp_path_factory: pytest.
 @pytest.mark.parametrize(
     'body', ['foc: {eta: 0.8, steps: 20}', '{foc.eta: 0.8, foc.steps: 20}', '{foc: {eta: 0.8}, foc.steps: 20}']
 )
-def test_names_are_nested_or_dotted(tmp_path: Path, key: str, body: str) -> None:
+def test_names_are_nested_or_dotted(tmp_path, key, body):
     text = f'{key}: {{ros__parameters: {{{body.strip("{}") if body[0] == "{" else body}}}}}'
     config = load(tmp_path, text + '}' * key.count('{'))
     assert (config.foc.eta, config.foc.steps) == (0.8, 20)
     assert dataclasses.replace(config, foc=Config().foc) == Config()
 
 
-def test_parameters_of_others_in_the_file_are_skipped(tmp_path: Path) -> None:
+def test_parameters_of_others_in_the_file_are_skipped(tmp_path):
     text = """
 /other_node: {ros__parameters: {gain: 3}}
 /**:
@@ -115,7 +111,7 @@ foc: {ros__parameters: {rate_hz: 25}}
         ('', 'expected a section for the node /foc, such as /** or /foc, got an empty file'),
     ],
 )
-def test_a_wrong_file_is_refused_with_its_reason(tmp_path: Path, text: str, words: str) -> None:
+def test_a_wrong_file_is_refused_with_its_reason(tmp_path, text, words):
     with pytest.raises(ParameterError, match=re.escape(words)):
         load(tmp_path, text)
 
@@ -135,14 +131,14 @@ ALIASES = ['a0: &a0 {x: 1}', *[f'a{i}: &a{i} {{b: *a{i - 1}, c: *a{i - 1}}}' for
         (None, 'cannot be read'),
     ],
 )
-def test_a_file_that_is_missing_or_not_plain_yaml_is_refused(tmp_path: Path, text: str | None, words: str) -> None:
+def test_a_file_that_is_missing_or_not_plain_yaml_is_refused(tmp_path, text, words):
     if text is not None:
         (tmp_path / 'params.yaml').write_text(text, 'utf-8')
     with pytest.raises(RecordingError, match=rf'params\.yaml: {words}'):
         load_parameter_file(tmp_path / 'params.yaml')
 
 
-def node_with(ros: Graph, **overrides: object) -> Any:
+def node_with(ros, **overrides):
     from rclpy.parameter import Parameter
 
     given_values = [Parameter(name.replace('__', '.'), value=value) for name, value in overrides.items()]
@@ -153,7 +149,7 @@ SECTIONS = ['/**', '/*', 'foc', '/foc', '/**/foc', '/*/foc', '/**/**', '/arm/foc
 
 
 @pytest.mark.parametrize('namespace', ['/', '/arm', '/arm/left'])
-def test_sections_apply_as_ros_applies_them(tmp_path: Path, namespace: str) -> None:
+def test_sections_apply_as_ros_applies_them(tmp_path, namespace):
     """All pairs of sections, of which the later one wins, in the node and in what is checked before it."""
     from ros_helpers import graph
 
@@ -177,7 +173,7 @@ def test_sections_apply_as_ros_applies_them(tmp_path: Path, namespace: str) -> N
                 assert [each.value for name, each in overrides.items() if name == 'rate_hz'] == applied[-1:]
 
 
-def test_a_section_that_does_not_apply_is_named(tmp_path: Path) -> None:
+def test_a_section_that_does_not_apply_is_named(tmp_path):
     file = tmp_path / 'params.yaml'
     file.write_text('arm: {foc: {ros__parameters: {rate_hz: -1.0}}}\n/**: {ros__parameters: {rate_hz: 6}}')
     with pytest.warns(FocWarning, match='params.yaml: /arm/foc does not apply to the node /foc$'):
@@ -203,7 +199,7 @@ def test_a_section_that_does_not_apply_is_named(tmp_path: Path) -> None:
         *((f'{name}: {{ros__parameters: {{rate_hz: 5}}}}', f'got /{name}') for name in ('fo*', 'foc/', 'foc-x', '"***"', '2foc')),
     ],
 )
-def test_node_and_commands_refuse_the_same_files(tmp_path: Path, text: str, words: str) -> None:
+def test_node_and_commands_refuse_the_same_files(tmp_path, text, words):
     file = tmp_path / 'params.yaml'
     file.write_text(text)
     for read in (load_parameter_file, lambda each: check_parameter_files(['--ros-args', '--params-file', str(each)])):
@@ -211,7 +207,7 @@ def test_node_and_commands_refuse_the_same_files(tmp_path: Path, text: str, word
             read(file)
 
 
-def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:
+def test_numbers_with_an_exponent_need_no_point(tmp_path):
     file = tmp_path / 'foc.yaml'
     file.write_text('foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1, rate_hz: .5e2}}')
     config = load_parameter_file(file)
@@ -221,7 +217,7 @@ def test_numbers_with_an_exponent_need_no_point(tmp_path: Path) -> None:
         load_parameter_file(file)
 
 
-def test_a_node_reads_the_file_that_replay_reads(tmp_path: Path) -> None:
+def test_a_node_reads_the_file_that_replay_reads(tmp_path):
     from ros_helpers import graph
 
     from foc_ros.ros.node_parameters import declare_parameters

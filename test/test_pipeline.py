@@ -3,7 +3,6 @@
 """The pipeline: when a prediction is due, what is rejected and why, and that no outdated input is used as a new one."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,14 +14,14 @@ from message_helpers import SECOND, cloud, marker, marker_array, message_types, 
 from foc_ros.analysis.replay import Replay
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.deadline import NEVER, Deadline
+from foc_ros.core.deadline import NEVER
 from foc_ros.core.errors import SceneError
-from foc_ros.core.learning.learnt import Knowledge
-from foc_ros.core.obstacle_table import Obstacles, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.prediction import Prediction
+from foc_ros.core.scene import ObstacleSource, Scene
 from foc_ros.core.tracks import Tracks
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState
+from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.bags import BagReader
 from foc_ros.ros.health import Freshness
 from foc_ros.ros.intake import Intake
@@ -35,20 +34,10 @@ CONFIG = replace_values(Config(), {'rate_hz': 50.0, 'scene.timeout_s': 2.0, 'foc
 class Recorder:
     """Replaces the predictor and records its arguments."""
 
-    def __init__(self) -> None:
-        self.calls: list[tuple[Config, HandState, Obstacles, Array, Tracks]] = []
+    def __init__(self):
+        self.calls: list[Any] = []
 
-    def __call__(
-        self,
-        config: Config,
-        hand: HandState,
-        obstacles: Obstacles,
-        goals: Array,
-        memory: Tracks,
-        knowledge: Knowledge,
-        deadline: Deadline,
-        goal_heights: Array | None,
-    ) -> tuple[Prediction, Tracks]:
+    def __call__(self, config, hand, obstacles, goals, memory, knowledge, deadline, goal_heights):
         assert not knowledge.library.demonstrations and goal_heights is None
         assert deadline is NEVER
         self.calls.append((config, hand, obstacles, goals, memory))
@@ -57,17 +46,17 @@ class Recorder:
 
 
 @pytest.fixture
-def recorder(monkeypatch: pytest.MonkeyPatch) -> Recorder:
+def recorder(monkeypatch):
     stand_in = Recorder()
     monkeypatch.setattr(module, 'predict', stand_in)
     return stand_in
 
 
-def hand(ms: float, x: float = 0.0, frame: str = 'world') -> HandSample:
+def hand(ms, x=0.0, frame='world'):
     return HandSample(START + round(ms * MS), np.array([x, 0.0]), 0.3, frame)
 
 
-def ready(config: Config = CONFIG) -> Pipeline:
+def ready(config=CONFIG):
     """Return a pipeline with a scene and a goal, but without a hand sample."""
     pipeline = Pipeline(config)
     pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03), START, 'world')
@@ -75,13 +64,8 @@ def ready(config: Config = CONFIG) -> Pipeline:
     return pipeline
 
 
-def observe(pipeline: Pipeline) -> tuple[object, ...]:
-    is_due, reason = pipeline.is_due, pipeline.not_ready_reason()
-    return pipeline.hand_state, pipeline.scene, is_due, reason, pipeline.is_engaged, pipeline.frame_id
-
-
 @pytest.mark.parametrize(('period_ms', 'expected'), [(1.0, 50), (14.0, 48), (19.9, 50), (30.0, 34)])
-def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder: Recorder, period_ms: float, expected: int) -> None:
+def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder, period_ms, expected):
     pipeline, stamps = ready(), []
     for ms in np.arange(0.0, 1000.0, period_ms):
         pipeline.add_hand_sample(hand(ms))
@@ -94,7 +78,7 @@ def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder: Record
     assert np.diff(stamps).min() >= 10 * MS
 
 
-def test_every_reason_for_no_prediction_is_explained(recorder: Recorder) -> None:
+def test_every_reason_for_no_prediction_is_explained(recorder):
     pipeline = Pipeline(CONFIG)
     assert pipeline.not_ready_reason() == 'no hand pose yet'
     pipeline.add_hand_sample(hand(0.0))
@@ -116,47 +100,8 @@ def test_every_reason_for_no_prediction_is_explained(recorder: Recorder) -> None
     assert recorder.calls == []
 
 
-def test_a_rejected_message_changes_nothing_and_is_counted_with_its_reason(recorder: Recorder) -> None:
-    pipeline = ready()
-    pipeline.add_hand_sample(hand(100.0))
-    frame, nothing, S = "header.frame_id: expected the working frame 'world', got 'camera'", make_obstacles(), SampleStatus
-    hands, scenes = pipeline.add_hand_sample, pipeline.set_obstacles
-    rejections = [
-        (lambda: hands(hand(100.0)), S.DUPLICATE, 'hand_duplicate', 'stamps repeat: 1000100000000 ns'),
-        (lambda: hands(hand(90.0)), S.LATE, 'hand_late', '0.01 s behind the newest one'),
-        (lambda: hands(hand(110.0, frame='camera')), S.WRONG_FRAME, 'hand_wrong_frame', f'hand_pose.{frame}'),
-        (lambda: scenes('cloud', nothing, START, 'camera'), S.WRONG_FRAME, 'obstacles_wrong_frame', f'cloud.{frame}'),
-        (lambda: scenes('cloud', nothing, START - MS, 'world'), S.LATE, 'obstacles_late', '0.001 s behind the newest one'),
-        (lambda: pipeline.set_goals(np.zeros((1, 2)), 'camera'), S.WRONG_FRAME, 'goals_wrong_frame', f'goals.{frame}'),
-    ]
-    before = observe(pipeline)
-    for reject, status, kind, words in rejections:
-        assert reject() is status
-        assert not status.is_taken
-        assert observe(pipeline) == before
-        assert pipeline.counts[kind] == 1
-        assert pipeline.last_refusal is not None
-        assert words in pipeline.last_refusal
-    assert sum(pipeline.counts.values()) == len(rejections)
-
-
-def test_while_disengaged_the_hand_is_followed_without_predictions(recorder: Recorder) -> None:
-    pipeline = ready()
-    pipeline.add_hand_sample(hand(0.0))
-    pipeline.predict()
-    pipeline.set_engaged(False)
-    assert pipeline.add_hand_sample(hand(50.0, 0.02)) is SampleStatus.DISENGAGED
-    assert not pipeline.is_due and pipeline.counts['hand_disengaged'] == 1
-    assert pipeline.hand_state is not None and pipeline.hand_state.stamp_ns == START + 50 * MS
-    pipeline.set_engaged(True)
-    assert not pipeline.is_due and pipeline.predict() is None
-    assert pipeline.add_hand_sample(hand(51.0, 0.02)) is SampleStatus.ACCEPTED
-    assert pipeline.is_due and pipeline.predict() is not None
-    assert recorder.calls[1][4].stamp_ns is None, 'a new movement'
-
-
-def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*arguments: object) -> tuple[Prediction, Tracks]:
+def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch):
+    def refuse(*arguments):
         raise SceneError('goals[0]', 'a goal outside of every obstacle', '(0.15, 0)')
 
     monkeypatch.setattr(module, 'predict', refuse)
@@ -168,54 +113,29 @@ def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch: pytest.Monke
     assert pipeline.last_refusal == 'goals[0]: expected a goal outside of every obstacle, got (0.15, 0)'
 
 
-EVENTS = {
-    'reset': lambda pipeline: pipeline.reset(),
-    'clutch': lambda pipeline: pipeline.set_engaged(False),
-    'parameters': lambda pipeline: pipeline.reconfigure(replace_values(CONFIG, {'foc.eta': 0.5})),
-    'restart': lambda pipeline: pipeline.add_hand_sample(hand(-10_000.0)),
-}
-
-
-@pytest.mark.parametrize('event', EVENTS)
-def test_a_prediction_that_was_begun_before_an_event_is_neither_returned_nor_remembered(recorder: Recorder, event: str) -> None:
-    pipeline, deadline = ready(), Deadline()
-    pipeline.add_hand_sample(hand(0.0))
-    task = pipeline.begin(deadline)
-    assert task is not None and not deadline.has_passed
-    EVENTS[event](pipeline)
-    assert deadline.has_passed
-    assert pipeline.finish(task, task.run) is None
-    assert pipeline.counts['predict_abandoned'] == 1
-    assert recorder.calls == []
-    pipeline.set_engaged(True)
-    pipeline.add_hand_sample(hand(100.0))
-    assert pipeline.is_due and pipeline.predict() is not None
-    assert recorder.calls[0][4].stamp_ns is None
-
-
 TYPES = message_types('rosbags')
 
 
 @pytest.fixture
-def intake() -> Intake:
+def intake():
     return Intake(Pipeline(replace_values(Config(), {'scene.marker_radius_stddev': 0.004})))
 
 
-def move(intake: Intake, seconds: float, frame_id: str = 'world') -> SampleStatus | None:
+def move(intake, seconds, frame_id='world'):
     return intake.take('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.2), round(seconds * SECOND), frame_id))
 
 
-def show(intake: Intake, *markers: Any) -> SampleStatus | None:
+def show(intake, *markers):
     return intake.take('obstacle_markers', marker_array(TYPES, *markers))
 
 
-def seen(intake: Intake) -> tuple[str, ...]:
+def seen(intake):
     state = intake.pipeline.hand_state
     assert state is not None
     return intake.pipeline.scene.obstacles(state.stamp_ns).ids
 
 
-def test_every_input_reaches_the_pipeline(intake: Intake) -> None:
+def test_every_input_reaches_the_pipeline(intake):
     assert move(intake, 1.0) is SampleStatus.ACCEPTED
     assert intake.sample is not None and intake.sample.height == 0.2
     assert intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)]))) is SampleStatus.ACCEPTED
@@ -229,7 +149,7 @@ def test_every_input_reaches_the_pipeline(intake: Intake) -> None:
     assert intake.counts == {} and intake.last_refusal is None
 
 
-def test_a_marker_expires_by_the_stamp_of_the_hand(intake: Intake) -> None:
+def test_a_marker_expires_by_the_stamp_of_the_hand(intake):
     move(intake, 1.0)
     show(intake, marker(TYPES, id=1, lifetime=0.5), marker(TYPES, id=2))
     for seconds, expected in ((1.1, ('a/1', 'a/2')), (1.4, ('a/1', 'a/2')), (1.6, ('a/2',))):
@@ -237,7 +157,7 @@ def test_a_marker_expires_by_the_stamp_of_the_hand(intake: Intake) -> None:
         assert seen(intake) == expected
 
 
-def test_markers_of_publishers_with_different_delays_are_all_used(intake: Intake) -> None:
+def test_markers_of_publishers_with_different_delays_are_all_used(intake):
     move(intake, 1.0)
     for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
         assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is SampleStatus.ACCEPTED
@@ -245,7 +165,7 @@ def test_markers_of_publishers_with_different_delays_are_all_used(intake: Intake
     assert intake.pipeline.scene.sources['markers'].stamp_ns == SECOND
 
 
-def test_a_table_that_never_held_a_marker_is_no_source(intake: Intake) -> None:
+def test_a_table_that_never_held_a_marker_is_no_source(intake):
     """One that did, and holds none any more, is an empty scene."""
     move(intake, 1.0)
     nothing = marker(TYPES, action=3, ns='', frame_id='')
@@ -258,7 +178,7 @@ def test_a_table_that_never_held_a_marker_is_no_source(intake: Intake) -> None:
     assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
 
 
-def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake: Intake) -> None:
+def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):
     move(intake, 1.0)
     show(intake, marker(TYPES, id=1, lifetime=5.0))
     intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)])))
@@ -272,7 +192,7 @@ def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake: In
     assert seen(intake) == ('a/2',)
 
 
-def test_markers_in_another_frame_are_discarded(intake: Intake) -> None:
+def test_markers_in_another_frame_are_discarded(intake):
     """They are received before the hand pose that fixes another working frame."""
     show(intake, marker(TYPES, id=1, frame_id='camera'))
     move(intake, 1.0)
@@ -287,7 +207,7 @@ POSE_MS = SECOND // 1000
 A, S, R = SampleStatus.ACCEPTED, SampleStatus.SKIPPED, SampleStatus.RESTARTED_BACKWARD
 
 
-def pose(ms: float, x: float = 0.0, frame_id: str = 'world') -> Any:
+def pose(ms, x=0.0, frame_id='world'):
     return pose_stamped(TYPES, (x, 0.0, 0.1), 10 * SECOND + round(ms * POSE_MS), frame_id)
 
 
@@ -302,15 +222,13 @@ def pose(ms: float, x: float = 0.0, frame_id: str = 'world') -> Any:
         pytest.param(0.0, (0, 1, 1.001), (A, A, A), id='switched off'),
     ],
 )
-def test_poses_are_skipped_by_their_stamps(
-    interval_s: float, stamps_ms: tuple[float, ...], expected: tuple[SampleStatus, ...]
-) -> None:
+def test_poses_are_skipped_by_their_stamps(interval_s, stamps_ms, expected):
     intake = Intake(Pipeline(replace_values(Config(), {'estimator.min_interval_s': interval_s})))
     assert tuple(intake.take('hand_pose', pose(ms)) for ms in stamps_ms) == expected
     assert intake.counts.get('hand_skipped', 0) == expected.count(S)
 
 
-def test_only_the_stamp_of_a_skipped_pose_is_looked_at() -> None:
+def test_only_the_stamp_of_a_skipped_pose_is_looked_at():
     """Bad poses between good ones count as skipped; where no good one is near, they are refused with their reason."""
     intake = Intake(Pipeline(Config()))
     intake.take('hand_pose', pose(0))
@@ -327,19 +245,19 @@ def test_only_the_stamp_of_a_skipped_pose_is_looked_at() -> None:
     assert intake.take('hand_pose', wrong) is None
 
 
-def test_a_publisher_in_a_wrong_frame_does_not_keep_the_right_one_away() -> None:
+def test_a_publisher_in_a_wrong_frame_does_not_keep_the_right_one_away():
     intake = Intake(Pipeline(replace_values(Config(), {'frame_id': 'world'})))
     found = [intake.take('hand_pose', pose(2 * i, 0.0, 'camera' if i % 2 else 'world')) for i in range(100)]
     assert found.count(A) == 50
 
 
-def predict(bag: Path, config: Config) -> tuple[list[Prediction], dict[str, int]]:
+def predict(bag, config):
     replayed = Replay(config)
     with BagReader(bag) as reader:
         return [each.prediction for each in replayed.steps(reader) if each.prediction is not None], replayed.intake.counts
 
 
-def are_equal(one: list[Prediction], other: list[Prediction]) -> bool:
+def are_equal(one, other):
     """Whether predictions are the same to the last bit."""
     return len(one) == len(other) and all(
         a.stamp_ns == b.stamp_ns
@@ -349,7 +267,7 @@ def are_equal(one: list[Prediction], other: list[Prediction]) -> bool:
     )
 
 
-def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_path: Path) -> None:
+def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_path):
     items = messages(0.2, rate_hz=1000.0)
     hands = [item for item in items if item[0] == '/hand_pose']
     dropped = {id(item) for i, item in enumerate(hands) if i % 4}
@@ -358,6 +276,39 @@ def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_p
     assert (counts.get('hand_skipped'), none.get('hand_skipped')) == (len(dropped), None)
     assert whole and are_equal(whole, thinned)
     assert not are_equal(whole, predict(tmp_path / 'whole', replace_values(BAG_CONFIG, {'estimator.min_interval_s': 0.0}))[0])
+
+
+def test_the_union_of_the_sources_holds_the_latest_row_of_an_id():
+    cloud = make_obstacles([[0.0, 0.0], [1.0, 0.0]], 0.1, 0.01, ids=('a', 'b'))
+    markers = make_obstacles([[5.0, 0.0], [2.0, 0.0]], 0.2, 0.02, ids=('b', 'c'))
+    scene = Scene().with_source('cloud', ObstacleSource(cloud, START, 'w'))
+    scene = scene.with_source('markers', ObstacleSource(markers, START, 'w'))
+    merged = scene.obstacles(START)
+    assert merged.ids == ('a', 'b', 'c')
+    np.testing.assert_array_equal(merged.centre[:, 0], [0.0, 5.0, 2.0])
+    np.testing.assert_array_equal(merged.radius, [0.1, 0.2, 0.2])
+    np.testing.assert_array_equal(merged.radius_stddev, [0.01, 0.02, 0.02])
+    again = scene.with_source('cloud', ObstacleSource(cloud, START, 'w')).obstacles(START)
+    assert dict(zip(again.ids, again.centre[:, 0], strict=True)) == {'a': 0.0, 'b': 1.0, 'c': 2.0}
+
+
+@pytest.mark.parametrize(
+    ('ages', 'timeout', 'words'),
+    [
+        ([3.1], 2.0, 'obstacles are 3.1 s older than the hand pose (scene.timeout_s is 2)'),
+        ([-3.1], 2.0, 'obstacles are 3.1 s newer than the hand pose (scene.timeout_s is 2)'),
+        ([0.0, 2.5], 2.0, 'obstacles are 2.5 s older than the hand pose (scene.timeout_s is 2)'),
+        ([2.0], 2.0, None),
+        ([1e6], 0.0, None),
+        ([None], 2.0, None),
+    ],
+)
+def test_stale_sources_are_found_by_their_stamps(ages, timeout, words):
+    scene = Scene().with_goals(np.zeros((1, 2)), 'w')
+    for i, age in enumerate(ages):
+        stamp = None if age is None else START - round(age * 1e9)
+        scene = scene.with_source(str(i), ObstacleSource(make_obstacles(), stamp, 'w'))
+    assert scene.not_ready_reason(START, timeout) == (None if words is None else ('stale', words))
 
 
 FRESH_CONFIG = replace_values(Config(), {'estimator.hand_timeout_s': 0.5, 'scene.timeout_s': 2.0})
@@ -376,7 +327,7 @@ ENDLESS_CONFIG = replace_values(Config(), {'estimator.hand_timeout_s': 0.0, 'sce
         [(10.0, 0.0, False, ''), (10.1, 10.1, False, ''), (10.2, 11.2, False, 'older')],
     ],
 )
-def test_poses_stamped_by_ros_time_are_judged_by_it(poses: list[tuple[float, float, bool, str]]) -> None:
+def test_poses_stamped_by_ros_time_are_judged_by_it(poses):
     freshness = Freshness()
     for stamp_s, clock_s, is_restart, words in poses:
         freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, is_restart=is_restart)
@@ -385,18 +336,3 @@ def test_poses_stamped_by_ros_time_are_judged_by_it(poses: list[tuple[float, flo
         assert freshness.find_not_ready_reason(0.0, ENDLESS_CONFIG, ()) is None
     freshness.forget_clock()
     assert freshness.find_not_ready_reason(0.0, FRESH_CONFIG, ()) is None
-
-
-@pytest.mark.parametrize(
-    ('stamp_s', 'received_s', 'words'),
-    [(100.0, 9.9, None), (100.0, 9.4, '0.6 s old'), (99.3, 9.9, '0.8 s old')],
-)
-def test_a_prediction_is_late_by_the_age_of_its_own_pose(stamp_s: float, received_s: float, words: str | None) -> None:
-    """The pose behind it may be fresh: what counts is when the pose was stamped and received from which it was computed."""
-    freshness, clock_ns = Freshness(), round(100.1 * NANOSECONDS)
-    freshness.note_pose(100 * NANOSECONDS, clock_ns, 0.5, is_restart=False)
-    stamp_ns = round(stamp_s * NANOSECONDS)
-    found = freshness.find_late_reason(stamp_ns, received_s, 10.0, clock_ns, FRESH_CONFIG)
-    assert (found is None) == (words is None) and (words or '') in (found or '')
-    assert freshness.find_late_reason(stamp_ns, received_s, 10.0, clock_ns, ENDLESS_CONFIG) is None
-    assert Freshness().find_late_reason(1, 9.9, 10.0, 10**18, FRESH_CONFIG) is None, 'the stamps of a recording'

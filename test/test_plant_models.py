@@ -90,7 +90,7 @@ def test_what_is_no_plant_model_is_refused(register):
         Config().with_values({'foc.plant': 'unicycle'})
 
 
-def zero_order_hold(a: np.ndarray, b: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+def zero_order_hold(a, b, dt):
     n, m = b.shape
     block = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * dt)
     return block[:n, :n], block[:n, n:]

@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parts of `foc_ros play` that need neither a browser nor a session: messages, clock, scene, tasks and the predictor."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -63,12 +60,12 @@ HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': 8.0}
         ({'type': 'stop', 'on': True}, r'stop\.on: expected no such field, got True'),
     ],
 )
-def test_a_bad_message_is_refused_with_field_value_and_bound(message: Any, error: str) -> None:
+def test_a_bad_message_is_refused_with_field_value_and_bound(message, error):
     with pytest.raises(InputError, match=error):
         parse_message(message if isinstance(message, str) else json.dumps(message))
 
 
-def test_a_scene_reaches_the_node_as_it_was_arranged() -> None:
+def test_a_scene_reaches_the_node_as_it_was_arranged():
     scene = parse(SCENE)
     assert parse(scene.model_dump()) == scene
     messages = scene.encode(TYPES, 5)
@@ -79,7 +76,7 @@ def test_a_scene_reaches_the_node_as_it_was_arranged() -> None:
     np.testing.assert_allclose(decode_goals(messages['goals'], 'xy')[0], [[0.3, 0.0]])
 
 
-def test_stamps_follow_the_quickest_message_and_never_step_back() -> None:
+def test_stamps_follow_the_quickest_message_and_never_step_back():
     clock, second = PageClock(), 10**9
     assert clock.stamp(1000.0, 100 * second) == 100 * second
     # this message took 50 ms less: those after it count from there
@@ -95,7 +92,7 @@ def test_stamps_follow_the_quickest_message_and_never_step_back() -> None:
     assert clock.stamp(1140.0, 100 * second + 60_000_000) == 100 * second + 50_000_000
 
 
-def test_a_trial_is_scored() -> None:
+def test_a_trial_is_scored():
     """The hand moves along x at 0.1 m/s through a circle, and the way of number 7 is the most likely one from x = 0.1 m on."""
     scene = parse(SCENE | {'obstacles': [CIRCLE | {'x': 0.15}]})
     tasks = Tasks(parse(TASKS | {'trials': 1, 'assistance': 'without'}), scene)
@@ -121,7 +118,7 @@ def test_a_trial_is_scored() -> None:
     assert tabulate_scores([score]) == [('without guidance', '1', *numbers)]
 
 
-def test_the_state_is_well_only_while_predictions_succeed() -> None:
+def test_the_state_is_well_only_while_predictions_succeed():
     """It fails where the pipeline fails, no path is found, all paths are from before, or the thread is gone."""
     predictor = Predictor(Config(budget_s=0.0), lambda _: None)
     assert predictor.check().level == 'failing', 'not started'

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The web server of `foc_ros play`: what it serves, and to whom."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import json
@@ -12,9 +10,7 @@ import signal
 import subprocess
 import sys
 import warnings
-from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -22,8 +18,8 @@ pytest.importorskip('tornado', reason='tornado is not installed')
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from play_helpers import play
-from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
-from tornado.websocket import WebSocketClientConnection, websocket_connect
+from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
+from tornado.websocket import websocket_connect
 
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
@@ -37,7 +33,7 @@ HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': None}
 
 
 @pytest.fixture(autouse=True)
-def _no_warning_of_sockets() -> Iterator[None]:
+def _no_warning_of_sockets():
     """Collect the sockets of refused connections here, which Tornado leaves to the garbage collector."""
     with warnings.catch_warnings():
         warnings.simplefilter('ignore', ResourceWarning)
@@ -45,10 +41,10 @@ def _no_warning_of_sockets() -> Iterator[None]:
         gc.collect()
 
 
-def serve(tmp_path: Path, test: Callable[[str], Awaitable[None]]) -> None:
+def serve(tmp_path, test):
     """Run a coroutine with the address of a server whose predictor was not started."""
 
-    async def run() -> None:
+    async def run():
         session = Session(Predictor, Config(), tmp_path)
         sockets = open_sockets('127.0.0.1', 0)
         server = listen(session, '127.0.0.1', sockets)
@@ -61,16 +57,16 @@ def serve(tmp_path: Path, test: Callable[[str], Awaitable[None]]) -> None:
     asyncio.run(run())
 
 
-async def get(address: str, path: str, **headers: str) -> HTTPResponse:
+async def get(address, path, **headers):
     return await AsyncHTTPClient().fetch(f'http://{address}{path}', headers=headers, raise_error=False)
 
 
-async def connect(address: str, origin: str = '', **headers: str) -> WebSocketClientConnection:
+async def connect(address, origin='', **headers):
     request = HTTPRequest(f'ws://{address}/socket', headers={'Origin': origin or f'http://{address}'} | headers)
     return await websocket_connect(request)
 
 
-async def read(socket: WebSocketClientConnection, kind: str) -> dict[str, Any]:
+async def read(socket, kind):
     """Return the next message of a kind."""
     while (text := await asyncio.wait_for(socket.read_message(), 20)) is not None:
         message = json.loads(text)
@@ -79,8 +75,8 @@ async def read(socket: WebSocketClientConnection, kind: str) -> dict[str, Any]:
     raise AssertionError(f'closed before a message {kind}')
 
 
-def test_only_files_of_the_page_are_served(tmp_path: Path) -> None:
-    async def test(address: str) -> None:
+def test_only_files_of_the_page_are_served(tmp_path):
+    async def test(address):
         for path, file in FILES.items():
             response = await get(address, path)
             assert (response.code, response.body) == (200, file.read_bytes())
@@ -92,8 +88,8 @@ def test_only_files_of_the_page_are_served(tmp_path: Path) -> None:
     serve(tmp_path, test)
 
 
-def test_a_name_that_was_made_to_lead_here_is_refused(tmp_path: Path) -> None:
-    async def test(address: str) -> None:
+def test_a_name_that_was_made_to_lead_here_is_refused(tmp_path):
+    async def test(address):
         port = address.rpartition(':')[2]
         for path in ('/', '/play.js', '/report', '/socket'):
             assert (await get(address, path, Host=f'attacker.example:{port}')).code == 404
@@ -102,8 +98,8 @@ def test_a_name_that_was_made_to_lead_here_is_refused(tmp_path: Path) -> None:
     serve(tmp_path, test)
 
 
-def test_another_page_cannot_connect(tmp_path: Path) -> None:
-    async def test(address: str) -> None:
+def test_another_page_cannot_connect(tmp_path):
+    async def test(address):
         port = address.rpartition(':')[2]
         for origin in ('http://attacker.example', f'http://127.0.0.1:{int(port) - 1}', 'null', f'http://localhost:{port}'):
             with pytest.raises(HTTPClientError, match='403'):
@@ -115,8 +111,8 @@ def test_another_page_cannot_connect(tmp_path: Path) -> None:
     serve(tmp_path, test)
 
 
-def test_bad_messages_are_refused_and_harm_nothing(tmp_path: Path) -> None:
-    async def test(address: str) -> None:
+def test_bad_messages_are_refused_and_harm_nothing(tmp_path):
+    async def test(address):
         socket = await connect(address)
         assert (await read(socket, 'scene'))['goals']
         for text, error in (
@@ -141,7 +137,7 @@ def test_bad_messages_are_refused_and_harm_nothing(tmp_path: Path) -> None:
     serve(tmp_path, test)
 
 
-def test_a_wrong_option_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_option_is_refused_in_one_line(tmp_path, capsys):
     with (tmp_path / 'file').open('w'):
         pass
     for arguments, error in (
@@ -154,12 +150,12 @@ def test_a_wrong_option_is_refused_in_one_line(tmp_path: Path, capsys: pytest.Ca
         assert error in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> None:
+def test_the_command_ends_when_it_is_interrupted(tmp_path):
+    """All other servers of these tests end by SIGTERM, with the same exit code."""
     with play(tmp_path, '--host', '0.0.0.0') as started:
         assert started.output.startswith('foc_ros play: loading ...\n')
         assert 'warning: everybody who reaches 0.0.0.0 can steer the hand' in started.output
-        started.process.send_signal(number)
+        started.process.send_signal(signal.SIGINT)
         assert started.process.wait(30) == 0
 
 
@@ -170,7 +166,7 @@ def test_the_command_ends_when_it_is_stopped(tmp_path: Path, number: int) -> Non
         ('pydantic', "scene files and the page need pydantic of version 2: pip install 'pydantic>=2'"),
     ],
 )
-def test_without_a_library_the_message_says_what_to_install(tmp_path: Path, name: str, words: str) -> None:
+def test_without_a_library_the_message_says_what_to_install(tmp_path, name, words):
     (tmp_path / f'{name}.py').write_text('raise ImportError')
     paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[1]), *filter(None, [os.environ.get('PYTHONPATH')])])
     command = [sys.executable, '-m', 'foc_ros', 'play', '--port', '0', '--data', str(tmp_path / 'data')]

@@ -2,23 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """A session of `foc_ros play`: tasks, recordings, the fit and its comparison, and what is refused."""
 
-from __future__ import annotations
-
 import asyncio
+import contextlib
+import io
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
+from fit_recordings import use_few_predictions
 from report_samples import predictions, samples
 from session_helpers import SCENE, TASKS, Page, Silent, reach, wait_until
 
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.analysis.replay import Replay
+from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError
 from foc_ros.io.bags import BagReader
@@ -31,10 +32,9 @@ from foc_ros.reporting.encode import LENGTH
 from foc_ros.ros.parameters import dump_parameter_file
 
 
-@pytest.fixture
-def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Page:
+def make_page(folder, monkeypatch, config):
     """Return a page of a session whose clock goes on with the time of the page."""
-    session = Session(Silent, Config(), tmp_path / 'data')
+    session = Session(Silent, config, folder)
     session.predictor.start()
     page = Page(session)
     for module in ('session', 'recording'):
@@ -42,7 +42,12 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Page:
     return page
 
 
-def test_tasks_leave_bags_that_fit_and_evaluate_read(page: Page) -> None:
+@pytest.fixture
+def page(tmp_path, monkeypatch):
+    return make_page(tmp_path / 'data', monkeypatch, Config())
+
+
+def test_tasks_leave_bags_that_fit_and_evaluate_read(page):
     page.send(TASKS)
     with pytest.raises(InputError, match='scene: expected no change while tasks run'):
         page.send(SCENE)
@@ -63,7 +68,7 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page: Page) -> None:
         assert sum(item.role == 'hand_pose' for item in reader) > len(stamps)
 
 
-def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None:
+def test_a_blinded_page_learns_nothing_from_what_it_receives(page):
     """The page receives no prediction, and the same messages with and without guidance; the force itself must be felt."""
     received = {}
     for assistance in ('with', 'without'):
@@ -77,7 +82,7 @@ def test_a_blinded_page_learns_nothing_from_what_it_receives(page: Page) -> None
     assert {each['type'] for each in received['with']} == {'task', 'status'}
 
 
-async def work(page: Page, name: str) -> dict[str, Any]:
+async def work(page, name):
     """Press the button of a job, and return what the page is told at its end."""
     page.send({'type': 'job', 'name': name})
     await wait_until(lambda: page.last('job')['state'] != 'running', 800.0)
@@ -85,17 +90,24 @@ async def work(page: Page, name: str) -> dict[str, Any]:
     return page.last('job')
 
 
-def record_trials(page: Page, count: int) -> None:
+def record_trials(page, count):
     page.send(TASKS | {'trials': count, 'assistance': 'without'})
     for _ in range(count):
         reach(page)
 
 
-@pytest.mark.timeout(900)
-def test_a_fit_and_its_comparison(page: Page) -> None:
-    """The commands behind the buttons, on three trials."""
+QUICK = Config().with_values({'rate_hz': 5.0, 'foc.steps': 15, 'homotopy.max_candidates': 2})
 
-    async def run() -> None:
+
+def test_a_fit_and_its_comparison(tmp_path, monkeypatch):
+    """The commands behind the buttons, on three trials, in this process and with few predictions and settings."""
+
+    async def run_here(note, *arguments):
+        with contextlib.redirect_stdout(io.StringIO()) as output:
+            assert main([*map(str, arguments), '--workers', '1']) == 0
+        return output.getvalue()
+
+    async def run():
         fitted = await work(page, 'fit')
         assert fitted['columns'] == ['parameter', 'before', 'after']
         assert 'duration.fitts_b_s' in [row[0] for row in fitted['rows']]
@@ -103,27 +115,28 @@ def test_a_fit_and_its_comparison(page: Page) -> None:
         assert 'on the trials of the fit' in compared['text']
         assert [row[0] for row in compared['rows']][:2] == ['path class: correct [%]', 'path class: log-likelihood [nat]']
 
+    use_few_predictions(monkeypatch)
+    monkeypatch.setattr(jobs, 'run_command', run_here)
+    page = make_page(tmp_path, monkeypatch, QUICK)
     record_trials(page, 3)
     asyncio.run(run())
     assert page.last('settings')['fitted']
     page.send({'type': 'parameters', 'name': 'mine'})  # the page keeps the others if positions become worse
     assert page.last('settings')['parameters'] == 'mine'
     mine = page.session.predictor.configs[-1]
-    assert mine.duration != Config().duration
+    assert mine.duration != QUICK.duration
     assert mine.plane == 'xy'
     page.send({'type': 'parameters', 'name': 'standard'})
-    assert page.session.predictor.configs[-1] == Config()
+    assert page.session.predictor.configs[-1] == QUICK
 
 
 FITTED = {'likelihood.beta': 7.5}
 
 
-def fit_with_errors(
-    page: Page, monkeypatch: pytest.MonkeyPatch, before_m: float, after_m: float, failed: dict[str, str] | None = None
-) -> dict[str, Any]:
+def fit_with_errors(page, monkeypatch, before_m, after_m, failed=None):
     """Press the button of the fit; in place of the command, write FITTED, with the errors of positions before and after it."""
 
-    async def fit(note: Any, *arguments: str | Path) -> str:
+    async def fit(note, *arguments):
         note('replays: 20 of 40')
         given = list(map(str, arguments))
         assert given[0] == 'fit' and given[given.index('--allow') + 1] == 'positions'
@@ -146,9 +159,7 @@ UNUSED = {'trial_002': 'nothing could be predicted'}
 
 
 @pytest.mark.parametrize(('after_m', 'text', 'used'), [(0.060, BETTER, 'mine'), (0.096, WORSE, 'standard')])
-def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_so(
-    page: Page, monkeypatch: pytest.MonkeyPatch, after_m: float, text: str, used: str
-) -> None:
+def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_so(page, monkeypatch, after_m, text, used):
     record_trials(page, 1)
     configs = {'standard': Config(), 'mine': replace_values(Config(), FITTED)}
     fitted = fit_with_errors(page, monkeypatch, 0.063, after_m, UNUSED)
@@ -162,7 +173,7 @@ def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_s
     fit_with_errors(page, monkeypatch, 0.063, after_m)
     assert page.last('settings')['parameters'] == used and page.session.predictor.configs[-1] == configs[used]
 
-    async def evaluate(*_: object) -> str:
+    async def evaluate(*_):
         return json.dumps({'questions': {}, 'positions': NO_POSITIONS, 'failed': UNUSED})
 
     monkeypatch.setattr(jobs, 'run_command', evaluate)
@@ -175,7 +186,7 @@ NO_POSITIONS = {
 }
 
 
-def test_what_is_impossible_is_refused(page: Page) -> None:
+def test_what_is_impossible_is_refused(page):
     for message, error in (
         ({'type': 'job', 'name': 'report'}, 'job: expected a session that was recorded, got report'),
         ({'type': 'parameters', 'name': 'mine'}, 'parameters: expected standard until parameters were fitted, got mine'),
@@ -190,7 +201,7 @@ def test_what_is_impossible_is_refused(page: Page) -> None:
     assert page.last('settings')['recording'] is False
 
 
-def test_a_page_that_is_loaded_again_finds_everything_as_it_was(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_that_is_loaded_again_finds_everything_as_it_was(page, monkeypatch):
     record_trials(page, 1)
     fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060)
     asyncio.run(work(page, 'report'))
@@ -204,7 +215,7 @@ def test_a_page_that_is_loaded_again_finds_everything_as_it_was(page: Page, monk
     assert '<h2>Score</h2>' in report and f'<td>{score["rows"][0][2]}</td>' in report, 'the score is in the report'
 
 
-def test_a_fit_shows_its_progress_and_can_be_cancelled(page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fit_shows_its_progress_and_can_be_cancelled(page, tmp_path, monkeypatch):
     record_trials(page, 1)
     program, ended = tmp_path / 'program', tmp_path / 'ended'
     program.write_text(
@@ -213,7 +224,7 @@ def test_a_fit_shows_its_progress_and_can_be_cancelled(page: Page, tmp_path: Pat
     program.chmod(0o755)
     monkeypatch.setattr(jobs.sys, 'executable', str(program))
 
-    async def run() -> None:
+    async def run():
         page.send({'type': 'job', 'name': 'fit'})
         await wait_until(lambda: page.last('job')['text'] == 'replays: 20 of 60')
         assert page.last('job')['state'] == 'running'
@@ -225,7 +236,7 @@ def test_a_fit_shows_its_progress_and_can_be_cancelled(page: Page, tmp_path: Pat
     assert page.last('settings')['fitted'] is False
 
 
-def test_only_the_newest_page_steers(page: Page) -> None:
+def test_only_the_newest_page_steers(page):
     other = Page(page.session)
     assert page.last('replaced') == {'type': 'replaced'}
     before = len(page.session.predictor.sent)
@@ -236,10 +247,8 @@ def test_only_the_newest_page_steers(page: Page) -> None:
 
 
 @pytest.mark.parametrize('begin', [{'type': 'record', 'on': True}, TASKS | {'assistance': 'with'}], ids=['recording', 'tasks'])
-def test_a_full_disk_ends_recording_and_tasks_and_nothing_else(
-    page: Page, monkeypatch: pytest.MonkeyPatch, begin: dict[str, Any]
-) -> None:
-    def fail(*_: object) -> None:
+def test_a_full_disk_ends_recording_and_tasks_and_nothing_else(page, monkeypatch, begin):
+    def fail(*_):
         raise OSError(28, 'No space left on device')
 
     page.send(begin)
@@ -252,13 +261,13 @@ def test_a_full_disk_ends_recording_and_tasks_and_nothing_else(
     page.move(START)
 
 
-def test_the_library_predicts_and_reports_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_library_predicts_and_reports_the_session(tmp_path, monkeypatch):
     """The hand moves to a goal; the report holds what was predicted, and the bag what was sent."""
 
-    async def run() -> tuple[Page, Session]:
+    async def run():
         loop = asyncio.get_running_loop()
 
-        def make(config: Config, receive: Any) -> Predictor:
+        def make(config, receive):
             return Predictor(config, lambda outcome: loop.call_soon_threadsafe(receive, outcome))
 
         session = Session(make, Config(budget_s=0.0, rate_hz=20.0), tmp_path)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording through the predictor: the same each time, nothing lost, every refusal counted."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json
@@ -13,15 +11,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_mcap, write_parameters
+from message_helpers import read_columns
+from rosbags.highlevel import AnyReader
 
 from foc_ros.analysis.replay import Replay, replay
 from foc_ros.cli.main import main
-from foc_ros.core.config import replace_values
+from foc_ros.core.config import Config, GuidanceConfig, replace_values
 from foc_ros.io.bags import BagReader
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import make_header
 
+RECORDING = Path(__file__).parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 FEW = 0.12
 """Seconds of a reach that are enough for a few predictions."""
 NAMES = 'label description goal sides status effort cost eta tau lambda likelihood qp_solves mean stddev'
@@ -29,21 +31,21 @@ HEIGHT_NAMES = ' height height_velocity height_stddev'
 
 
 @pytest.fixture(scope='module')
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bag(tmp_path_factory):
     return write_bag(tmp_path_factory.mktemp('replay') / 'reach', messages(seconds=FEW))
 
 
 @pytest.fixture(scope='module')
-def answer(bag: Path) -> dict[str, Any]:
+def answer(bag):
     """Return what `replay --json` prints of the bag."""
     return replay_json(bag)
 
 
-def run(bag: Path, *options: str) -> int:
-    return main(['replay', str(bag), '--params', write_parameters(bag.parent), *options])
+def run(bag, *options, config=CONFIG):
+    return main(['replay', str(bag), '--params', write_parameters(bag.parent, config), *options])
 
 
-def replay_json(bag: Path, *options: str) -> dict[str, Any]:
+def replay_json(bag, *options):
     output, errors = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
         assert run(bag, '--json', *options) == 0
@@ -51,11 +53,11 @@ def replay_json(bag: Path, *options: str) -> dict[str, Any]:
     return json.loads(output.getvalue(), parse_constant=lambda name: pytest.fail(f'{name} is no JSON'))
 
 
-def without_times(answer: dict[str, Any]) -> dict[str, Any]:
+def without_times(answer):
     return {**answer, 'summary': {name: value for name, value in answer['summary'].items() if name != 'prediction_ms'}}
 
 
-def test_json_has_the_promised_names(answer: dict[str, Any]) -> None:
+def test_json_has_the_promised_names(answer):
     samples = len(reach(FEW))
     summary = answer['summary']
     counts = {name: summary[name] for name in ('samples', 'predictions', 'refused')}
@@ -75,14 +77,14 @@ def test_json_has_the_promised_names(answer: dict[str, Any]) -> None:
         assert np.allclose([each['mean'][-1] for each in solved], [0.3, 0.0], atol=1e-6)
 
 
-def test_the_same_answer_each_time_also_with_topics_by_type(tmp_path: Path, bag: Path, answer: dict[str, Any]) -> None:
+def test_the_same_answer_each_time_also_with_topics_by_type(tmp_path, bag, answer):
     names = {'/hand_pose': '/tool/pose', '/obstacles': '/perception/spheres', '/goals': '/targets'}
     renamed = write_bag(tmp_path / 'renamed', messages(seconds=FEW), names)
     for each in (bag, renamed):
         assert without_times(replay_json(each)) == without_times(answer)
 
 
-def test_a_topic_can_be_chosen(tmp_path: Path, answer: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_topic_can_be_chosen(tmp_path, answer, capsys):
     still = [('/left/measured_cp', stamp_ns, message) for topic, stamp_ns, message in messages(FEW) if topic == '/hand_pose'][:1]
     moving = [('/right/measured_cp' if each[0] == '/hand_pose' else each[0], *each[1:]) for each in messages(seconds=FEW)]
     arms = write_bag(tmp_path / 'arms', [*moving, *still])
@@ -91,13 +93,13 @@ def test_a_topic_can_be_chosen(tmp_path: Path, answer: dict[str, Any], capsys: p
     assert replay_json(arms, '--remap', 'hand_pose:=/right/measured_cp')['predictions'] == answer['predictions']
 
 
-def test_the_rate_bounds_the_predictions(tmp_path: Path) -> None:
+def test_the_rate_bounds_the_predictions(tmp_path):
     fast = write_bag(tmp_path / 'fast', messages(seconds=FEW, rate_hz=200.0))
     stamps = [prediction.stamp_ns for prediction in replay(fast, CONFIG)]
     assert len(stamps) == 6 and min(np.diff(stamps)) >= 20_000_000
 
 
-def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path):
     obstacles = [(0.15, 0.0, 0.0, 0.03, 0.002, 7), (float('inf'), 0, 0, 0.1, 0, 8)]
     bad = [
         ('/hand_pose', ns(0.01), encode_hand_pose(TYPES, ns(0.01), FRAME, (float('nan'), 0.0, 0.0))),
@@ -114,11 +116,11 @@ def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path: Path) -> 
     assert {name: replayed.intake.counts.get(name) for name in expected} == expected
 
 
-def by_stamp(*given: list[tuple[str, int, Any]]) -> list[tuple[str, int, Any]]:
+def by_stamp(*given):
     return sorted(chain.from_iterable(given), key=lambda each: each[1])
 
 
-def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path: Path) -> None:
+def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path):
     """As ROS 1 named frames; in any input, in a transform and in the parameter."""
     turned = TYPES.make('geometry_msgs/msg/Transform', rotation=TYPES.make('geometry_msgs/msg/Quaternion', w=1.0))
     link = TYPES.make(
@@ -134,13 +136,14 @@ def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path: Path) -> None:
     assert len(list(replay(bag, config))) == len(reach(FEW))
 
 
-def test_a_hand_that_does_not_move_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_hand_that_does_not_move_is_told(tmp_path, capsys):
     last = [(ns(0.2 + i / 10), encode_hand_pose(TYPES, ns(0.2 + i / 10), FRAME, (0.1, 0.0, 0.0))) for i in range(15)]
-    assert run(write_bag(tmp_path / 'frozen', [*messages(seconds=FEW), *(('/hand_pose', *each) for each in last)])) == 0
+    bag = write_bag(tmp_path / 'frozen', [*messages(seconds=FEW), *(('/hand_pose', *each) for each in last)])
+    assert run(bag, config=replace_values(CONFIG, {'rate_hz': 2.0})) == 0
     assert capsys.readouterr().err == 'foc_ros replay: the hand does not move: the same position for 1.4 s\n'
 
 
-def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path, capsys):
     marker = TYPES.make('visualization_msgs/msg/Marker', header=make_header(TYPES, ns(0), FRAME), type=9)
     array = TYPES.make('visualization_msgs/msg/MarkerArray', markers=[marker, marker])
     moved = TYPES.make('geometry_msgs/msg/TransformStamped', header=make_header(TYPES, ns(0), 'base'), child_frame_id='base')
@@ -155,7 +158,7 @@ def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path: Path, ca
     assert '2 parts of obstacle_markers left out (not_a_shape); no obstacles received' in capsys.readouterr().err
 
 
-def test_a_scene_in_another_frame_than_the_first_pose_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scene_in_another_frame_than_the_first_pose_is_counted(tmp_path, capsys):
     marker = TYPES.make('visualization_msgs/msg/Marker', header=make_header(TYPES, ns(0), 'camera'), type=2)
     array = TYPES.make('visualization_msgs/msg/MarkerArray', markers=[marker])
     assert run(write_bag(tmp_path / 'odd', by_stamp(messages(seconds=FEW), [('/obstacle_markers', ns(-0.08), array)]))) == 0
@@ -164,7 +167,7 @@ def test_a_scene_in_another_frame_than_the_first_pose_is_counted(tmp_path: Path,
     )
 
 
-def test_nothing_solved_is_exit_3_and_says_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_solved_is_exit_3_and_says_why(tmp_path, capsys):
     stale = [each for each in messages(seconds=FEW) if each[0] == '/hand_pose']
     stale += [
         ('/obstacles', ns(-1), encode_obstacles(TYPES, ns(-4.5), FRAME, [])),
@@ -178,7 +181,7 @@ def test_nothing_solved_is_exit_3_and_says_why(tmp_path: Path, capsys: pytest.Ca
     assert err.count('\n') == 1
 
 
-def test_parameters_are_the_nodes(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_parameters_are_the_nodes(tmp_path, bag, capsys):
     few = write_parameters(tmp_path, replace_values(CONFIG, {'homotopy.max_candidates': 1, 'foc.steps': 20}))
     assert main(['replay', str(bag), '--json', '--params', few]) == 0
     predictions = json.loads(capsys.readouterr().out)['predictions']
@@ -189,7 +192,7 @@ def test_parameters_are_the_nodes(tmp_path: Path, bag: Path, capsys: pytest.Capt
     assert capsys.readouterr().err == 'foc_ros replay: foc.steps: expected a number in [5, 400], got 2\n'
 
 
-def test_the_output_bag_holds_inputs_and_predictions(tmp_path: Path, bag: Path, answer: dict[str, Any]) -> None:
+def test_the_output_bag_holds_inputs_and_predictions(tmp_path, bag, answer):
     assert run(bag, '--output', str(tmp_path / 'out')) == 0
     with BagReader(bag) as before, BagReader(tmp_path / 'out') as after:
         inputs = [(item.topic, item.log_ns, bytes(item.raw)) for item in before]
@@ -198,7 +201,41 @@ def test_the_output_bag_holds_inputs_and_predictions(tmp_path: Path, bag: Path, 
     assert without_times(replay_json(tmp_path / 'out')) == without_times(answer)
 
 
-def test_a_damaged_recording_leaves_neither_json_nor_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_independent_reader_finds_topics_counts_and_numbers_in_the_output_bag(tmp_path, bag):
+    """The mcap library and its ROS 2 decoder share no code with the writer."""
+    mcap_reader = pytest.importorskip('mcap.reader', reason='the mcap library is not installed')
+    mcap_decoder = pytest.importorskip('mcap_ros2.decoder', reason='mcap-ros2-support is not installed')
+    assert run(bag, '--output', str(tmp_path / 'out')) == 0
+    found: dict[str, list[Any]] = {}
+    with (tmp_path / 'out' / 'out.mcap').open('rb') as stream:
+        reader = mcap_reader.make_reader(stream, decoder_factories=[mcap_decoder.DecoderFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            assert message.log_time > 0
+            found.setdefault(channel.topic, []).append(decoded)
+    poses, outputs = len(reach(FEW)), ('prediction', 'likelihoods', 'likelihoods_by_name', 'path', 'markers')
+    inputs = {'/hand_pose': poses, '/obstacles': 2, '/goals': 2}
+    assert {topic: len(each) for topic, each in found.items()} == inputs | {f'/foc/{name}': poses for name in outputs}
+    information = yaml.safe_load((tmp_path / 'out' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    assert (information['version'], information['storage_identifier']) == (9, 'mcap')
+    assert (information['message_count'], information['relative_file_paths']) == (sum(map(len, found.values())), ['out.mcap'])
+    for prediction, cloud, likelihoods in zip(
+        replay(bag, CONFIG), found['/foc/prediction'], found['/foc/likelihoods'], strict=True
+    ):
+        *labels, rest = likelihoods.layout.dim[0].label.split(';')
+        by_label = {each.label: each for each in prediction.solved_candidates}
+        assert rest == 'other' and labels[0] == prediction.most_likely and sorted(labels) == sorted(by_label)
+        table = read_columns(cloud)
+        assert len(table['x']) == (CONFIG.foc.steps + 1) * len(labels)
+        for index, label in enumerate(labels):
+            known, rows = by_label[label], table['candidate'] == index
+            assert np.allclose(np.column_stack([table['x'], table['y']])[rows], known.solution.path, atol=1e-6)
+            assert np.allclose(table['t'][rows], known.times, atol=1e-6)
+            assert np.allclose(table['z'][rows], known.height.mean[:, 0], atol=1e-6)
+            assert np.allclose(table['xx'][rows], known.covariance[:, 0, 0], rtol=1e-6)
+            assert np.allclose(table['likelihood'][rows], known.likelihood)
+
+
+def test_a_damaged_recording_leaves_neither_json_nor_output(tmp_path, capsys):
     file = tmp_path / 'damaged.mcap'
     ends = write_mcap(file, messages(seconds=FEW), per_chunk=5)
     data = bytearray(file.read_bytes())
@@ -210,7 +247,7 @@ def test_a_damaged_recording_leaves_neither_json_nor_output(tmp_path: Path, caps
     assert out == '' and 'damaged or cut short' in err and not (tmp_path / 'out').exists()
 
 
-def test_a_table_is_printed_and_a_report_is_written(tmp_path: Path, bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_is_printed_and_a_report_is_written(tmp_path, bag, capsys):
     pytest.importorskip('matplotlib', reason='matplotlib is not installed')
     assert run(bag, '--report', str(tmp_path / 'report')) == 0
     out, err = capsys.readouterr()
@@ -221,13 +258,13 @@ def test_a_table_is_printed_and_a_report_is_written(tmp_path: Path, bag: Path, c
 
 
 @pytest.mark.parametrize('remap', ['hand_pose', 'hand_pose:=', 'hand:=/hand_pose'])
-def test_a_wrong_remap_is_said(bag: Path, capsys: pytest.CaptureFixture[str], remap: str) -> None:
+def test_a_wrong_remap_is_said(bag, capsys, remap):
     assert run(bag, '--remap', remap) == 2
     err = capsys.readouterr().err
     assert remap.split(':=')[0] in err and err.count('\n') == 1
 
 
-def camera_at(y: float, seconds: float, late_s: float = 0.02) -> tuple[str, int, Any]:
+def camera_at(y, seconds, late_s=0.02):
     """Return a transform for a time that is logged later: a camera at (0, y) that looks along the y axis of the world."""
     stamped = TYPES.make(
         'geometry_msgs/msg/TransformStamped',
@@ -242,7 +279,7 @@ def camera_at(y: float, seconds: float, late_s: float = 0.02) -> tuple[str, int,
     return '/tf', ns(seconds + late_s), TYPES.make('tf2_msgs/msg/TFMessage', transforms=[stamped])
 
 
-def seen_by_camera(items: list[tuple[str, int, Any]]) -> list[tuple[str, int, Any]]:
+def seen_by_camera(items):
     """Return messages with the obstacle in the frame of a camera that moves by 0.1 m/s."""
     moved = []
     for topic, log_ns, message in items:
@@ -253,14 +290,14 @@ def seen_by_camera(items: list[tuple[str, int, Any]]) -> list[tuple[str, int, An
     return moved
 
 
-def test_the_transforms_of_a_recording_are_applied(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_transforms_of_a_recording_are_applied(tmp_path, capsys):
     """A camera on a moving arm, whose transforms are logged after the obstacles that need them; the goals are in the world."""
-    transforms = [camera_at(0.1 * seconds, seconds) for seconds in np.arange(-0.2, 0.6, 0.05)]
-    items = sorted([*seen_by_camera(messages()), *transforms], key=lambda item: item[1])
+    transforms = [camera_at(0.1 * seconds, seconds) for seconds in np.arange(-0.2, 0.3, 0.05)]
+    items = sorted([*seen_by_camera(messages(0.24)), *transforms], key=lambda item: item[1])
     config = replace_values(CONFIG, {'frame_id': FRAME})
-    bag, still = write_bag(tmp_path / 'moving', items), write_bag(tmp_path / 'still')
+    bag, still = write_bag(tmp_path / 'moving', items), write_bag(tmp_path / 'still', messages(0.24))
     moving = list(replay(bag, config))
-    assert len(moving) == len(reach())
+    assert len(moving) == len(reach(0.24))
     by_stamp = {each.stamp_ns: each for each in replay(still, config)}
     for prediction in moving[2:]:
         (obstacle,), (expected,) = (each.obstacles.centre for each in (prediction, by_stamp[prediction.stamp_ns]))
@@ -271,11 +308,41 @@ def test_the_transforms_of_a_recording_are_applied(tmp_path: Path, capsys: pytes
     assert 'transform_newest' not in capsys.readouterr().out
 
 
-def test_what_was_refused_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_was_refused_is_named(tmp_path, capsys):
     config = replace_values(CONFIG, {'frame_id': FRAME})
-    bag = write_bag(tmp_path / 'blind', seen_by_camera(messages()))
-    count = sum(topic == '/obstacles' for topic, _, _ in messages())
+    bag = write_bag(tmp_path / 'blind', seen_by_camera(messages(0.24)))
+    count = sum(topic == '/obstacles' for topic, _, _ in messages(0.24))
     assert main(['replay', str(bag), '--params', write_parameters(tmp_path, config)]) == 3
     line = capsys.readouterr().err.splitlines()[-1]
     assert f'{count} of {count} messages of obstacles refused' in line
     assert "expected the working frame 'world', got 'camera'; no transform to world: camera and world are not connected" in line
+
+
+def test_guidance_is_the_same_each_time_and_within_its_limits(tmp_path, capsys):
+    """In the first 6 s of the packaged recording."""
+    values = {'rate_hz': 2.0, 'foc.steps': 20, 'homotopy.max_candidates': 2}
+    values |= {'guidance.clearance': 0.0, 'guidance.rate_hz': 25.0, 'guidance.hold_s': 1.0}
+    parameters, out = write_parameters(tmp_path, replace_values(Config(), values)), tmp_path / 'out'
+    with BagReader(RECORDING) as reader:
+        items = [(item.topic, item.log_ns, item.message) for item in reader]
+    bag = write_bag(tmp_path / 'bag', [each for each in items if each[1] < items[0][1] + 6 * 10**9])
+
+    def run(*options):
+        assert main(['replay', str(bag), '--params', parameters, '--json', *options]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    answer, plain = run('--guidance', '--output', str(out)), run()
+    guidance = answer['guidance']
+    assert guidance == run('--guidance')['guidance']
+    assert 'guidance' not in plain
+    assert [each['most_likely'] for each in plain['predictions']] == [each['most_likely'] for each in answer['predictions']]
+    stamps, forces = np.array([each['stamp_ns'] for each in guidance]), np.array([each['force'] for each in guidance])
+    settings = GuidanceConfig()
+    assert set(np.diff(stamps).tolist()) == {40_000_000}
+    assert 0.0 < np.hypot(*forces.T).max() <= settings.f_max * (1 + 1e-9)
+    assert np.hypot(*np.diff(forces, axis=0).T).max() <= settings.slew * 0.04 * (1 + 1e-9)
+    with AnyReader([out]) as reader:
+        counts = {each.topic: each.msgcount for each in reader.connections}
+    assert {counts[f'/foc/guidance/{name}'] for name in ('wrench', 'reference', 'stiffness')} == {len(guidance)}
+    with BagReader(out) as reader:
+        assert sorted(reader.roles) == ['goals', 'hand_pose', 'obstacles'], 'its outputs are taken for no input'

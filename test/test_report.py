@@ -1,27 +1,27 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report: a page that needs no other file, and numbers that agree with the predictions."""
-
-from __future__ import annotations
+"""The report: a page that needs no other file, numbers that agree with the predictions, and what it may replace."""
 
 import json
 from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
+from matplotlib.figure import Figure
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
 
+from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
-from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import HandSample
+from foc_ros.io.outputs import REPORT_FILES, check_page, check_replaceable
 from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
+from foc_ros.reporting.figures import write_picture
+from foc_ros.reporting.page import write_page
 from foc_ros.reporting.report import describe_late, write_report
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 from foc_ros.ros.messages.ranking import find_drawn_curve
@@ -30,7 +30,7 @@ from foc_ros.ros.messages.ranking import find_drawn_curve
 class Page(HTMLParser):
     """Parser of a page: its tags with attributes, and its text."""
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, file):
         super().__init__()
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.open: list[str] = []
@@ -38,25 +38,25 @@ class Page(HTMLParser):
         self.feed(file.read_text(encoding='utf-8'))
         assert self.open == []
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
         if tag not in ('meta', 'img', 'input', 'link', 'br'):
             self.open.append(tag)
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         self.text += data
 
 
-def report(directory: Path, reaches: int = 1, title: str = 'A title') -> list[Path]:
+def report(directory, reaches=1, title='A title'):
     made = samples(reaches)
     snapshots = [build_snapshot(each) for each in predictions(made)]
     return write_report(directory, title, build_hand_trajectory(made), snapshots, {'recording': 'some <bag> & more'})
 
 
-def test_the_report_is_a_page_without_other_files_and_a_picture_beside_it(tmp_path: Path) -> None:
+def test_the_report_is_a_page_without_other_files_and_a_picture_beside_it(tmp_path):
     """Text is escaped, facts are shown, and nothing is loaded from anywhere; the input is left alone."""
     before = OBSTACLES.centre.copy()
     files = report(tmp_path / 'new' / 'report', title='<img src=x onerror=alert(1)>')
@@ -73,7 +73,7 @@ def test_the_report_is_a_page_without_other_files_and_a_picture_beside_it(tmp_pa
         assert words in page.text
 
 
-def test_page_and_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
+def test_page_and_numbers_agree_with_the_predictions(tmp_path):
     made = samples(2)
     expected = predictions(made)
     write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
@@ -93,7 +93,7 @@ def test_page_and_numbers_agree_with_the_predictions(tmp_path: Path) -> None:
         assert written['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
 
 
-def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
+def test_paths_on_the_page_are_those_predicted(tmp_path):
     made = samples()
     expected = [widen(each) for each in predictions(made)]
     write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
@@ -116,7 +116,7 @@ def test_paths_on_the_page_are_those_predicted(tmp_path: Path) -> None:
     assert data['unknown'] == [0.25] * len(expected)
 
 
-def test_a_long_recording_is_thinned_out_and_its_page_stays_below_a_megabyte_and_a_half(tmp_path: Path) -> None:
+def test_a_long_recording_is_thinned_out_and_its_page_stays_below_a_megabyte_and_a_half(tmp_path):
     """45 s at 100 Hz with six candidates: the slider stops at fewer of the predictions, evenly spread."""
     made = samples(30)
     many = [replace(each, candidates=each.candidates[:3] * 2) for each in predictions(made, every=1)]
@@ -136,7 +136,7 @@ def test_a_long_recording_is_thinned_out_and_its_page_stays_below_a_megabyte_and
     assert len(json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))['predictions']) == 4_500
 
 
-def end_with(snapshot: Prediction, *statuses: Status) -> Prediction:
+def end_with(snapshot, *statuses):
     """Return a snapshot whose likeliest candidates have ended otherwise, and without one that is lost."""
     shown = snapshot.candidates_with_likelihood
     pairs = zip(shown, statuses, strict=False)
@@ -144,11 +144,11 @@ def end_with(snapshot: Prediction, *statuses: Status) -> Prediction:
     return replace(snapshot, candidates=(*ended, *shown[len(ended) :]))
 
 
-def test_a_busy_computer_is_told_once_with_what_to_change_and_an_estimate_is_not_called_compromised(tmp_path: Path) -> None:
+def test_a_busy_computer_is_told_once_with_what_to_change_and_an_estimate_is_not_called_compromised(tmp_path):
     made = [build_snapshot(each) for each in predictions(samples())]
     hand = build_hand_trajectory(samples())
 
-    def told(snapshots: list[Prediction]) -> tuple[list[str], dict[str, str]]:
+    def told(snapshots):
         write_report(tmp_path, 'x', hand, snapshots, {})
         numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
         return numbers['warnings'], numbers['summary']
@@ -167,12 +167,12 @@ def test_a_busy_computer_is_told_once_with_what_to_change_and_an_estimate_is_not
     assert words.startswith(f'In 5 of {count} predictions the most likely path avoids the obstacles less surely than wanted')
 
 
-def page_data_of(directory: Path) -> dict[str, Any]:
+def page_data_of(directory):
     text = (directory / 'index.html').read_text(encoding='utf-8')
     return json.loads(text.partition('id="report-data">')[2].partition('</script>')[0])
 
 
-def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path: Path) -> None:
+def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path):
     """Without predictions, without a solved candidate, with a hand that never moves, and with a number that is not finite."""
     hand, made = build_hand_trajectory(samples()), prediction(START_NS, np.zeros(2))
     files = write_report(tmp_path / 'none', 'x', hand, [], {})
@@ -191,7 +191,7 @@ def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path: Pa
     assert 'NaN' not in text and json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
 
 
-def test_no_hand_and_a_folder_that_is_a_file_are_refused(tmp_path: Path) -> None:
+def test_no_hand_and_a_folder_that_is_a_file_are_refused(tmp_path):
     with pytest.raises(InputError, match='hand pose'):
         write_report(tmp_path / 'report', 'x', build_hand_trajectory([]), [], {})
     assert not (tmp_path / 'report').exists()
@@ -199,3 +199,41 @@ def test_no_hand_and_a_folder_that_is_a_file_are_refused(tmp_path: Path) -> None
     with pytest.raises(InputError, match='--report: expected a folder'):
         report(tmp_path / 'report')
     assert (tmp_path / 'report').read_text() == 'mine'
+
+
+SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "noise": [0.05, 0.05], "eta": 0.9, "obstacles": []}'
+
+
+@pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
+def test_a_picture_is_replaced_by_the_next_one(tmp_path, suffix):
+    file = tmp_path / f'scene.{suffix}'
+    write_picture(file, prediction(START_NS, np.zeros(2)))
+    check_replaceable('--plot', file)
+
+
+def test_a_picture_that_something_else_has_made_is_left_alone(tmp_path, capsys):
+    (tmp_path / 'scene.json').write_text(SCENE, 'utf-8')
+    picture = tmp_path / 'holiday.png'
+    Figure().savefig(picture)
+    before = picture.read_bytes()
+    assert main(['solve', str(tmp_path / 'scene.json'), '--plot', str(picture)]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count('\n')) == ('', 1)
+    assert '--plot: expected a new file, or one that foc_ros has made' in err
+    assert picture.read_bytes() == before
+
+
+def test_a_report_is_replaced_by_the_next_one(tmp_path):
+    made = samples()
+    for _ in range(2):
+        write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], {})
+    write_page(tmp_path, 'index.html', 'x', (), (), None)
+
+
+@pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png'])
+def test_a_report_overwrites_no_other_file(tmp_path, name):
+    (tmp_path / name).write_text('mine', 'utf-8')
+    with pytest.raises(InputError, match='--report: expected a new file, or one that foc_ros has made'):
+        check_page('--report', tmp_path, *REPORT_FILES)
+    (tmp_path / name).rename(tmp_path / 'other.html')
+    check_page('--report', tmp_path, *REPORT_FILES)

@@ -2,20 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report page in a browser: it plays, it draws the numbers of predictions.json, and the check finds a broken page."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from browser_helpers import MOVE, check_report, chromium, screenshot, show
+from browser_helpers import MOVE, check_report, screenshot, show
 from report_samples import START_NS, predictions, samples
 
 from foc_ros.core.obstacles.geometry import measure_offsets
@@ -29,13 +24,7 @@ HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
 
 
 @pytest.fixture(scope='module')
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    with chromium(tmp_path_factory.mktemp('profile')) as opened:
-        yield opened
-
-
-@pytest.fixture(scope='module')
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(tmp_path_factory):
     made, directory = samples(2), tmp_path_factory.mktemp('report')
     write_report(
         directory,
@@ -47,11 +36,11 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def test_the_page_shows_the_numbers(browser: Any, report: Path) -> None:
+def test_the_page_shows_the_numbers(browser, report):
     check_report(browser, report)
 
 
-def test_the_page_draws_outlines_of_boxes_and_circles(browser: Any, tmp_path: Path) -> None:
+def test_the_page_draws_outlines_of_boxes_and_circles(browser, tmp_path):
     """A pixel has the colour of an obstacle where the obstacle is, and not elsewhere, up to its border."""
     made = samples()
     shapes = collect_obstacles([Circle((0.15, 0.0), 0.03, 0.003), WALL, Capsule((0.0, 0.1), (0.1, 0.2), radius=0.02)])
@@ -85,7 +74,7 @@ return { disc: arguments[0].map((point) => isAt(point, disc)), ring: arguments[0
 
 
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
-def test_the_page_fits_on_a_phone(browser: Any, report: Path, tmp_path: Path, dark: bool) -> None:
+def test_the_page_fits_on_a_phone(browser, report, tmp_path, dark):
     """The page fits into a width of 360 px; it follows the dark or light mode of the system, and a button changes it."""
     assert show(browser, report / 'index.html', 360, 640, dark) == []
     assert browser.execute_script('return document.documentElement.scrollWidth') == 360
@@ -104,7 +93,7 @@ def test_the_page_fits_on_a_phone(browser: Any, report: Path, tmp_path: Path, da
     assert pages == (['rgb(20, 24, 28)', 'rgb(255, 255, 255)'] if dark else ['rgb(255, 255, 255)', 'rgb(20, 24, 28)'])
 
 
-def test_playing_stops_at_the_end_of_a_movement(browser: Any, report: Path) -> None:
+def test_playing_stops_at_the_end_of_a_movement(browser, report):
     from selenium.webdriver.support.ui import WebDriverWait
 
     show(browser, report / 'index.html')
@@ -114,14 +103,14 @@ def test_playing_stops_at_the_end_of_a_movement(browser: Any, report: Path) -> N
     assert browser.find_element('id', 'play').text == '▶'
 
 
-def test_a_long_recording_says_where_the_slider_stops(browser: Any, tmp_path: Path) -> None:
+def test_a_long_recording_says_where_the_slider_stops(browser, tmp_path):
     made = samples(5)
     write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made, every=1)], {})
     check_report(browser, tmp_path)
     assert f'{MOST_FRAMES} of the 750 predictions' in browser.find_element('id', 'decimated').text
 
 
-def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_the_pointer(browser: Any, report: Path) -> None:
+def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_the_pointer(browser, report):
     show(browser, report / 'index.html')
     choose = "const first = document.getElementById('movement'); first.value = 0; first.dispatchEvent(new Event('change'))"
     browser.execute_script(choose)
@@ -145,7 +134,7 @@ def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_t
     )
 
 
-def test_a_click_on_a_chart_leads_to_its_time_and_the_scene_zooms(browser: Any, report: Path) -> None:
+def test_a_click_on_a_chart_leads_to_its_time_and_the_scene_zooms(browser, report):
     from selenium.webdriver import ActionChains
 
     show(browser, report / 'index.html')
@@ -166,7 +155,7 @@ def test_a_click_on_a_chart_leads_to_its_time_and_the_scene_zooms(browser: Any, 
     assert scale == pytest.approx([1.25, 1.0])
 
 
-def test_the_page_opens_on_the_way_where_several_paths_are_likely_and_the_filter_has_setled(browser: Any, tmp_path: Path) -> None:
+def test_the_page_opens_on_the_way_where_several_paths_are_likely_and_the_filter_has_setled(browser, tmp_path):
     """The second of two movements has a moment with four paths; the first predictions of both are not settled."""
     made = samples(2)
     snapshots = [build_snapshot(each) for each in predictions(made)]

@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scene files: every field is read, and errors name field, value and bound."""
 
-from __future__ import annotations
-
 import json
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,11 +36,11 @@ SCENE: dict[str, Any] = {
 }
 
 
-def without(*names: str) -> dict[str, Any]:
+def without(*names):
     return {name: value for name, value in SCENE.items() if name not in names}
 
 
-def test_every_field_is_read() -> None:
+def test_every_field_is_read():
     scene = parse_scene(SCENE)
     assert scene.hand.mean.tolist() == [0.0, 0.1, 0.2, 0.0, 0.0, -1.0]
     assert np.allclose(np.diag(scene.hand.covariance), [4e-6, 4e-6, 0, 0, 0, 0])
@@ -57,7 +54,7 @@ def test_every_field_is_read() -> None:
     assert scene.guess is None
 
 
-def test_a_missing_field_has_the_default_of_its_parameter() -> None:
+def test_a_missing_field_has_the_default_of_its_parameter():
     scene = parse_scene({'start': [0, 0], 'goals': [[0.3, 0], [0.3, 0.1]]})
     assert scene.config.foc == Config().foc and scene.config.homotopy == Config().homotopy
     assert scene.duration_s == Config().duration.fixed_s
@@ -65,14 +62,14 @@ def test_a_missing_field_has_the_default_of_its_parameter() -> None:
     assert scene.goals.tolist() == [[0.3, 0.0], [0.3, 0.1]]
 
 
-def test_goals_have_names_and_may_be_obstacles() -> None:
+def test_goals_have_names_and_may_be_obstacles():
     goals = [{'position': [0.1, 0.0], 'name': 'tea', 'object': 'cup'}, {'position': [0.2, 0.1], 'object': 1}, [0.3, 0.0]]
     scene = parse_scene({**without('goal'), 'goals': goals})
     assert scene.goals.tolist() == [[0.1, 0.0], [0.2, 0.1], [0.3, 0.0]]
     assert scene.goal_names == ('tea', 'goal1', 'goal2') and scene.goal_objects == ('cup', '1', None)
 
 
-def test_boxes_capsules_and_hulls_are_read() -> None:
+def test_boxes_capsules_and_hulls_are_read():
     corners = [[0.1, 1.0], [0.3, 1.0], [0.2, 1.2]]
     given = [
         {'x': 1, 'y': 2, 'size': [0.4, 0.2], 'yaw': 0.5, 'id': 'tray'},
@@ -94,7 +91,7 @@ def test_boxes_capsules_and_hulls_are_read() -> None:
 
 
 @pytest.mark.parametrize('name', ['scene.yaml', 'scene.yml', 'scene.json', 'scene'])
-def test_yaml_and_json_give_the_same_scene(tmp_path: Path, name: str) -> None:
+def test_yaml_and_json_give_the_same_scene(tmp_path, name):
     (tmp_path / name).write_text(json.dumps(SCENE, indent='\t' if name.endswith('json') else None), 'utf-8')
     scene = load_scene(tmp_path / name)
     assert scene.config.foc.lam == 1e6 and scene.obstacles.ids == ('cup', '1')
@@ -103,7 +100,7 @@ def test_yaml_and_json_give_the_same_scene(tmp_path: Path, name: str) -> None:
 ROUND = [[2 + np.cos(turn), 2 + np.sin(turn)] for turn in np.linspace(0, 2 * np.pi, 18)[:17]]
 
 
-def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
+def obstacle(count=1, **fields):
     return {**SCENE, 'obstacles': count * [{'x': 1, 'y': 1, 'radius': 0.1, **fields}]}
 
 
@@ -155,7 +152,7 @@ def obstacle(count: int = 1, **fields: Any) -> dict[str, Any]:
         ({'start': [0, 0], 'goal': [0, 0], 'guess': {'amplitude': 0.1}}, 'guess: expected a goal away from the start, got both'),
     ],
 )  # fmt: skip
-def test_a_wrong_field_is_named(scene: object, message: str) -> None:
+def test_a_wrong_field_is_named(scene, message):
     with pytest.raises(SceneError, match=f'^{message}'):
         parse_scene(scene)
 
@@ -174,7 +171,7 @@ def test_a_wrong_field_is_named(scene: object, message: str) -> None:
         ('s.yaml', '\x00', 'not a YAML file'),
     ],
 )
-def test_a_file_that_cannot_be_parsed_is_refused(tmp_path: Path, name: str, text: str, message: str) -> None:
+def test_a_file_that_cannot_be_parsed_is_refused(tmp_path, name, text, message):
     (tmp_path / name).write_text(text, 'utf-8')
     with pytest.raises(RecordingError, match=f'^{re.escape(str(tmp_path / name))}: .*{re.escape(message)}|{re.escape(message)}'):
         load_scene(tmp_path / name)
@@ -183,9 +180,7 @@ def test_a_file_that_cannot_be_parsed_is_refused(tmp_path: Path, name: str, text
 @pytest.mark.parametrize('name', ['s.json', 's.yaml'])
 @pytest.mark.parametrize('number', ['9' * 25, '-' + '9' * 400, '9' * 4000, '1e400'])
 @pytest.mark.parametrize('field', ['steps', 'duration_s'])
-def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(
-    tmp_path: Path, name: str, number: str, field: str
-) -> None:
+def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(tmp_path, name, number, field):
     (tmp_path / name).write_text(f'{{"start": [0, 0], "goal": [1, 0], "{field}": {number}}}', 'utf-8')
     with pytest.raises(
         SceneError, match=rf"^{field}: expected a .*number in \[.*\].*, got '?-?(9999|1e400|1.0e\+400|inf|a whole number of)"
@@ -194,7 +189,7 @@ def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(
     assert len(str(caught.value)) < 300
 
 
-def test_a_guess_is_a_minimum_jerk_line_with_a_bulge_to_its_left() -> None:
+def test_a_guess_is_a_minimum_jerk_line_with_a_bulge_to_its_left():
     guess = parse_scene(
         {**without('obstacles'), 'start': [0, 0], 'goal': [0.3, 0], 'guess': {'amplitude': -0.05, 'kind': 'text'}}
     ).guess

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command lines of the documentation work as they stand: from a scene to a report, and a node beside a publisher."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -27,7 +25,7 @@ PAGE_S = 280
 ROS_COMMANDS = ('foc_ros node', 'teleoperation_loop')
 
 
-def test_every_command_is_run_or_listed() -> None:
+def test_every_command_is_run_or_listed():
     shown = [line for page in PAGES for line in find_commands(page)]
     listed = {*NOT_RUN, *ENDLESS}
     assert listed <= set(shown), f'listed but not shown: {listed - set(shown)}'
@@ -39,13 +37,13 @@ def test_every_command_is_run_or_listed() -> None:
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_every_block_is_of_a_known_kind(page: Path) -> None:
+def test_every_block_is_of_a_known_kind(page):
     assert find_unknown_blocks(page) == []
 
 
 @pytest.mark.timeout(PAGE_S + 20)
 @pytest.mark.parametrize('page', [page for page in PAGES if RUN[page]], ids=lambda page: page.name)
-def test_commands_work_as_shown(page: Path, tmp_path: Path) -> None:
+def test_commands_work_as_shown(page, tmp_path):
     """The lines run in a clone that also contains the files that a user would bring."""
     if any(word in line for line in RUN[page] for word in ROS_COMMANDS) and find_spec('rclpy') is None:
         pytest.skip('rclpy is not installed')
@@ -55,7 +53,7 @@ def test_commands_work_as_shown(page: Path, tmp_path: Path) -> None:
     check_outputs(page.name, clone, done.stdout)
 
 
-def make_clone(clone: Path) -> Path:
+def make_clone(clone):
     """Return a clone that also contains the files that a user would bring."""
     clone.mkdir()
     for name in ('doc', 'config', 'scripts', 'foc_ros', 'Makefile', 'setup.py', 'test', 'pyproject.toml'):
@@ -71,7 +69,7 @@ def make_clone(clone: Path) -> Path:
     return clone
 
 
-def run_lines(clone: Path, lines: list[str]) -> subprocess.CompletedProcess[str]:
+def run_lines(clone, lines):
     """Run the lines in one shell, with their own ROS graph, and end the processes that they leave running."""
     # 124: the line was still running when it was interrupted
     run = [
@@ -86,7 +84,7 @@ def run_lines(clone: Path, lines: list[str]) -> subprocess.CompletedProcess[str]
         )
 
 
-def check_outputs(page: str, clone: Path, printed: str) -> None:
+def check_outputs(page, clone, printed):
     if page in ('README.md', 'start.md'):
         numbers = json.loads((clone / 'report' / 'predictions.json').read_text('utf-8'))
         assert len(numbers['predictions']) > 20
@@ -99,6 +97,6 @@ def check_outputs(page: str, clone: Path, printed: str) -> None:
         assert shares and max(shares) > 10, printed
 
 
-def test_a_line_that_fails_is_an_error(tmp_path: Path) -> None:
+def test_a_line_that_fails_is_an_error(tmp_path):
     (tmp_path / 'clone').mkdir()
     assert run_lines(tmp_path / 'clone', ['foc_ros solve nothing.yaml']).returncode == 2

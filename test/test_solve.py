@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`solve`: scenes from files, against the reference cases, closed forms and Monte Carlo."""
 
-from __future__ import annotations
-
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,27 +20,25 @@ SCENE: dict[str, Any] = {
     'steps': 50,
     'noise': [0.05, 0.05],
     'eta': 0.9,
-    'strategy': 'lv',
+    'strategy': 'optimal',
     'obstacles': [{'x': 0.15, 'y': 0.01, 'radius': 0.03, 'radius_stddev': 0.002}],
 }
 
 
-def solve(tmp_path: Path, scene: dict[str, Any], *options: str) -> int:
+def solve(tmp_path, scene, *options):
     (tmp_path / 'scene.json').write_text(json.dumps(scene), 'utf-8')
     return main(['solve', str(tmp_path / 'scene.json'), *options])
 
 
-def candidates(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: dict[str, Any], *options: str, code: int = 0
-) -> list[dict[str, Any]]:
+def candidates(tmp_path, capsys, scene, *options, code=0):
     assert solve(tmp_path, scene, '--json', *options) == code
     captured = capsys.readouterr()
     assert code == 3 or captured.err == ''
     return json.loads(captured.out)['candidates']
 
 
-@pytest.mark.parametrize('case', reference_cases()[:3])
-def test_reference_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str], case: dict[str, Any]) -> None:
+@pytest.mark.parametrize('case', reference_cases()[:1])
+def test_a_reference_case(tmp_path, capsys, case):
     expected = case['converged_qp']
     scene = {name: case[name] for name in ('start', 'goal', 'duration_s', 'steps', 'noise', 'obstacles', 'guess')}
     (answer,) = candidates(tmp_path, capsys, {**scene, 'strategy': 'fixed', 'tau': expected['tau'], 'lambda': expected['lam']})
@@ -54,7 +49,7 @@ def test_reference_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str], cas
     assert np.allclose(np.max(answer['stddev'], axis=0), expected['stddev_max'], rtol=1e-3, atol=1e-9)
 
 
-def test_json_has_the_promised_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_has_the_promised_names(tmp_path, capsys):
     found = candidates(tmp_path, capsys, SCENE, '--monte-carlo', '500')
     promised = 'label description goal sides status effort cost eta tau lambda likelihood qp_solves solve_ms'
     promised += ' mean velocity stddev mc_step mc_path'
@@ -68,7 +63,7 @@ def test_json_has_the_promised_names(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert sum(each['likelihood'] for each in found) == pytest.approx(1) and found[0]['likelihood'] > found[1]['likelihood']
 
 
-def test_only_the_class_of_a_guess_is_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_only_the_class_of_a_guess_is_solved(tmp_path, capsys):
     for amplitude, side in ((0.05, 'left'), (-0.05, 'right')):
         (found,) = candidates(tmp_path, capsys, {**SCENE, 'guess': {'amplitude': amplitude}})
         assert found['sides'] == {'0': side}
@@ -76,7 +71,7 @@ def test_only_the_class_of_a_guess_is_solved(tmp_path: Path, capsys: pytest.Capt
         assert via['sides'] == {'0': side} and via['effort'] == pytest.approx(found['effort'], rel=1e-3)
 
 
-def test_the_table_and_the_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_table_and_the_picture(tmp_path, capsys):
     pytest.importorskip('matplotlib', reason='matplotlib is not installed')
     assert solve(tmp_path, SCENE, '--plot', str(tmp_path / 'ways.png')) == 0
     assert (tmp_path / 'ways.png').read_bytes().startswith(b'\x89PNG')
@@ -91,9 +86,7 @@ GOALS: dict[str, Any] = {
 }
 
 
-def test_goals_have_names_and_the_object_of_a_goal_blocks_the_others_only(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_goals_have_names_and_the_object_of_a_goal_blocks_the_others_only(tmp_path, capsys):
     found = candidates(tmp_path, capsys, GOALS)
     assert {each['description'] for each in found} == {'tea: direct', 'milk: left of front', 'milk: right of front'}
     assert {each['status'] for each in found} == {'solved'}
@@ -106,7 +99,7 @@ def test_goals_have_names_and_the_object_of_a_goal_blocks_the_others_only(
     assert guessed['description'] == 'milk: left of front' and guessed['status'] == 'solved'
 
 
-def test_a_goal_without_a_path_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_goal_without_a_path_is_named(tmp_path, capsys):
     ring = [{'x': 0.3 + 0.05 * math.cos(turn), 'y': 0.05 * math.sin(turn), 'radius': 0.03} for turn in range(7)]
     scene = {**SCENE, 'obstacles': ring, 'max_candidates': 4}
     del scene['goal']
@@ -118,22 +111,13 @@ def test_a_goal_without_a_path_is_named(tmp_path: Path, capsys: pytest.CaptureFi
     assert (tmp_path / 'none.png').exists()
 
 
-def test_the_terminal_gives_reason_and_remedy_of_what_is_not_solved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_terminal_gives_reason_and_remedy_of_what_is_not_solved(tmp_path, capsys):
     assert solve(tmp_path, {**SCENE, 'noise': [0.8, 0.8], 'eta': 0.99}) == 0
     shown = capsys.readouterr().out.replace('\n  ', ' ').splitlines()
     remedies = [line for line in shown if 'remedy' in line]
     assert remedies
     for line in remedies:
         assert line.startswith('goal0:') and any(line.endswith(f'remedy: {status.remedy}') for status in Status)
-
-
-def test_nothing_solved_is_exit_3_with_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    noisy = {**SCENE, 'noise': [0.5, 0.5], 'eta': 0.99, 'duration_s': 0.3, 'shortfall': math.inf}
-    found = candidates(tmp_path, capsys, noisy, code=3)
-    assert found and all(each['status'] != 'solved' and each['likelihood'] == 0 for each in found)
-    assert solve(tmp_path, noisy) == 3
-    error = capsys.readouterr().err
-    assert error.startswith('foc_ros solve: no candidate could be solved: goal0:') and error.count('\n') == 1
 
 
 @pytest.mark.parametrize(
@@ -144,9 +128,7 @@ def test_nothing_solved_is_exit_3_with_one_line(tmp_path: Path, capsys: pytest.C
         (SCENE, ('--monte-carlo', 'x'), 'foc_ros solve: Invalid value for --monte-carlo: unable to convert "x" into int.'),
     ],
 )
-def test_wrong_input_is_exit_2_with_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], scene: dict[str, Any], options: tuple[str, ...], line: str
-) -> None:
+def test_wrong_input_is_exit_2_with_one_line(tmp_path, capsys, scene, options, line):
     try:
         code = solve(tmp_path, scene, *options)
     except SystemExit as leaving:
@@ -155,9 +137,9 @@ def test_wrong_input_is_exit_2_with_one_line(
     assert capsys.readouterr() == ('', f'{line}\n')
 
 
-def test_json_describes_the_whole_solution(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_describes_the_whole_solution(tmp_path, capsys):
     """The JSON holds every cost term, the whole state with its covariance, the place of the smallest eta, and the contacts."""
-    for each in candidates(tmp_path, capsys, {**SCENE, 'start_stddev': 0.001}):
+    for each in candidates(tmp_path, capsys, {**SCENE, 'strategy': 'lv', 'start_stddev': 0.001}):
         assert each['costs']['effort'] == pytest.approx(each['effort']) and each['costs']['lambda_variance'] > 0
         covariance = np.array(each['covariance'])
         assert covariance.shape == (51, 6, 6)
@@ -171,14 +153,7 @@ def test_json_describes_the_whole_solution(tmp_path: Path, capsys: pytest.Captur
         assert min(abs(each['eta_at']['step'] - row['step']) for row in each['rows']) < 0.5
 
 
-def test_a_compromised_candidate_is_an_answer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = candidates(tmp_path, capsys, {**SCENE, 'eta': 0.999, 'noise': [0.6, 0.6]}, code=0)
-    assert {each['status'] for each in found} == {'compromised'}
-    assert sum(each['likelihood'] for each in found) == pytest.approx(1.0)
-    assert all(0 < each['eta'] < 0.999 and each['eta_reachable'] is None for each in found)
-
-
-def test_bound_and_risk_of_a_scene_say_what_eta_means(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bound_and_risk_of_a_scene_say_what_eta_means(tmp_path, capsys):
     efforts = [
         candidates(tmp_path, capsys, {**SCENE, 'noise': [0.05, 0.05], 'bound': bound, 'risk': risk})[0]['effort']
         for bound, risk in (('gaussian', 'step'), ('cantelli', 'step'), ('gaussian', 'path'))
@@ -186,11 +161,19 @@ def test_bound_and_risk_of_a_scene_say_what_eta_means(tmp_path: Path, capsys: py
     assert efforts[0] < efforts[1] and efforts[0] < efforts[2]
 
 
-def test_json_of_an_unsolved_candidate_holds_what_was_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    far = candidates(tmp_path, capsys, {**SCENE, 'eta': 0.999, 'noise': [0.6, 0.6], 'shortfall': math.inf}, code=3)
+def test_json_of_an_unsolved_candidate_holds_what_was_reached(tmp_path, capsys):
+    demanding = {**SCENE, 'eta': 0.999, 'noise': [0.6, 0.6]}
+    soft = candidates(tmp_path, capsys, demanding)
+    assert {each['status'] for each in soft} == {'compromised'}
+    assert sum(each['likelihood'] for each in soft) == pytest.approx(1.0)
+    assert all(0 < each['eta'] < 0.999 and each['eta_reachable'] is None for each in soft)
+    far = candidates(tmp_path, capsys, {**demanding, 'shortfall': math.inf}, code=3)
     assert {each['status'] for each in far} == {'eta_unreachable'}
-    assert all(0 < each['eta_reachable'] == each['eta'] < 0.999 for each in far)
+    assert all(0 < each['eta_reachable'] == each['eta'] < 0.999 and each['likelihood'] == 0 for each in far)
     walls = [{'x': 0.15, 'y': y, 'radius': 0.03} for y in (-0.02, 0.02)]
     (shut,) = candidates(tmp_path, capsys, {**SCENE, 'obstacles': walls, 'guess': {'amplitude': 0.0}}, code=3)
     assert shut['status'] == 'infeasible' and shut['violation'] > 0.005
     assert shut['violation_at']['obstacle'] in ('0', '1')
+    assert solve(tmp_path, {**demanding, 'shortfall': math.inf}) == 3
+    error = capsys.readouterr().err
+    assert error.startswith('foc_ros solve: no candidate could be solved: goal0:') and error.count('\n') == 1

@@ -2,9 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages of evaluations and fits: pictures with their intervals, fitted values beside given ones, with escaped text."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from datetime import datetime
 from importlib.metadata import version
 from itertools import islice
@@ -17,7 +14,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.io.bags import BagReader, Item
+from foc_ros.io.bags import BagReader
 from foc_ros.reporting import study_pages
 from foc_ros.reporting.page import Section, write_page
 from foc_ros.reporting.study_pages import FEW, draw_example, warn_of_few
@@ -40,7 +37,7 @@ ANSWER = {
 }
 
 
-def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path: Path) -> None:
+def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path):
     write_report(tmp_path / 'new', 'hers & his', ANSWER)
     page = (tmp_path / 'new' / 'fit.html').read_text(encoding='utf-8')
     assert '<title>Fit: hers &amp; his</title>' in page
@@ -53,7 +50,7 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path: Path) -> 
     assert page.count('<img') == 1
 
 
-def test_a_fit_without_parameters_has_tables_only_and_a_folder_that_cannot_be_written_is_rejected(tmp_path: Path) -> None:
+def test_a_fit_without_parameters_has_tables_only_and_a_folder_that_cannot_be_written_is_rejected(tmp_path):
     write_report(tmp_path, 'x', ANSWER | {'parameters': {}})
     assert '<img' not in (tmp_path / 'fit.html').read_text(encoding='utf-8')
     (tmp_path / 'file').write_text('mine')
@@ -64,17 +61,17 @@ def test_a_fit_without_parameters_has_tables_only_and_a_folder_that_cannot_be_wr
 class Recorded:
     """The packaged recording, as one of a folder of recordings, or one that cannot be read."""
 
-    def __init__(self, is_broken: bool = False) -> None:
+    def __init__(self, is_broken=False):
         self.is_broken = is_broken
 
-    def items(self) -> Iterator[Item]:
+    def items(self):
         if self.is_broken:
             raise RecordingError('broken')
         with BagReader(RECORDING) as reader:
             yield from islice(reader, 250)
 
 
-def test_a_recording_is_pictured_with_its_prediction_and_one_that_cannot_be_read_is_passed_over() -> None:
+def test_a_recording_is_pictured_with_its_prediction_and_one_that_cannot_be_read_is_passed_over():
     config = Config().with_values({'rate_hz': 10.0, 'foc.steps': 20})
     (section,) = draw_example({'broken': Recorded(is_broken=True), 'whole': Recorded()}, config)
     ((_, caption),) = section.pictures
@@ -82,7 +79,7 @@ def test_a_recording_is_pictured_with_its_prediction_and_one_that_cannot_be_read
     assert draw_example({'broken': Recorded(is_broken=True)}, config) == []
 
 
-def test_a_page_names_what_made_it_and_no_path(tmp_path: Path) -> None:
+def test_a_page_names_what_made_it_and_no_path(tmp_path):
     config = Config().with_values({'foc.eta': 0.8, 'homotopy.library': '/elsewhere/mine.json'})
     write_page(tmp_path, 'x.html', 'x', [Section('In short', ['a < b'])], (), config)
     page = (tmp_path / 'x.html').read_text(encoding='utf-8')
@@ -95,7 +92,7 @@ def test_a_page_names_what_made_it_and_no_path(tmp_path: Path) -> None:
     assert 'All parameters have their defaults.' in (tmp_path / 'x.html').read_text(encoding='utf-8')
 
 
-def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
+def test_few_recordings_are_warned_of(tmp_path):
     assert warn_of_few(FEW, 'recordings') == [] and warn_of_few(FEW - 1, 'recordings')[0].startswith(
         f'Few recordings ({FEW - 1})'
     )
@@ -105,7 +102,7 @@ def test_few_recordings_are_warned_of(tmp_path: Path) -> None:
     assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
 
 
-def test_results_are_told_in_plain_words_first() -> None:
+def test_results_are_told_in_plain_words_first():
     scores = {'right': 0.8, 'log_likelihood': float(np.log(0.5))}
     answer = {
         'recordings': 3,

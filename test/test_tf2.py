@@ -5,10 +5,7 @@
 `scripts/tf2_check` compiles tf2 where ROS 2 is not installed, and runs this file.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
-from typing import Any
 
 import ros_required  # noqa: F401
 import numpy as np
@@ -20,20 +17,19 @@ tf2_ros = pytest.importorskip('tf2_ros', reason='optional message package: tf2_r
 from message_helpers import SECOND, cloud, obstacle_table, transform  # noqa: E402
 from node_helpers import TYPES, Bench, begin, figures, hand_path  # noqa: E402
 from rclpy.time import Time  # noqa: E402
-from ros_helpers import Graph  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 
 from foc_ros.ros.transforms import TransformTree, TransformUnavailableError  # noqa: E402
 
 
-def is_followed(ros: Graph, bench: Bench) -> Any:
+def is_followed(ros, bench):
     """Return a broadcaster whose transforms the node receives."""
     broadcaster = tf2_ros.TransformBroadcaster(bench.player)
     ros.spin_until(lambda: broadcaster.pub_tf.get_subscription_count() > 0, 'the listener')
     return broadcaster
 
 
-def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> None:
+def test_no_message_is_refused_whose_transform_arrives_after_it(ros):
     """A hand and obstacles in the frame of a camera on a moving arm, each sent before the transform for its stamp."""
     bench = begin(ros, frame_id='world', frames__tolerance_s=10.0)
     broadcaster, rows = is_followed(ros, bench), obstacle_table([(0.2, 0.02, 0.0, 0.03)])
@@ -54,7 +50,7 @@ def test_no_message_is_refused_whose_transform_arrives_after_it(ros: Graph) -> N
     assert len(bench.wait_for('prediction', 2)) >= 2
 
 
-def test_a_simulation_that_starts_again_forgets_its_transforms(ros: Graph) -> None:
+def test_a_simulation_that_starts_again_forgets_its_transforms(ros):
     """In the second round the camera is elsewhere: the transforms of the first, newer by their stamps, are not used."""
     bench = Bench(ros, outputs=[], frame_id='world', frames__tolerance_s=10.0, use_sim_time=True)
     broadcaster, clock = is_followed(ros, bench), bench.player.create_publisher(Clock, '/clock', 10)
@@ -74,7 +70,7 @@ def test_a_simulation_that_starts_again_forgets_its_transforms(ros: Graph) -> No
     assert figures(bench.health())['obstacles refused'] == '0 of 40'
 
 
-def test_the_transforms_of_a_recording_are_those_of_tf2() -> None:
+def test_the_transforms_of_a_recording_are_those_of_tf2():
     """Random trees of frames, static and moving, looked up at random stamps."""
     generator = np.random.default_rng(0)
     for _ in range(20):

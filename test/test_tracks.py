@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tracks: a class keeps its number, its solution and its share under changing names, and what fails is held."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
@@ -13,14 +11,12 @@ from reach_helpers import bowed, one_obstacle
 
 from foc_ros.core.config import Config, FocConfig, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
-from foc_ros.core.hand.duration import CHANGE_S, limit_change
 from foc_ros.core.hand.kalman import update
-from foc_ros.core.obstacle_table import Obstacles, make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import predict
-from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Status
 from foc_ros.core.tracks import NO_TRACKS, REST_S, SMOOTHING_S, TURNS, Track, Tracks
 from foc_ros.core.types import HandSample, HandState
@@ -31,31 +27,9 @@ MOVING = np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
 STEP_NS = 20_000_000
 
 
-def make_class(sides: dict[str, int], goal: int = 0) -> Candidate:
+def make_class(sides, goal=0):
     label = f'goal{goal}:' + ''.join(('+' if side == LEFT else '-') + name for name, side in sides.items())
     return Candidate(label, goal, tuple(sides.items()), np.zeros((2, 2)), 0.1)
-
-
-def number(*predictions: tuple[Candidate, ...]) -> list[list[int]]:
-    """Return the numbers of the classes in predictions 20 ms after one another."""
-    tracks, numbers = NO_TRACKS, []
-    for tick, candidates in enumerate(predictions):
-        matched = tracks.match(candidates, tick * STEP_NS)
-        numbers.append([each.number for each in matched])
-        seen = [replace(each, candidate=made, seen_ns=tick * STEP_NS) for each, made in zip(matched, candidates, strict=True)]
-        absent = [each for each in (*tracks.followed, *tracks.absent) if each.number not in numbers[-1]]
-        tracks = Tracks(
-            tuple(seen), tuple(absent), tick * STEP_NS, next_number=max([tracks.next_number, *(n + 1 for n in numbers[-1])])
-        )
-    return numbers
-
-
-OVER = make_class({'a': LEFT})
-
-
-def test_a_class_that_is_missing_for_a_short_time_keeps_its_number() -> None:
-    for gap, expected in ((9, 0), (10, 1)):
-        assert number((OVER,), *([()] * gap), (OVER,))[-1] == [expected]
 
 
 @pytest.mark.parametrize(
@@ -70,23 +44,23 @@ def test_a_class_that_is_missing_for_a_short_time_keeps_its_number() -> None:
         pytest.param(make_class({'b': LEFT}, goal=1), 2, id='another goal'),
     ],
 )
-def test_a_candidate_continues_the_track_of_its_class_under_any_name(now: Candidate, before: int) -> None:
+def test_a_candidate_continues_the_track_of_its_class_under_any_name(now, before):
     known = make_class({'a': LEFT, 'b': LEFT}), make_class({'a': LEFT, 'b': RIGHT})
     tracks = Tracks((Track(0, known[0], 0, 0.2), Track(1, known[1], 0, 0.8)), (), 0, next_number=2)
     assert [each.number for each in tracks.match([now], STEP_NS)] == [before]
 
 
-def predict_at(tick: int, y: float, tracks: Tracks, config: Config = CONFIG, goals: np.ndarray = GOALS, radius: float = 0.02):
+def predict_at(tick, y, tracks, config=CONFIG, goals=GOALS, radius=0.02):
     stamp_ns = STEP_NS * tick
     hand = HandState(stamp_ns, MOVING, np.zeros((6, 6)), onset_ns=stamp_ns, onset_position=np.zeros(2))
     return predict(config, hand, make_obstacles([[0.15, y]], radius, 0.001), goals, tracks)
 
 
-def find_likelihoods(prediction) -> dict[str, float]:
+def find_likelihoods(prediction):
     return {each.label: each.likelihood for each in prediction.candidates}
 
 
-def test_likelihoods_follow_a_filter_of_the_stated_time_constant() -> None:
+def test_likelihoods_follow_a_filter_of_the_stated_time_constant():
     """After a step of the scene the difference decays as exp(-t / SMOOTHING_S), whatever the period of the predictions."""
     first, after = (find_likelihoods(predict_at(0, y, NO_TRACKS)[0]) for y in (-0.015, 0.015))
     for ticks in ((5, 10), (1, 2, 3, 7, 10)):
@@ -100,7 +74,7 @@ def test_likelihoods_follow_a_filter_of_the_stated_time_constant() -> None:
             assert abs(first[label] - after[label]) > 0.05, 'the scene is no test'
 
 
-def reaching(x: float, tracks: Tracks):
+def reaching(x, tracks):
     """Predict for a hand at (x, 0) that moves, among two obstacles of which it passes the first at x = 0.1."""
     obstacles = make_obstacles([[0.1, 0.04], [0.2, -0.01]], 0.02, 0.001)
     state = None
@@ -111,7 +85,7 @@ def reaching(x: float, tracks: Tracks):
     return predict(CONFIG, state, obstacles, GOALS, tracks)
 
 
-def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions_and_numbers() -> None:
+def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions_and_numbers():
     before, tracks = reaching(0.099, NO_TRACKS)
     warm, _ = reaching(0.101, tracks)
     cold, _ = reaching(0.101, NO_TRACKS)
@@ -126,7 +100,7 @@ def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions_and_numb
         np.testing.assert_allclose(one.solution.path, other.solution.path, atol=exact)
 
 
-def test_unlikely_classes_are_solved_in_turns_unless_the_scene_changes() -> None:
+def test_unlikely_classes_are_solved_in_turns_unless_the_scene_changes():
     config = CONFIG.with_values({'homotopy.max_detour': 100.0, 'likelihood.planning_horizon_s': 1000.0})
     row = make_obstacles([[0.15, 0.05], [0.15, -0.05], [0.2, 0.0]], 0.02)
     hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
@@ -149,7 +123,7 @@ def test_unlikely_classes_are_solved_in_turns_unless_the_scene_changes() -> None
         assert any('solved again soon' in each.solution.message for each in prediction.candidates) == some_rest
 
 
-def test_an_earlier_solution_on_another_side_is_no_start() -> None:
+def test_an_earlier_solution_on_another_side_is_no_start():
     """An obstacle jumps over the earlier paths: both classes are solved from their guesses, and none leaves its class."""
     hand = HandState(0, np.zeros(6), np.zeros((6, 6)))
     _, tracks = predict(CONFIG, hand, make_obstacles([[0.15, -0.02]], 0.02, 0.001), GOALS, NO_TRACKS)
@@ -160,51 +134,38 @@ def test_an_earlier_solution_on_another_side_is_no_start() -> None:
     assert {each.label: each.cost for each in warm.candidates} == pytest.approx(costs, rel=1e-5)
 
 
-@pytest.mark.parametrize('elapsed_s', [0.005, 0.02, 0.1])
-def test_the_time_to_go_changes_gradually_and_never_slower_than_time(elapsed_s: float) -> None:
-    factor = np.exp(elapsed_s / CHANGE_S)
-    assert limit_change(4.8, 2.2, elapsed_s) == pytest.approx(2.2 * factor)
-    assert limit_change(0.3, 2.2, elapsed_s) == pytest.approx(2.2 / factor)
-    assert limit_change(2.2 - elapsed_s, 2.2, elapsed_s) == 2.2 - elapsed_s
-    assert limit_change(0.2 - elapsed_s, 0.2, elapsed_s) == 0.2 - elapsed_s, 'the end of a movement'
-    assert limit_change(4.8, 2.2, np.inf) == 4.8
-
-
 TWO_CIRCLES = make_obstacles([[0.12, 0.01], [0.2, -0.03]], [0.02, 0.02], 0.001)
 SCENES = {
     'two circles': TWO_CIRCLES,
     'a row of three': make_obstacles([[0.15, -0.07], [0.15, 0.005], [0.15, 0.07]], 0.02, 0.002),
     'one that moves': make_obstacles([[0.14, -0.05]], 0.03, 0.002, velocity=[[0.0, 0.06]]),
 }
-BUDGET_GOALS = np.array([[0.3, 0.0]])
-BUDGET_CONFIG = replace_values(Config(), {'foc.steps': 20})
 HANDS = [
-    update(None, HandSample(1_000_000_000 + 20_000_000 * tick, np.array([1e-4 * tick, 0.0])), BUDGET_CONFIG.estimator).state
+    update(None, HandSample(1_000_000_000 + 20_000_000 * tick, np.array([1e-4 * tick, 0.0])), CONFIG.estimator).state
     for tick in range(20)
 ]
-STRATEGIES = ('lv', 'hc', 'optimal', 'fixed', 'algorithm1')
 
 
 class Counted(Deadline):
     """A deadline that allows a number of steps, whatever the clock says, to the search for classes as many as it likes."""
 
-    def __init__(self, steps: int) -> None:
+    def __init__(self, steps):
         super().__init__()
         self.steps = steps
 
-    def allows(self, seconds: float = 0.0) -> bool:
+    def allows(self, seconds=0.0):
         self.steps -= 1
         return self.steps >= 0
 
-    def take_share(self, share: float, reserve_s: float = 0.0) -> Deadline:
+    def take_share(self, share, reserve_s=0.0):
         return NEVER if share < 0.5 else self
 
 
-def predicted(tick: int, memory: Tracks, deadline: Deadline = NEVER, obstacles: Obstacles = TWO_CIRCLES):
-    return predict(BUDGET_CONFIG, HANDS[tick], obstacles, BUDGET_GOALS, memory, deadline=deadline)
+def predicted(tick, memory, deadline=NEVER, obstacles=TWO_CIRCLES):
+    return predict(CONFIG, HANDS[tick], obstacles, GOALS, memory, deadline=deadline)
 
 
-def find_shares(prediction: Prediction) -> dict[str, float]:
+def find_shares(prediction):
     return {each.label: each.likelihood for each in prediction.candidates_with_likelihood}
 
 
@@ -264,7 +225,7 @@ def test_what_is_not_settled_goes_on_in_the_next_prediction():
     assert find_shares(prediction).keys() == find_shares(predicted(tick, NO_TRACKS)[0]).keys()
 
 
-@pytest.mark.parametrize('strategy', STRATEGIES)
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])
 def test_a_strategy_stops_at_its_deadline_with_the_best_so_far(strategy):
     problem, start = one_obstacle(0.94), cold_start(bowed((0, 0), (0.3, 0), 50, 0.05))
     settings = FocConfig(strategy=strategy, algorithm1_growth=1.5)
@@ -282,7 +243,7 @@ def test_a_strategy_stops_at_its_deadline_with_the_best_so_far(strategy):
 
 
 PERIOD_NS = 10_000_000
-TICKS = {'optimal': 1000, 'lv': 250, 'hc': 250}
+TICKS = {'optimal': 1000, 'lv': 120, 'hc': 120}
 """Ten seconds of the default strategy, and fewer of those that seek a point of a curve, which take several times as long."""
 NOISE = 0.001
 

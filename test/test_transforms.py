@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages in other frames: refused without tf2, and transformed with it (here with a substitute for tf2)."""
 
-from __future__ import annotations
-
 import re
 import sys
 from types import SimpleNamespace
-from typing import Any
 
 import ros_required  # noqa: F401
 import numpy as np
@@ -23,7 +20,6 @@ from message_helpers import (
     transform,
 )
 from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures
-from ros_helpers import Graph
 from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
@@ -43,11 +39,11 @@ class TransformException(Exception):
 class Buffer(TransformTree):
     """A substitute for the buffer of tf2, with a camera that stands still at (1, 0, 0)."""
 
-    def __init__(self, node: Any) -> None:
+    def __init__(self, node):
         super().__init__()
         self.set_transform_static(camera(1.0), '')
 
-    def lookup_transform(self, target: str, source: str, time: Any) -> Any:
+    def lookup_transform(self, target, source, time):
         try:
             found = self.look_up(target, source, time.nanoseconds)
         except TransformUnavailableError as error:
@@ -55,31 +51,31 @@ class Buffer(TransformTree):
         rotation = Rotation.from_matrix(found.rotation).as_quat()
         return transform(TYPES, source, found.translation, rotation, found.stamp_ns, target)
 
-    def set_transform(self, transform: Any, authority: str) -> None:
+    def set_transform(self, transform, authority):
         self.add(SimpleNamespace(transforms=[transform]), is_static=False)
 
-    def set_transform_static(self, transform: Any, authority: str) -> None:
+    def set_transform_static(self, transform, authority):
         self.add(SimpleNamespace(transforms=[transform]), is_static=True)
 
 
-def camera(x: float, stamp_ns: int = 0) -> Any:
+def camera(x, stamp_ns=0):
     """Return the transform of a camera at (x, 0, 0) in the world, rotated by 90 degrees to the left."""
     return transform(TYPES, 'camera', (x, 0.0, 0.0), (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)), stamp_ns)
 
 
 @pytest.fixture
-def tf2(monkeypatch: pytest.MonkeyPatch) -> None:
+def tf2(monkeypatch):
     """Install a substitute for tf2."""
     module = SimpleNamespace(Buffer=Buffer, TransformListener=lambda buffer, node: None, TransformException=TransformException)
     monkeypatch.setitem(sys.modules, 'tf2_ros', module)
 
 
-def seen(bench: Bench) -> np.ndarray:
+def seen(bench):
     return bench.node.pipeline.scene.obstacles(10 * SECOND).centre
 
 
 @pytest.mark.usefixtures('tf2')
-def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
+def test_every_input_is_transformed_into_the_working_frame(ros):
     bench = begin(ros, 1)
     columns = [(name, '<f8') for name in ('x', 'y', 'z', 'radius', 'vx', 'vy', 'vz')]
     moving = obstacle_table([(0.2, 0.3, 0.4, 0.05, 1.0, 0.0, 0.0)], columns)
@@ -113,7 +109,7 @@ def test_every_input_is_transformed_into_the_working_frame(ros: Graph) -> None:
 
 
 @pytest.mark.usefixtures('tf2')
-def test_what_cannot_be_transformed_is_refused_with_its_reason(ros: Graph) -> None:
+def test_what_cannot_be_transformed_is_refused_with_its_reason(ros):
     bench = begin(ros, 1)
     row, scene = (0.2, 0.3, 0.4, 0.0, 0.2, 0.1, 0.3), bench.node.pipeline.scene
     for message, words in (
@@ -136,7 +132,7 @@ def test_what_cannot_be_transformed_is_refused_with_its_reason(ros: Graph) -> No
         decode_point_cloud(cloud(TYPES, obstacle_table([row], BOX)), 'xz', lambda _: ('world', turn))
 
 
-def test_without_tf2_other_frames_are_refused(ros: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_tf2_other_frames_are_refused(ros, monkeypatch):
     monkeypatch.setitem(sys.modules, 'tf2_ros', None)
     bench = begin(ros, 2)
     bench.wait_for('prediction', 1)
@@ -148,7 +144,7 @@ HAND = [pose_stamped(TYPES, (0.0, 0.01 * i, 0.0), 10 * SECOND + i * SECOND // 10
 """Hand poses in the frame of a camera."""
 
 
-def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: None) -> None:
+def test_a_transform_that_arrives_after_its_message_is_awaited(ros, tf2):
     """Obstacles and hand in the frame of a camera that moves: every message is taken with the transform for its stamp."""
     bench = Bench(ros, frame_id='world', frames__tolerance_s=10.0)
     tf = bench.node._tf
@@ -166,7 +162,7 @@ def test_a_transform_that_arrives_after_its_message_is_awaited(ros: Graph, tf2: 
     assert 'count transform_newest_obstacles' not in status
 
 
-def test_without_a_transform_for_its_stamp_the_newest_one_is_taken_and_counted(ros: Graph, tf2: None) -> None:
+def test_without_a_transform_for_its_stamp_the_newest_one_is_taken_and_counted(ros, tf2):
     bench = Bench(ros, frame_id='world', frames__tolerance_s=0.05)
     bench.node._tf.set_transform(camera(1.0, 10 * SECOND), '')
     for i, expected in ((4, '0 of 1'), (6, '1 of 2')):

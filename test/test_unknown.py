@@ -2,9 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """No probability without knowledge: what fails keeps a share, and what is not followed is unknown."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +13,7 @@ from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.predict import predict
-from foc_ros.core.prediction import Prediction
-from foc_ros.core.solution import Solution, Status
+from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 from foc_ros.io.json_output import encode_prediction
@@ -29,28 +25,26 @@ ROW = make_obstacles([[0.15, 0.04], [0.15, -0.045]], 0.025, 0.001)
 GOALS = np.array([[0.3, 0.0]])
 
 
-def ask(config: Config = CONFIG, goals: np.ndarray = GOALS, obstacles=ROW) -> Prediction:
+def ask(config=CONFIG, goals=GOALS, obstacles=ROW):
     return predict(config, HAND, obstacles, goals, NO_TRACKS)[0]
 
 
-def let_fail(monkeypatch: pytest.MonkeyPatch, number: int, status: Status) -> None:
+def let_fail(monkeypatch, number, status):
     """Let the solver fail in the candidate of a number."""
     solve = candidates.solve_problems
 
-    def fail(*given) -> Sequence[Solution]:
+    def fail(*given):
         return [replace(each, status=status) if row == number else each for row, each in enumerate(solve(*given))]
 
     monkeypatch.setattr(candidates, 'solve_problems', fail)
 
 
-def total(prediction: Prediction) -> float:
+def total(prediction):
     return sum(each.likelihood for each in prediction.candidates) + prediction.unknown + prediction.other
 
 
 @pytest.mark.parametrize(('number', 'status'), [(0, Status.LEFT_CLASS), (1, Status.ITERATION_LIMIT), (2, Status.INFEASIBLE)])
-def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(
-    monkeypatch: pytest.MonkeyPatch, status: Status, number: int
-) -> None:
+def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(monkeypatch, status, number):
     known = {each.way: each for each in ask().candidates}
     let_fail(monkeypatch, number, status)
     found = ask()
@@ -65,7 +59,7 @@ def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(
 
 
 @pytest.mark.parametrize('horizon_s', [1000.0, 0.0])
-def test_what_is_seen_and_not_followed_is_unknown(horizon_s: float) -> None:
+def test_what_is_seen_and_not_followed_is_unknown(horizon_s):
     """The share of the classes that are not followed is about what they have where they are, by the same rule."""
     config = replace_values(CONFIG, {'likelihood.planning_horizon_s': horizon_s})
     whole, one = ask(config), ask(replace_values(config, {'homotopy.max_candidates': 1}))
@@ -75,7 +69,7 @@ def test_what_is_seen_and_not_followed_is_unknown(horizon_s: float) -> None:
     assert one.candidates[0].likelihood == pytest.approx(1.0 - one.unknown)
 
 
-def test_goals_that_are_not_followed_are_unknown() -> None:
+def test_goals_that_are_not_followed_are_unknown():
     """There are more goals than candidates that a prediction may have."""
     angles = np.linspace(-0.7, 0.7, 80)
     found = ask(
@@ -85,7 +79,7 @@ def test_goals_that_are_not_followed_are_unknown() -> None:
     assert found.unknown == pytest.approx(16.0 / 80.0, abs=0.02) and total(found) == pytest.approx(1.0)
 
 
-def test_the_cost_of_a_class_that_is_not_followed_is_the_largest_that_candidates_lead_to_expect() -> None:
+def test_the_cost_of_a_class_that_is_not_followed_is_the_largest_that_candidates_lead_to_expect():
     right, left = outcome('goal0:+1', cost=1.0), outcome('goal1:-1', bend=-0.1, cost=50.0, safety_factor=1.0)
     left = replace(left, candidate=replace(left.candidate, goal=1))
     unfollowed = replace(left.candidate, label='goal0:-1', goal=0, length=1.1 * left.candidate.length)
@@ -94,13 +88,13 @@ def test_the_cost_of_a_class_that_is_not_followed_is_the_largest_that_candidates
         assert known_cost < found.cost < 3.0 * known_cost and found.status is Status.ESTIMATED
 
 
-def test_where_nothing_is_solved_all_is_unknown() -> None:
+def test_where_nothing_is_solved_all_is_unknown():
     hard = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': np.inf})
     found = ask(hard)
     assert found.unknown == 1.0 and found.most_likely is None and total(found) == 1.0
 
 
-def test_the_unknown_share_is_published() -> None:
+def test_the_unknown_share_is_published():
     whole, one = ask(), ask(replace_values(CONFIG, {'homotopy.max_candidates': 1}))
     table = encode_likelihoods(one, TYPES)
     assert table.layout.dim[0].label == f'{one.candidates[0].label};unknown'
@@ -112,7 +106,7 @@ def test_the_unknown_share_is_published() -> None:
     assert encode_prediction(one)['unknown'] == one.unknown
 
 
-def test_a_class_that_the_search_misses_keeps_its_answer_for_a_moment() -> None:
+def test_a_class_that_the_search_misses_keeps_its_answer_for_a_moment():
     one = replace_values(CONFIG, {'homotopy.max_candidates': 1})
     whole, tracks = predict(CONFIG, HAND, ROW, GOALS, NO_TRACKS)
     ages = []

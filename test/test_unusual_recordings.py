@@ -2,14 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings as recorders, converters and accidents leave them: each is read as a whole, or what is missing is named."""
 
-from __future__ import annotations
-
 import os
 import sqlite3
 import warnings
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 import zstandard
@@ -22,25 +17,18 @@ from foc_ros.core.errors import FocWarning, MessageError, RecordingError
 from foc_ros.io import bags
 from foc_ros.io.bags import BagReader
 
-Content = list[tuple[str, int, bytes]]
 SHORT = messages(seconds=0.3)
 WHOLE = sorted((topic, stamp_ns, bytes(STORE.serialize_cdr(made, made.__msgtype__))) for topic, stamp_ns, made in SHORT)
 TOPICS = 'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT'
 MESSAGES = 'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)'
 
 
-def read(path: Path, **options: Any) -> Content:
+def read(path, **options):
     with BagReader(path, **options) as reader:
         return sorted((item.topic, item.log_ns, item.raw) for item in reader)
 
 
-def write_sqlite(
-    file: Path,
-    content: Content = WHOLE,
-    encoding: str = 'cdr',
-    rename: Callable[[str], str] = str,
-    mode: str = 'DELETE',
-) -> sqlite3.Connection:
+def write_sqlite(file, content=WHOLE, encoding='cdr', rename=str, mode='DELETE'):
     """Write a file as ROS 2 Foxy does, which has no definitions; return the open database."""
     database = sqlite3.connect(file)
     database.execute(f'PRAGMA journal_mode={mode}')
@@ -56,13 +44,13 @@ def write_sqlite(
     return database
 
 
-def write_metadata(folder: Path, names: list[str], count: int) -> None:
+def write_metadata(folder, names, count):
     text = f'rosbag2_bagfile_information:\n  relative_file_paths: {names}\n  message_count: {count}\n'
     (folder / 'metadata.yaml').write_text(text)
 
 
 @pytest.mark.parametrize('share', [1.0, 0.5])
-def test_a_killed_sqlite_recorder_leaves_a_log_that_is_read_with_a_warning(tmp_path: Path, share: float) -> None:
+def test_a_killed_sqlite_recorder_leaves_a_log_that_is_read_with_a_warning(tmp_path, share):
     first = len(WHOLE) // 2
     database = write_sqlite(tmp_path / 'live.db3', WHOLE[:first], mode='WAL')
     database.execute('PRAGMA wal_checkpoint(TRUNCATE)')
@@ -98,13 +86,13 @@ def test_a_killed_sqlite_recorder_leaves_a_log_that_is_read_with_a_warning(tmp_p
         {'repeat_channels': False, 'use_statistics': False, 'index_types': IndexType.NONE, 'repeat_schemas': False},
     ],
 )
-def test_every_record_of_a_summary_is_optional(tmp_path: Path, options: dict[str, Any]) -> None:
+def test_every_record_of_a_summary_is_optional(tmp_path, options):
     write_mcap(tmp_path / 'lean.mcap', SHORT, per_chunk=7, **options)
     assert read(tmp_path / 'lean.mcap') == WHOLE
 
 
 @pytest.mark.parametrize(('kind', 'is_folder'), [('.mcap', True), ('.db3', False)])
-def test_files_and_messages_may_be_compressed(tmp_path: Path, kind: str, is_folder: bool) -> None:
+def test_files_and_messages_may_be_compressed(tmp_path, kind, is_folder):
     plain, bag = tmp_path / f'plain{kind}', tmp_path / 'bag'
     bag.mkdir()
     if kind == '.mcap':
@@ -139,7 +127,7 @@ def test_files_and_messages_may_be_compressed(tmp_path: Path, kind: str, is_fold
         ),
     ],
 )
-def test_wrong_metadata_is_named_and_hides_nothing(tmp_path: Path, metadata: str, words: str) -> None:
+def test_wrong_metadata_is_named_and_hides_nothing(tmp_path, metadata, words):
     bag = write_bag(tmp_path / 'one', SHORT)
     (bag / 'metadata.yaml').write_text(metadata)
     with pytest.warns(FocWarning, match=words):
@@ -148,7 +136,7 @@ def test_wrong_metadata_is_named_and_hides_nothing(tmp_path: Path, metadata: str
 
 @pytest.mark.parametrize('has_metadata', [True, False])
 @pytest.mark.parametrize('lost', [0, 1])
-def test_a_missing_part_of_a_split_recording_is_named(tmp_path: Path, lost: int, has_metadata: bool) -> None:
+def test_a_missing_part_of_a_split_recording_is_named(tmp_path, lost, has_metadata):
     parts = [f'split_{part}.db3' for part in range(3)]
     for part, name in enumerate(parts):
         write_sqlite(tmp_path / name, [*WHOLE[part::3]]).close()
@@ -164,7 +152,7 @@ def test_a_missing_part_of_a_split_recording_is_named(tmp_path: Path, lost: int,
 
 @pytest.mark.parametrize('name', ['a%20b', 'a?mode=rw', "it's", 'été 手', '-x', 'a\nb'])
 @pytest.mark.parametrize('kind', ['.mcap', '.db3'])
-def test_a_path_opens_the_file_that_it_names(tmp_path: Path, name: str, kind: str) -> None:
+def test_a_path_opens_the_file_that_it_names(tmp_path, name, kind):
     (tmp_path / name).mkdir()
     for other in ('a b', 'a', 'A', 'a%2520b'):
         (tmp_path / other).mkdir(exist_ok=True)
@@ -181,9 +169,7 @@ def test_a_path_opens_the_file_that_it_names(tmp_path: Path, name: str, kind: st
 
 
 @pytest.mark.parametrize(('topic', 'wrong'), [('/hand_pose', b''), ('/obstacles', bytes(500)), ('/goals', b'?!' * 40)])
-def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], topic: str, wrong: bytes
-) -> None:
+def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(tmp_path, capsys, topic, wrong):
     place = [each[0] for each in WHOLE].index(topic) + 1
     changed = [*WHOLE[:place], (topic, WHOLE[place][1], wrong), *WHOLE[place + 1 :]]
     write_sqlite(tmp_path / 'one.db3', changed).close()
@@ -195,12 +181,12 @@ def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(
 SHORT_KINDS = {topic: made.__msgtype__ for topic, _, made in SHORT}
 
 
-def name_by_dds(name: str) -> str:
+def name_by_dds(name):
     return '::'.join([*name.split('/')[:-1], 'dds_', name.split('/')[-1] + '_'])
 
 
 @pytest.mark.parametrize('rename', [lambda name: name.replace('/msg/', '/'), lambda name: name.replace('/', '::'), name_by_dds])
-def test_a_type_name_may_be_that_of_older_recorders(tmp_path: Path, rename: Callable[[str], str]) -> None:
+def test_a_type_name_may_be_that_of_older_recorders(tmp_path, rename):
     write_sqlite(tmp_path / 'one.db3', rename=rename).close()
     assert read(tmp_path / 'one.db3') == WHOLE
     renamed = {made.__msgtype__: rename(made.__msgtype__) for _, _, made in SHORT}
@@ -212,7 +198,7 @@ def test_a_type_name_may_be_that_of_older_recorders(tmp_path: Path, rename: Call
     ('encoding', 'words'),
     [('ros1', 'in ROS 1 encoding, which is not read: convert'), ('json', 'in encoding json, which'), ('', 'in encoding unknown')],
 )
-def test_an_encoding_that_is_not_read_is_named(tmp_path: Path, encoding: str, words: str) -> None:
+def test_an_encoding_that_is_not_read_is_named(tmp_path, encoding, words):
     write_sqlite(tmp_path / 'one.db3', encoding=encoding).close()
     odd = {topic: (encoding, kind.replace('/msg/', '/'), 'ros1msg', b'') for topic, kind in SHORT_KINDS.items()}
     write_mcap(tmp_path / 'one.mcap', [], odd=odd)
@@ -230,7 +216,7 @@ def test_an_encoding_that_is_not_read_is_named(tmp_path: Path, encoding: str, wo
         (lambda text: '?!', True),
     ],
 )
-def test_definitions_may_be_those_of_another_system(tmp_path: Path, change: Callable[[str], str], is_told: bool) -> None:
+def test_definitions_may_be_those_of_another_system(tmp_path, change, is_told):
     """With the line ends of Windows, without those of other types, empty, or such that they cannot be parsed."""
     database = write_sqlite(tmp_path / 'one.db3')
     database.execute('CREATE TABLE message_definitions(topic_type TEXT, encoding TEXT, encoded_message_definition TEXT)')
@@ -246,7 +232,7 @@ def test_definitions_may_be_those_of_another_system(tmp_path: Path, change: Call
     assert bool(issued) == is_told and all('cannot be read, and that of ROS is used' in str(each.message) for each in issued)
 
 
-def test_a_file_name_need_not_be_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_name_need_not_be_text(tmp_path, capsys):
     """As a name in Latin-1 that was written by another system."""
     file = tmp_path / os.fsdecode(b'caf\xe9.db3')
     write_sqlite(file).close()
@@ -257,14 +243,14 @@ def test_a_file_name_need_not_be_text(tmp_path: Path, capsys: pytest.CaptureFixt
     assert 'caf?.db3' in (tmp_path / 'report' / 'index.html').read_text('utf-8')
 
 
-def test_a_bag_of_ros_1_is_named(tmp_path: Path) -> None:
+def test_a_bag_of_ros_1_is_named(tmp_path):
     (tmp_path / 'old.bag').write_bytes(b'#ROSBAG V2.0\n')
     with pytest.raises(RecordingError, match='a bag of ROS 1: convert it to ROS 2'):
         read(tmp_path / 'old.bag')
 
 
 @pytest.mark.parametrize('time', [None, 'noon', 0.5])
-def test_a_message_without_a_time_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], time: object) -> None:
+def test_a_message_without_a_time_is_named(tmp_path, capsys, time):
     database = write_sqlite(tmp_path / 'one.db3')
     database.execute('UPDATE messages SET timestamp = ? WHERE id = 4', (time,))
     database.commit()
@@ -273,9 +259,7 @@ def test_a_message_without_a_time_is_named(tmp_path: Path, capsys: pytest.Captur
     assert capsys.readouterr().err.endswith(f'damaged: 1 of its {len(WHOLE)} messages have no time\n')
 
 
-def test_a_compressed_message_does_not_fill_the_memory(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_compressed_message_does_not_fill_the_memory(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(bags, 'LARGEST_MESSAGE', 100_000)
     packed = [(topic, stamp_ns, zstandard.compress(raw)) for topic, stamp_ns, raw in WHOLE]
     place = [each[0] for each in packed].index('/hand_pose') + 3

@@ -2,27 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Views of predictions: those of the records and of the node's messages agree, and tracks keep their letters over time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from report_samples import START_NS, prediction, predictions, samples, scene
+from report_samples import START_NS, prediction, samples, scene
 
 from foc_ros.core.prediction import Prediction
-from foc_ros.core.solution import LEFT, RIGHT, Status
+from foc_ros.core.solution import Status
 from foc_ros.io.bags import TYPESTORE
-from foc_ros.reporting.views import (
-    HandTrajectory,
-    Slots,
-    build_candidate_tracks,
-    build_hand_trajectory,
-    build_snapshot,
-    is_late,
-    parse_label,
-    read_snapshot,
-)
+from foc_ros.reporting.views import HandTrajectory, Slots, build_hand_trajectory, build_snapshot, is_late, read_snapshot
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.ranking import compute_cost_ratios
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -31,7 +20,7 @@ TYPES = RosbagsTypes(TYPESTORE)
 NOWHERE = np.zeros(2)
 
 
-def test_movements_are_found_where_they_are_and_tremor_is_none() -> None:
+def test_movements_are_found_where_they_are_and_tremor_is_none():
     spans = build_hand_trajectory(samples(3)).find_movements(0.05)
     np.testing.assert_allclose((np.array(spans) - START_NS) * 1e-9, [[0.5, 1.5], [2.0, 3.0], [3.5, 4.5]], atol=0.15)
     random = np.random.default_rng(3)
@@ -41,7 +30,7 @@ def test_movements_are_found_where_they_are_and_tremor_is_none() -> None:
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
-def test_the_messages_hold_everything_that_a_report_shows(plane: str) -> None:
+def test_the_messages_hold_everything_that_a_report_shows(plane):
     """Also when another class is the most likely one by hysteresis, and after serialisation."""
     made = replace(prediction(START_NS, np.array([0.01, -0.02])), most_likely='goal1:+1-post')
     statuses = Status.DEADLINE, Status.COMPROMISED, Status.ESTIMATED
@@ -66,7 +55,7 @@ def test_the_messages_hold_everything_that_a_report_shows(plane: str) -> None:
             np.testing.assert_allclose(getattr(got, name), getattr(expected, name), rtol=1e-6, atol=1e-8)
 
 
-def test_messages_of_unknown_obstacles_and_of_nothing() -> None:
+def test_messages_of_unknown_obstacles_and_of_nothing():
     made = prediction(START_NS, NOWHERE)
     cloud, likelihoods = encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES)
     read = read_snapshot(cloud, likelihoods, 'xy', made.obstacles.take([1]), made.goal_positions)
@@ -80,24 +69,7 @@ def test_messages_of_unknown_obstacles_and_of_nothing() -> None:
     assert (read.candidates, read.most_likely) == ((), None)
 
 
-IDS = ('1', '12', 'post-2', '+')
-
-
-@pytest.mark.parametrize(
-    ('label', 'goal', 'sides'),
-    [
-        ('goal0:', 'goal0', {}),
-        ('goal1:+1-12', 'goal1', {'1': LEFT, '12': RIGHT}),
-        ('goal0:+12-1', 'goal0', {'12': LEFT, '1': RIGHT}),
-        ('goal0:-post-2+1', 'goal0', {'post-2': RIGHT, '1': LEFT}),
-        ('goal0:++-1', 'goal0', {'+': LEFT, '1': RIGHT}),
-    ],
-)
-def test_a_label_is_split_into_goal_and_sides(label: str, goal: str, sides: dict[str, int]) -> None:
-    assert parse_label(label, IDS) == (goal, sides)
-
-
-def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_absence() -> None:
+def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_absence():
     slots = Slots()
     assert slots.assign(range(6)) == list(range(6)), 'in order of likelihood'
     assert slots.assign([7, 3]) == [6, 3], 'a letter that has been free for longest'
@@ -107,13 +79,3 @@ def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_abs
     assert sorted(many[:12]) == list(range(12)) and many[12] is None
     assert len({slot % 6 for slot in many[:6]}) == 6
     assert slots.assign([3])[0] in range(12)
-
-
-def test_tracks_are_numbered_from_0_whatever_the_classes_are_called() -> None:
-    """The rows of a report's tracks are their numbers, and its recording may begin after the classes were numbered."""
-    made = prediction(START_NS, NOWHERE)
-    first, second, third = (replace(each, way=each.way + 70) for each in made.candidates_with_likelihood)
-    tracks = build_candidate_tracks([replace(made, candidates=(first, second)), replace(made, candidates=(second, third))])
-    assert [dict(each) for each in tracks.tracks] == [{'goal0:+1': 0, 'goal0:-1': 1}, {'goal0:-1': 1, 'goal1:+1-post': 2}]
-    assert list(tracks.likelihoods()) == [0, 1, 2]
-    assert [build_snapshot(each).stamp_ns for each in predictions(samples())] == [each.stamp_ns for each in samples()[::4]]

@@ -3,15 +3,13 @@
 """Which tests are `long` and which are `process`: the two markers by which `make check`, `test` and `test-long` choose.
 
 `LONG` lists the long tests. The mark `process` is derived from the code: a test has it if the test, a fixture of it or a helper
-in this folder starts a process, a ROS graph or a browser. Tests that do so through the package are listed in `PROCESS`,
-with others that `make check` leaves to `make test`. The
-lists consist of shell patterns for 'file::function'. `test_documentation.py` fails if a pattern matches no test.
+in this folder starts a process, a ROS graph or a browser. Tests that do so through the package are listed in `PROCESS`, and those
+that take more than half a second, with all their parameters, in `SLOW`: both have the mark, too, so that `make check` is quick.
+The lists consist of shell patterns for 'file::function'. `test_documentation.py` fails if a pattern matches no test.
 """
 
-from __future__ import annotations
-
-import ast
 import inspect
+import re
 from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -27,21 +25,19 @@ LONG = (
     'test_tracks.py::test_*symmetric_obstacle*',
     'test_guarantee.py::*',
     'test_plan_recovery.py::test_recovered_*',
-    'test_examples.py::test_the_slow_example_*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
-    # all steps of a fit, of the paper's studies and of long reports
+    # a fit and its comparison or without obstacles, the paper's studies and long reports
+    'test_play_session.py::test_a_fit_and_its_comparison',
     'test_fit.py::test_without_obstacles_goals_*',
     'test_report.py::test_a_long_recording_is_thinned_out*',
     'test_paper.py::test_*trend*',
     'test_paper.py::test_files_hold_the_computed_numbers',
-    'test_play_session.py::test_a_fit_and_its_comparison',
     'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
     # the commands of the documentation, and its web site
     'test_shown_commands.py::test_commands_work_as_shown',
     'test_documentation_site.py::*',
     # a node under load, and a process that is stopped or killed
     'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
-    'test_demo.py::test_the_live_predictions_are_those_of_the_recording',
     'test_node_scenes.py::test_*a_flood_of_obstacles*',
     'test_node_scenes.py::test_the_node_keeps_its_promises_in_a_hostile_scene',
     'test_node_process.py::test_a_node_that_is_killed_and_started_again',
@@ -51,27 +47,58 @@ LONG = (
 )
 
 PROCESS = (
+    'test_node_*.py::*',
     'test_parallel.py::*',
     'test_demo.py::*',
-    'test_demo_*.py::test_the_node_*',
+    'test_demo_parts.py::test_the_node_*',
     'test_fit.py::*',
-    'test_fit_*.py::test_a_setting_that_predicts_nothing_*',
-    'test_evaluate.py::test_workers_do_not_matter_*',
-    'test_paper.py::*',
-    # seconds in one process, as a dozen programs with a picture each
-    'test_strategies.py::test_a_cheap_eta_*',
-    'test_strategies.py::test_effort_and_likelihood_*',
-    'test_reference_cases.py::test_every_solved_candidate_*',
-    'test_solution_numbers.py::test_nothing_is_below_*',
+    'test_fit_search.py::test_a_setting_that_predicts_nothing_*',
     'test_simulation.py::test_the_command_*',
-    'test_replay_guidance.py::*',
-    'test_one_driver.py::*',
+    'test_paper.py::*',
     'test_notebook.py::*',
+    'test_evaluate.py::*',
+)
+
+SLOW = (
+    # the strategies that seek a point of a curve, and many scenes
+    'test_reference_cases.py::test_continuous_*',
+    'test_reference_cases.py::test_*class*',
+    'test_shapes_in_ocp.py::*',
+    'test_strategies.py::*',
+    'test_solution_numbers.py::test_nothing_is_below_*',
+    'test_solution_numbers.py::test_an_infeasible_*',
+    'test_homotopy_shapes.py::test_brute_force_finds_*',
+    'test_homotopy_shapes.py::test_candidates_stay_*',
+    'test_gradients.py::test_*corner*',
+    'test_extensions.py::test_a_qp_backend_*',
+    'test_tracks.py::test_*_class_*',
+    'test_tracks.py::test_a_strategy_stops_*',
+    'test_guidance_safety.py::test_hostile_hands',
+    'test_demonstrations.py::test_*path*',
+    'test_pace.py::test_a_repeated_way_*',
+    'test_height_messages.py::test_every_plane_*',
+    # recordings and commands
+    'test_one_driver.py::*',
+    'test_replay.py::*',
+    'test_solve.py::*',
+    'test_pipeline.py::test_a_replay_*',
+    'test_unusual_recordings.py::*',
+    'test_bags.py::test_no_mutant_*',
+    'test_fuzz*.py::*',
+    'test_decode_objects.py::test_a_bag_*',
+    'test_parameters.py::test_every_configuration_*',
+    'test_parameters.py::test_sections_apply_*',
+    'test_command_line.py::test_the_output_*',
+    'test_benchmarks.py::*',
+    # studies, pictures and pages
+    'test_box_scenes.py::*',
+    'test_evaluation_scores.py::test_the_region_*',
+    'test_fit_*.py::test_the_*',
     'test_plan_recovery.py::*',
-    'test_evaluate.py::test_in_order_*',
-    'test_measure_predictions.py::*',
-    'test_demonstrations.py::test_a_pooled_path_*',
-    'test_examples.py::test_the_example_runs_and_makes_a_figure',
+    'test_draw.py::test_a_plot_survives_*',
+    'test_study_pages.py::test_a_recording_*',
+    'test_play_session.py::test_t*',
+    'test_examples.py::test_the_example_runs_*',
 )
 
 STARTERS = {'subprocess', 'reserve_domain', 'chromium', 'worker_tasks'}
@@ -116,23 +143,29 @@ def find_names(code: CodeType) -> Iterator[str]:
 
 
 def add_marks(items: list[pytest.Item]) -> None:
-    """Mark the collected tests."""
+    """Mark the collected tests; those of a file with fixtures of the module run in one worker, which makes these once."""
     for item in items:
         if not isinstance(item, pytest.Function):
             continue
         file, function = item.path.name, item.originalname
         if is_listed(file, function, LONG):
             item.add_marker(pytest.mark.long)
-        if is_listed(file, function, PROCESS) or starts_process(item):
+        if is_listed(file, function, PROCESS + SLOW) or starts_process(item):
             item.add_marker(pytest.mark.process)
+        fixtures = [definition for found in item._fixtureinfo.name2fixturedefs.values() for definition in found]
+        if any(each.scope == 'module' for each in fixtures):
+            item.add_marker(pytest.mark.xdist_group(file))
 
 
-def list_test_functions() -> set[tuple[str, str]]:
-    """Return the file and name of all test functions of this folder."""
-    found = set()
-    for path in FOLDER.glob('test_*.py'):
-        tree = ast.parse(path.read_text(encoding='utf-8'))
-        found |= {
-            (path.name, node.name) for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name[:5] == 'test_'
-        }
-    return found
+def is_left_out(file: str, expression: str) -> bool:
+    """Return whether a target of the Makefile chooses no test of a file by its expression, so that it need not be imported."""
+    if expression == 'long':
+        return not any(fnmatchcase(file, pattern.partition('::')[0]) for pattern in LONG)
+    patterns = {'not long': LONG, 'not long and not process': LONG + PROCESS + SLOW}.get(expression, ())
+    return is_listed(file, '*', patterns)
+
+
+def list_test_functions() -> set[str]:
+    """Return 'file::function' of all tests of this folder."""
+    files = {path.name: path.read_text(encoding='utf-8') for path in FOLDER.glob('test_*.py')}
+    return {f'{file}::{name}' for file, text in files.items() for name in re.findall(r'^def (test_\w+)\(', text, re.MULTILINE)}
