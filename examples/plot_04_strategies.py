@@ -19,7 +19,7 @@ config = foc_ros.Config().with_values({'foc.noise_x': 0.15, 'foc.noise_y': 0.15}
 figure, (paths, speeds) = plt.subplots(1, 2, figsize=(11, 3.6), width_ratios=(1.5, 1), layout='constrained')
 paths.add_patch(plt.Circle(obstacle.centre, obstacle.radius, color='0.7'))
 for strategy in ('lv', 'hc', 'optimal'):
-    solution = foc_ros.solve((0.0, 0.0), (0.3, 0.0), [obstacle], eta=0.93, strategy=strategy, config=config)
+    solution = foc_ros.solve((0.0, 0.0), (0.3, 0.0), [obstacle], eta=0.94, strategy=strategy, config=config)
     paths.plot(*solution.path.T, marker='.', label=strategy)
     speed = np.hypot(*solution.mean[:, 2:4].T)
     speeds.plot(solution.times, speed, label=f'{strategy}: effort {solution.effort:,.0f} m²/s⁶')

@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Make the pictures of README and doc/, all of which the program computes.
 
-python scripts/pictures.py [NAME ...] [--to DIRECTORY], with NAME of scene, demo, api, play, concept_noise, concept_surrogate,
+python scripts/pictures.py [NAME ...], with NAME of scene, demo, api, play, concept_noise, concept_surrogate,
 concept_strategies, concept_classes, concept_likelihood, contacts. `play` needs Chromium, its driver and selenium, `demo` Pillow.
 """
 
@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import matplotlib as mpl
@@ -36,7 +37,6 @@ from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.interpolation import interpolate_position
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacles.shapes import collect_obstacles
-from foc_ros.core.plant.covariance import stack_noise
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import BagReader
@@ -49,10 +49,6 @@ from foc_ros.reporting.views import CandidateTracks, HandTrajectory, build_candi
 from foc_ros.ros.parameters import dump_parameter_file
 
 sys.path.append(str(ROOT / 'test'))
-sys.path.append(str(ROOT / 'examples' / 'paper'))
-
-from studies import NOISE as PAPER_NOISE
-from studies import STRATEGY_CLASS, Method
 
 RECORDING, SCENE = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', ROOT / 'doc' / 'examples' / 'scene.yaml'
 MOVEMENT, AFTER_S = 5, 0.02
@@ -225,14 +221,12 @@ def reach(
     return foc_ros.solve((0.0, 0.0), goal, obstacles, eta, strategy, seconds, config, guess)
 
 
-def rolled(solution: foc_ros.Solution, count: int) -> Array:
-    """Return noisy movements under the control of a solution, (count, N, 2) [m]."""
+def roll_out(solution: foc_ros.Solution, count: int) -> list[Array]:
+    """Return noisy movements under the control of a solution, (N, 2) [m] each."""
     control, problem = solution.control.T.ravel(), solution.problem
     assert problem is not None
     draws = np.random.default_rng(0).standard_normal((count, control.size))
-    noise = stack_noise(problem.noise, STEPS) * np.abs(control) * draws
-    movements: Array = problem.positions(control) + np.einsum('atu,su->sta', problem.horizon.position, noise)
-    return movements
+    return [problem.positions(control + problem.noise[0] * np.abs(control) * each) for each in draws]
 
 
 def noise() -> Figure:
@@ -243,7 +237,7 @@ def noise() -> Figure:
             colour, _ = get_class_style(number)
             solution = reach([], seconds=seconds, goal=SLANTED)
             up = np.array([0.0, shift])
-            for movement in rolled(solution, 30):
+            for movement in roll_out(solution, 30):
                 paths.plot(*(movement + up).T, color=colour, linewidth=0.5, alpha=0.35)
             paths.plot(*(solution.path + up).T, color=colour, linewidth=2.2)
             for row in range(5, STEPS + 1, 5):
@@ -279,21 +273,8 @@ def surrogate() -> Figure:
 
 
 def strategies() -> Figure:
-    """Return the same scene by three strategies: paths and speeds."""
-    with open_figure(8.6, 3.4) as figure:
-        paths, speeds = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
-        obstacles = collect_obstacles(STRATEGY_CLASS[0].obstacles)
-        draw_scene(paths, obstacles, GOAL[None], (-0.02, 0.32, -0.06, 0.14), named=False)
-        for number, name in enumerate(('lv', 'hc', 'optimal')):
-            colour, dash = get_class_style(number)
-            solution = Method(PAPER_NOISE, name).solve(*STRATEGY_CLASS, 0.94)
-            paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0)
-            for row in range(5, STEPS, 8):
-                _ellipse(paths, solution, row, colour)
-            speed = np.linalg.norm(solution.mean[:, 2:4], axis=1)
-            speeds.plot(solution.times, speed, color=colour, linewidth=2.0, label=f'{name}, effort {solution.effort:,.0f}')
-        speeds.set(xlabel='time [s]', ylabel='speed [m/s]', ylim=(0.0, 1.5))
-        speeds.legend(frameon=False, loc='upper left', fontsize=8)
+    """Return the figure of the example that compares the strategies."""
+    figure: Figure = run_path(str(ROOT / 'examples' / 'plot_04_strategies.py'))['figure']
     return figure
 
 
@@ -402,18 +383,16 @@ def main() -> None:
     names = [*FIGURES, 'demo', 'play']
     parser = argparse.ArgumentParser(description='Make the pictures of README and doc/.')
     parser.add_argument('names', nargs='*', metavar='NAME', help=f'some of {", ".join(names)}; all if none is named')
-    parser.add_argument('--to', type=Path, default=IMAGES, metavar='DIRECTORY', help='default: doc/images')
-    given = parser.parse_args()
-    if unknown := set(given.names) - set(names):
+    chosen = parser.parse_args().names or names
+    if unknown := set(chosen) - set(names):
         parser.error(f'no picture is named {", ".join(sorted(unknown))}')
-    given.to.mkdir(parents=True, exist_ok=True)
-    for name in given.names or names:
+    for name in chosen:
         if name == 'demo':
-            save_animation(list(pictures(*replayed())), given.to / 'demo.gif')
+            save_animation(list(pictures(*replayed())), IMAGES / 'demo.gif')
         elif name == 'play':
-            (given.to / 'play.png').write_bytes(play_page())
+            (IMAGES / 'play.png').write_bytes(play_page())
         else:
-            save_figure(FIGURES[name](), given.to / f'{name}.png')
+            save_figure(FIGURES[name](), IMAGES / f'{name}.png')
 
 
 if __name__ == '__main__':

@@ -3,8 +3,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Make recordings of simulated hands.
 
-    python scripts/recordings.py packaged [FILE]
-    python scripts/recordings.py tables [DIRECTORY]
+    python scripts/recordings.py packaged
+    python scripts/recordings.py tables
 
 packaged: the recording of the package. An operator carries objects to and fro among obstacles, on a different path each time. The
 movements are independent of the predictor. Each reach is the minimum-jerk movement through hand-picked via points: a quintic
@@ -17,30 +17,28 @@ tables: doc/examples/*.csv, two movements of the packaged recording as motion-ca
 
 from __future__ import annotations
 
+import argparse
 import csv
 import tempfile
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cyclopts import App
 from page import ROOT
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.optimize import minimize
 
 from foc_ros.core.config import Config
-from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Array, HandSample
+from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
-from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory
-from foc_ros.ros.intake import Intake
+from foc_ros.io.topics import HAND
+from foc_ros.reporting.views import build_hand_trajectory
+from foc_ros.ros.messages.decode_poses import decode_hand_sample
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 
-EXAMPLES = ROOT / 'doc' / 'examples'
 MOVEMENTS = (4, 6)
 """Rows of the movements of the recording that the tables have."""
 LEAD_NS, EVERY = 200_000_000, 2
@@ -190,13 +188,13 @@ def write_recording(file: Path) -> None:
             for stamp_ns, topic, message in messages():
                 writer.write(topic, message, stamp_ns)
         (made,) = bag.glob('*.mcap')
-        file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(made.read_bytes())
 
 
 def write_tables(directory: Path) -> None:
     """Write recordings.csv, obstacles.csv and goals.csv of two movements of the packaged recording."""
-    hand, goals = read()
+    with BagReader(PACKAGED) as reader:
+        hand = build_hand_trajectory([decode_hand_sample(item.message, 'xy') for item in reader if item.role == HAND])
     spans = hand.find_movements(Config().estimator.onset_speed)
     samples = []
     for name, number in zip('ab', MOVEMENTS, strict=True):
@@ -208,44 +206,21 @@ def write_tables(directory: Path) -> None:
         (str(name), *(f'{value:.4f}' for value in (x, y, radius, stddev, *box)))
         for x, y, _, radius, stddev, name, *box in OBSTACLES
     ]
-    _write(directory / 'recordings.csv', ('recording', 't_s', 'x_m', 'y_m'), samples)
-    columns = ('id', 'x_m', 'y_m', 'radius_m', 'radius_stddev_m', 'size_x_m', 'size_y_m', 'yaw_rad')
-    _write(directory / 'obstacles.csv', columns, obstacles)
-    _write(directory / 'goals.csv', ('x_m', 'y_m'), [tuple(f'{value:.4f}' for value in goal) for goal in goals])
-
-
-def read() -> tuple[HandTrajectory, Array]:
-    """Return the hand and the goals of the recording, decoded as in the node."""
-    intake = Intake(Pipeline(Config()))
-    samples: list[HandSample] = []
-    with BagReader(PACKAGED) as reader:
-        for item in reader:
-            intake.take(item.role, item.message)
-            if intake.sample is not None and (not samples or intake.sample is not samples[-1]):
-                samples.append(intake.sample)
-    assert intake.pipeline.scene.goals is not None
-    return build_hand_trajectory(samples), intake.pipeline.scene.goals
-
-
-def _write(file: Path, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    with file.open('w', newline='', encoding='utf-8') as stream:
-        csv.writer(stream, lineterminator='\n').writerows([columns, *rows])
-
-
-app = App(name='recordings', help=__doc__, help_format='plaintext')
-
-
-@app.command
-def packaged(file: Path = PACKAGED, /) -> None:
-    """Make the packaged recording."""
-    write_recording(file)
-
-
-@app.command
-def tables(directory: Path = EXAMPLES, /) -> None:
-    """Make the tables of doc/examples."""
-    write_tables(directory)
+    columns = 'id', 'x_m', 'y_m', 'radius_m', 'radius_stddev_m', 'size_x_m', 'size_y_m', 'yaw_rad'
+    tables = {
+        'recordings': [('recording', 't_s', 'x_m', 'y_m'), *samples],
+        'obstacles': [columns, *obstacles],
+        'goals': [('x_m', 'y_m'), *([f'{value:.4f}' for value in goal] for goal in FAR)],
+    }
+    for name, rows in tables.items():
+        with (directory / f'{name}.csv').open('w', newline='', encoding='utf-8') as stream:
+            csv.writer(stream, lineterminator='\n').writerows(rows)
 
 
 if __name__ == '__main__':
-    app()
+    parser = argparse.ArgumentParser(description='Make recordings of simulated hands.')
+    parser.add_argument('what', choices=('packaged', 'tables'))
+    if parser.parse_args().what == 'packaged':
+        write_recording(PACKAGED)
+    else:
+        write_tables(ROOT / 'doc' / 'examples')
