@@ -102,6 +102,7 @@ setup(
             'ipykernel>=6.29',
             'mcap-ros2-support>=0.5',
             'nbclient>=0.10',
+            'psutil>=5.9',
             'pytest>=7.4',
             'pytest-timeout>=2.2',
             'pytest-xdist>=3.3',

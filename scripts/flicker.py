@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure how steady predictions are from tick to tick, on recordings at 100 Hz, with measurement noise.
 
-    python scripts/flicker.py [DATA ...] [--strategy NAME ...] [--noise M ...] [--set NAME=VALUE ...] [--every N]
+    python scripts/flicker.py [DATA ...] [--strategy NAME ...] [--noise M ...] [--set NAME=VALUE ...]
 
 DATA: bags, or folders as `foc_ros evaluate` reads them; by default the packaged recording, and D3IL and HLP where they are beside
 the checkout. Positions come at 100 Hz by cubic interpolation, and predictions at 50 Hz. Ticks across a change of the scene are
@@ -22,12 +22,13 @@ import numpy as np
 import yaml
 from page import ROOT, SHARED, format_table
 from scipy.interpolate import CubicSpline
+from scipy.spatial import KDTree
 
 from foc_ros.analysis.recordings import Recording, find_recordings
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config
 from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.io.topics import HAND
 from foc_ros.ros.messages.decode_poses import decode_stamp
@@ -40,49 +41,34 @@ STRATEGIES, NOISE_M = ('lv', 'hc', 'optimal'), (0.0, 0.0005, 0.001)
 TYPES = RosbagsTypes(TYPESTORE)
 CHANGE = 0.1
 """Change of a likelihood from one tick to the next that counts."""
-SHORT_TICKS, RETURN_S, LONGEST_S = 10, 0.2, 0.05
-"""Absences of fewer ticks and leads that return within this time count. Ticks farther apart than LONGEST_S are not compared."""
-FINE = 6
-"""Points for each step of a path, so that its chords are no part of a distance."""
+SHORT_TICKS, LONGEST_S = 10, 0.05
+"""Absences of fewer ticks count. Ticks farther apart than LONGEST_S are not compared."""
+FINE = 100
+"""Points for each step of a path, less than 0.2 mm apart, from which distances are measured."""
 
 
 @dataclass
 class Steadiness:
     """What happened over the ticks of several recordings.
 
-    ticks: pairs of predictions that were compared; changed: those in which a likelihood changed by more than CHANGE; returns:
-    leads A-B-A within RETURN_S; absences: of a class, shorter than SHORT_TICKS; sideways: move of each mean path [m].
+    ticks: pairs of predictions that were compared; changed: those in which a likelihood changed by more than CHANGE; absences: of
+    a class, shorter than SHORT_TICKS; sideways: move of each mean path [m].
     """
 
     seconds: float = 0.0
     ticks: int = 0
     changed: int = 0
-    returns: int = 0
     absences: int = 0
     sideways: list[float] = field(default_factory=list)
 
     def summarise(self) -> list[str]:
         """Return the cells under HEAD."""
-        minutes = self.seconds / 60.0
         percentile, largest = (1e3 * float(np.percentile(self.sideways or [0.0], each)) for each in (95.0, 100.0))
-        return [
-            str(self.ticks),
-            f'{100 * self.changed / max(self.ticks, 1):.2f}',
-            f'{self.returns / minutes:.1f}',
-            f'{self.absences / minutes:.1f}',
-            f'{percentile:.2f}',
-            f'{largest:.1f}',
-        ]
+        changed, absences = 100 * self.changed / max(self.ticks, 1), 60.0 * self.absences / max(self.seconds, 1e-9)
+        return [str(self.ticks), f'{changed:.2f}', f'{absences:.1f}', f'{percentile:.1f}', f'{largest:.1f}']
 
 
-HEAD = (
-    'ticks',
-    'changed > 0.1 [%]',
-    'A-B-A [1/min]',
-    'short absences [1/min]',
-    'sideways 95 % [mm]',
-    'largest [mm]',
-)
+HEAD = 'ticks', 'changed > 0.1 [%]', 'short absences [1/min]', 'sideways 95 % [mm]', 'largest [mm]'
 
 
 def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> None:
@@ -90,20 +76,16 @@ def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> 
     before: Prediction | None = None
     last: dict[int, PredictedCandidate] = {}
     seen: dict[int, int] = {}  # the last tick of each class
-    leads: list[tuple[float, int]] = []
     for tick, now in enumerate(predictions):
-        is_first = before is None or not _is_same_scene(before, now)
-        if is_first:
-            last, seen, leads = {}, {}, []
         found = {each.way: each for each in now.candidates_with_likelihood}
-        if before is not None and not is_first:
+        if before is None or not _is_same_scene(before, now):
+            seen = {}
+        else:
             total.ticks += 1
             total.seconds += now.t - before.t
             total.absences += sum(1 < tick - seen.get(way, -SHORT_TICKS) <= SHORT_TICKS for way in found)
             total.changed += _compute_largest_change(last, found) > CHANGE
             total.sideways += [compute_sideways_move(last[each], found[each]) for each in last.keys() & found.keys()]
-        leads += [(now.t, way) for way, each in found.items() if each.label == now.most_likely]
-        total.returns += _has_returned(leads)
         before, last = now, found
         seen |= dict.fromkeys(found, tick)
 
@@ -122,28 +104,10 @@ def _compute_largest_change(last: dict[int, PredictedCandidate], found: dict[int
     return max((abs(shares[0].get(each, 0.0) - shares[1].get(each, 0.0)) for each in last | found), default=0.0)
 
 
-def _has_returned(leads: list[tuple[float, int]]) -> bool:
-    """Tell whether the last lead (time [s], class) has just come back to a class that led within RETURN_S; forget older ones."""
-    if len(leads) < 3 or leads[-1][1] == leads[-2][1]:
-        return False
-    end, leader = leads[-1]
-    return any(number == leader and end - time <= RETURN_S + 1e-9 for time, number in leads[:-2])
-
-
 def compute_sideways_move(before: PredictedCandidate, now: PredictedCandidate) -> float:
     """Return the largest distance [m] of a mean path from that of the tick before, perpendicular to the latter."""
     line = before.position_at(np.linspace(0.0, before.times[-1], FINE * (len(before.times) - 1) + 1))
-    return float(measure_distances(now.solution.path, line).max())
-
-
-def measure_distances(points: Array, line: Array) -> Array:
-    """Return the distance (m,) of points (m, 2) from a line through points (n, 2)."""
-    start, along = line[:-1], np.diff(line, axis=0)
-    offset = points[:, None] - start
-    share = np.einsum('mnk,nk->mn', offset, along) / np.maximum((along**2).sum(axis=1), 1e-30)
-    nearest = np.clip(share, 0.0, 1.0)[..., None] * along
-    distances: Array = np.hypot(*(offset - nearest).transpose(2, 0, 1)).min(axis=1)
-    return distances
+    return float(KDTree(line).query(now.solution.path)[0].max())
 
 
 def resample(recording: Recording, stddev: float, seed: int) -> list[Item]:
@@ -179,15 +143,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--set', action='append', default=[], metavar='NAME=VALUE', help='a parameter')
     parser.add_argument('--strategy', nargs='+', default=STRATEGIES, metavar='NAME')
     parser.add_argument('--noise', nargs='+', type=float, default=NOISE_M, metavar='M', help='standard deviations [m]')
-    parser.add_argument('--every', type=int, default=1, metavar='N', help='every n-th recording only')
     chosen = parser.parse_args(arguments)
     config = Config().with_values({name: yaml.safe_load(text) for name, _, text in (each.partition('=') for each in chosen.set)})
     print(config)
     print(format_table(('data', 'strategy', 'noise [mm]', *HEAD), ()), flush=True)
     paths = chosen.data or [DEMO, *(SHARED / name for name in ('d3il_avoiding', 'hlp_reaching') if (SHARED / name).exists())]
     for path, strategy, noise in product(paths, chosen.strategy, chosen.noise):
-        recordings = list(find_recordings(path).values())[:: chosen.every]
-        row = path.stem, f'`{strategy}`', f'{1e3 * noise:g}', *measure(recordings, strategy, noise, config).summarise()
+        measured = measure(list(find_recordings(path).values()), strategy, noise, config)
+        row = path.stem, f'`{strategy}`', f'{1e3 * noise:g}', *measured.summarise()
         print(format_table(row, ()).partition('\n')[0], flush=True)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES, SHARED = ROOT / 'doc' / 'images', ROOT.parent / 'shared' / 'data'
+BLOCK = r'<!-- measured: (\w+) -->\n(.*?)<!-- end -->'
 
 
 def format_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -20,20 +21,16 @@ def format_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def find_blocks(page: str) -> dict[str, str]:
     """Return the text of the measured blocks of a page, by name."""
-    return dict(re.findall(r'<!-- measured: (\w+) -->\n(.*?)<!-- end -->', page, re.DOTALL))
-
-
-def replace_blocks(page: str, texts: Mapping[str, str]) -> str:
-    """Return the page with new texts in those of its blocks that are named; a text for which it has no block is left out."""
-    for name in texts.keys() & find_blocks(page).keys():
-        mark = f'<!-- measured: {name} -->\n'
-        before, _, rest = page.partition(mark)
-        page = f'{before}{mark}\n{texts[name]}\n\n<!-- end -->{rest.partition("<!-- end -->")[2]}'
-    return page
+    return dict(re.findall(BLOCK, page, re.DOTALL))
 
 
 def write_blocks(texts: Mapping[str, str], page: Path) -> None:
     """Print all texts, and write those into the page for which it has a block: it shows the main results only."""
+
+    def renew(block: re.Match[str]) -> str:
+        name = block[1]
+        return f'<!-- measured: {name} -->\n\n{texts[name]}\n\n<!-- end -->' if name in texts else block[0]
+
     for name, text in texts.items():
         print(f'{name}\n{text}\n', flush=True)
-    page.write_text(replace_blocks(page.read_text(encoding='utf-8'), texts), encoding='utf-8')
+    page.write_text(re.sub(BLOCK, renew, page.read_text(encoding='utf-8'), flags=re.DOTALL), encoding='utf-8')

@@ -325,38 +325,29 @@ def follow_with_rows_at_steps() -> Array:
 
 
 def contacts() -> Figure:
-    """Return the picture: the mean against the circle, a close-up of the contact, effort over eta."""
+    """Return the picture: the mean against the circle, near the contact; effort over eta."""
     solution = reach([TOUCHED], TOUCHED_ETA, 'lv', c=TOUCHED_NOISE)
     _, time, multiplier = max(solution.multipliers, key=lambda contact: contact[2])
-    centre, radius = np.array(TOUCHED.centre), TOUCHED.radius
-    kept = float(np.sqrt(radius**2 + TOUCHED.radius_stddev**2 + solution.tau))
+    kept = float(np.sqrt(TOUCHED.radius**2 + TOUCHED.radius_stddev**2 + solution.tau))
     blue, orange = get_class_style(0)[0], get_class_style(1)[0]
     fine = interpolate_position(solution.mean, solution.dt, solution.dt * np.linspace(0.0, STEPS, 20 * STEPS + 1))
     contact = interpolate_position(solution.mean, solution.dt, np.array(solution.dt * time))
-    normal = (contact - centre) / np.linalg.norm(contact - centre)
-    with open_figure(10.0, 3.4) as figure:
-        overview, close_up, curves = figure.subplots(1, 3, width_ratios=(1.35, 1.0, 1.15))
-        for axes in (overview, close_up):
-            axes.add_patch(Circle((0.12, 0.0), radius, facecolor='0.75', edgecolor='0.4'))
-            axes.add_patch(Circle((0.12, 0.0), kept, facecolor='none', edgecolor='0.4', linestyle='--'))
-            axes.plot(*fine.T, color=blue, linewidth=1.6)
-            axes.plot(*solution.path.T, color=blue, marker='o', markersize=3.5, linestyle='none')
-            axes.plot(*contact, color=orange, marker='D', markersize=7, zorder=5)
-        arrow = {'arrowstyle': '->', 'color': orange, 'linewidth': 1.8}
-        overview.annotate('', contact + 0.035 * normal, contact, arrowprops=arrow)
-        overview.annotate(f'y = {multiplier:,.0f} m/s⁶', contact + 0.037 * normal, color=orange, fontsize=8, ha='center')
-        overview.plot(*GOAL, marker='*', markersize=12, color='black', markerfacecolor='white')
-        overview.set(title='The mean touches the circle', xlabel='x [m]', ylabel='y [m]')
-        overview.set(xlim=(-0.01, 0.31), ylim=(-0.07, 0.17))
-        overview.set_aspect('equal')
-        before, after = solution.path[int(time)], solution.path[int(time) + 1]
-        half = 1.2 * float(np.linalg.norm(after - before))
-        for point, number in ((before, int(time)), (after, int(time) + 1)):
-            close_up.annotate(f'step {number}', point, xytext=(0, 10), textcoords='offset points', fontsize=8, ha='center')
-        close_up.annotate(f's = {time:.2f}', contact, xytext=(0, -18), textcoords='offset points', fontsize=8, ha='center')
-        close_up.set(title='Close-up of the contact', xticks=(), yticks=())
-        close_up.set(xlim=contact[0] + half * np.array([-1, 1]), ylim=contact[1] + half * np.array([-1.0, 1.0]))
-        close_up.set_aspect('equal')
+    outward = 0.008 * (contact - TOUCHED.centre) / np.linalg.norm(contact - TOUCHED.centre)
+    with open_figure(9.0, 3.6) as figure:
+        touch, curves = figure.subplots(1, 2)
+        touch.add_patch(Circle(TOUCHED.centre, kept, facecolor='none', edgecolor='0.4', linestyle='--'))
+        touch.plot(*fine.T, color=blue, linewidth=1.6)
+        touch.plot(*solution.path.T, color=blue, marker='o', markersize=3.5, linestyle='none')
+        touch.plot(*contact, color=orange, marker='D', markersize=7, zorder=5)
+        arrow = {'arrowstyle': '<-', 'color': orange, 'linewidth': 1.8}
+        words = f's = {time:.2f}, y = {multiplier:,.0f} m/s⁶'
+        touch.annotate(words, contact, contact + outward, color=orange, fontsize=8, ha='center', arrowprops=arrow)
+        for step in (int(time), int(time) + 1):
+            look = {'xytext': (0, -14), 'textcoords': 'offset points', 'fontsize': 8, 'ha': 'center'}
+            touch.annotate(f'step {step}', solution.path[step], **look)
+        touch.set(title='The mean touches the circle between two steps', xlabel='x [m]', ylabel='y [m]')
+        touch.set_aspect('equal')
+        touch.set(xlim=contact[0] + 0.02 * np.array([-1, 1]), ylim=contact[1] + 0.012 * np.array([-1, 1]))
         along = follow_with_rows_at_steps()
         look = {'color': orange, 'marker': '.', 'markersize': 3, 'linestyle': 'none'}
         curves.plot(*along[along[:, 0] > ETAS[0]].T, label='rows at the steps', **look)

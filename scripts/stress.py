@@ -35,6 +35,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import psutil
 from cyclopts import App, Parameter
 
 from foc_ros.core.config import Config
@@ -118,11 +119,6 @@ class Player:
         for node, context in zip((self._node, self._tracker), self._contexts, strict=True):
             node.destroy_node()
             context.try_shutdown()
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether the node subscribes to every input."""
-        return all(publisher.get_subscription_count() for publisher in self._publishers.values())
 
     def forget(self) -> None:
         """Forget what was measured so far."""
@@ -238,7 +234,7 @@ class Player:
 
     def count_received(self) -> int:
         """Return how many poses the node has received."""
-        return int(self.health['hand_pose refused'].split(' of ')[1])
+        return int(self.health.get('hand_pose refused', '0 of 0').split(' of ')[1])
 
 
 @contextmanager
@@ -252,17 +248,9 @@ def run_node(parameters: Mapping[str, object]) -> Iterator[NodeProcess]:
         yield node
 
 
-def measure_process(pid: int) -> dict[str, float]:
-    """Return resident memory [MB], threads and open files of a process."""
-    status = dict(line.split(':', 1) for line in Path(f'/proc/{pid}/status').read_text('ascii').splitlines())
-    files = len(list(Path(f'/proc/{pid}/fd').iterdir()))
-    return {'memory': int(status['VmRSS'].split()[0]) / 1024.0, 'threads': float(status['Threads']), 'files': float(files)}
-
-
-def read_cpu_s(pid: int) -> float:
-    """Return the CPU time of a process [s]."""
-    fields = Path(f'/proc/{pid}/stat').read_text('ascii').rpartition(')')[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+def measure_process(process: psutil.Process) -> dict[str, float]:
+    """Return resident memory [bytes], threads and open files of a process."""
+    return {'memory': process.memory_info().rss, 'threads': process.num_threads(), 'files': process.num_fds()}
 
 
 def play_until_predicted(player: Player) -> float:
@@ -318,17 +306,18 @@ def measure_case(case: Case, strategy: str, seconds: float, *, is_faulty: bool =
         Player(case.rows, case.goals, asks=not is_faulty) as player,
         run_node({'foc.strategy': strategy, **case.parameters}) as node,
     ):
+        process = psutil.Process(node.pid)
         play_until_predicted(player)
-        while 'hand_pose refused' not in player.health:
+        while not player.count_received():
             player.play(PERIOD_S)
         player.spin(SETTLE_S)
         player.sent['good'] = player.count_received()  # earlier ones may be lost
         player.forget()
         before = [player.count(name) for name in names]
         player.play(seconds / 3.0, is_faulty)
-        first = measure_process(node.pid) | {'slower': player.read_percentiles('cycle')[1]}
+        first = measure_process(process) | {'slower': player.read_percentiles('cycle')[1]}
         player.play(2.0 * seconds / 3.0, is_faulty)
-        last = measure_process(node.pid) | {'slower': player.read_percentiles('cycle')[1]}
+        last = measure_process(process) | {'slower': player.read_percentiles('cycle')[1]}
         for _ in range(50):
             if player.count_received() >= sum(player.sent.values()):
                 break
@@ -368,7 +357,7 @@ def measure_rates(seconds: float) -> dict[str, float]:
     parameters = {'guidance.enabled': 'true', 'guidance.clearance': 0.0}
     with Player(rows, GOALS[:1], FAST_S, asks=True) as player, run_node(parameters):
         start_s = play_until_predicted(player)
-        player.play(2.0)
+        player.play(SETTLE_S)
         player.forget()
         player.play(seconds)
     ages, periods = np.array(player.ages_s or [np.nan]), np.diff(player.wrenches_s or [np.nan] * 2)
@@ -386,18 +375,18 @@ def measure_rates(seconds: float) -> dict[str, float]:
 def measure_intake(seconds: float) -> dict[str, float]:
     """Measure the CPU time of a node that hardly predicts, with a hand at 1 kHz and without."""
     with Player(period_s=FAST_S) as player, run_node({'rate_hz': 0.1}) as node:
-        while not player.is_connected:
-            player.spin(0.1)
-        player.play(2.0)
-        before, sent = read_cpu_s(node.pid), player.sent['good']
+        process = psutil.Process(node.pid)
+        play_until_predicted(player)
+        player.play(SETTLE_S)
+        sent = player.sent['good']
+        process.cpu_percent()
         player.play(seconds)
-        used, hertz = read_cpu_s(node.pid) - before, (player.sent['good'] - sent) / seconds
-        player.spin(1.0)
-        before = read_cpu_s(node.pid)
+        used, hertz = process.cpu_percent() / 100.0, (player.sent['good'] - sent) / seconds
+        player.spin(SETTLE_S)
+        process.cpu_percent()
         player.spin(seconds)
-        idle = read_cpu_s(node.pid) - before
-    cost = (used - idle) / seconds * 1e3 / hertz
-    return {'poses published [Hz]': hertz, 'cost of 1 kHz [cores]': cost, 'without a hand [cores]': idle / seconds}
+        idle = process.cpu_percent() / 100.0
+    return {'poses published [Hz]': hertz, 'cost of 1 kHz [cores]': (used - idle) * 1e3 / hertz, 'without a hand [cores]': idle}
 
 
 app = App(name='stress', help=__doc__, help_format='plaintext', default_parameter=Parameter(negative=()))
