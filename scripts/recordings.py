@@ -20,7 +20,6 @@ from __future__ import annotations
 import argparse
 import csv
 import tempfile
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -67,27 +66,17 @@ OBSTACLES = [  # x, y, z, radius, radius_stddev, id, size_x, size_y, yaw: a box,
 ]
 
 
-@dataclass(frozen=True)
-class Reach:
-    """A reach to one of the opposite sites: `via` (m, 2) points [m], duration [s], rest before it [s]."""
-
-    outward: bool
-    target: int
-    via: tuple[tuple[float, float], ...]
-    duration_s: float
-    rest_s: float
-
-
-REACHES = (
-    Reach(True, 0, ((0.180, -0.065),), 1.05, 1.2),
-    Reach(False, 1, ((0.165, 0.072),), 1.20, 1.3),
-    Reach(True, 1, ((0.150, 0.068), (0.245, 0.125)), 1.10, 1.2),
-    Reach(False, 1, ((0.145, 0.185),), 1.25, 1.3),
-    Reach(True, 0, ((0.100, -0.010), (0.190, -0.064)), 1.20, 1.2),
-    Reach(False, 0, ((0.190, -0.185),), 1.30, 1.4),
-    Reach(True, 1, ((0.190, -0.060),), 1.10, 1.2),
-    Reach(False, 0, ((0.225, 0.042), (0.150, 0.062)), 1.25, 1.3),
-)
+REACHES: list[tuple[bool, int, list[list[float]], float, float]] = [
+    # outward or back, number of the site, via points [m], duration [s], rest before it [s]
+    (True, 0, [[0.180, -0.065]], 1.05, 1.2),
+    (False, 1, [[0.165, 0.072]], 1.20, 1.3),
+    (True, 1, [[0.150, 0.068], [0.245, 0.125]], 1.10, 1.2),
+    (False, 1, [[0.145, 0.185]], 1.25, 1.3),
+    (True, 0, [[0.100, -0.010], [0.190, -0.064]], 1.20, 1.2),
+    (False, 0, [[0.190, -0.185]], 1.30, 1.4),
+    (True, 1, [[0.190, -0.060]], 1.10, 1.2),
+    (False, 0, [[0.225, 0.042], [0.150, 0.062]], 1.25, 1.3),
+]
 REST_AT_END_S = 1.0
 SWITCH_S = 0.4
 """Time after an arrival at which the goals change: the object is put down."""
@@ -121,14 +110,14 @@ def reference() -> tuple[Array, list[tuple[float, bool]]]:
     parts: list[Array] = []
     goals = [(0.0, True)]
     at, elapsed = NEAR[0], 0.0
-    for reach in REACHES:
-        target = (FAR if reach.outward else NEAR)[reach.target]
-        parts.append(_resting(at, reach.rest_s))
-        movement = minimum_jerk(np.vstack([at, *reach.via, target]), reach.duration_s)
-        times = STEP_S * np.arange(round(reach.duration_s / STEP_S))
+    for is_outward, site, via, duration_s, rest_s in REACHES:
+        target = (FAR if is_outward else NEAR)[site]
+        parts.append(_resting(at, rest_s))
+        movement = minimum_jerk(np.vstack([at, *via, target]), duration_s)
+        times = STEP_S * np.arange(round(duration_s / STEP_S))
         parts.append(np.stack([movement(times, nu=order) for order in range(3)], axis=1))
-        elapsed += reach.rest_s + reach.duration_s
-        goals.append((elapsed + SWITCH_S, not reach.outward))
+        elapsed += rest_s + duration_s
+        goals.append((elapsed + SWITCH_S, not is_outward))
         at = target
     parts.append(_resting(at, REST_AT_END_S))
     return np.concatenate(parts), goals
@@ -168,11 +157,9 @@ def messages() -> list[tuple[int, str, Any]]:
         out.append((_stamp(seconds), '/goals', encode_goals(types, _stamp(seconds), FRAME, sites)))
     stamps = [_stamp(seconds) for seconds in np.arange(0.0, end_s, 0.2)]
     out += [(stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, OBSTACLES)) for stamp_ns in stamps]
-    stamps = [_stamp(STEP_S * step) for step in range(len(measured))]
-    out += [
-        (stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, at))
-        for stamp_ns, at in zip(stamps, measured, strict=True)
-    ]
+    for step, at in enumerate(measured):
+        stamp_ns = _stamp(STEP_S * step)
+        out.append((stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, at)))
     return sorted(out, key=lambda item: item[0])
 
 
