@@ -19,11 +19,6 @@ def format_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return '\n'.join(f'|{"|".join(cells)}|' for cells in lines)
 
 
-def find_blocks(page: str) -> dict[str, str]:
-    """Return the text of the measured blocks of a page, by name."""
-    return dict(re.findall(BLOCK, page, re.DOTALL))
-
-
 def write_blocks(texts: Mapping[str, str], page: Path) -> None:
     """Print all texts, and write those into the page for which it has a block: it shows the main results only."""
 

@@ -14,7 +14,7 @@ import io
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -36,7 +36,6 @@ from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, LikelihoodConfig
 from foc_ros.core.interpolation import interpolate_position
 from foc_ros.core.likelihood import compute_likelihoods
-from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import BagReader
@@ -59,11 +58,8 @@ PICTURES, LAST_MS, STEP_MS, COLOURS, SHOWN = 18, 1200, 140, 96, 0.02
 """Pictures of a movement, durations of the last and of each other picture [ms], about a third of the real speed; colours; least
 likelihood of a path that the animation shows."""
 STEPS, GOAL = 50, np.array([0.3, 0.0])
-NOISE = 0.1
-CIRCLE = foc_ros.Circle((0.15, -0.01), radius=0.03, radius_stddev=0.003)
 SLANTED = np.array([0.3, 0.12])
 """A goal that needs effort on both axes."""
-SAMPLES = 20_000
 TOUCHED, TOUCHED_ETA, TOUCHED_NOISE = foc_ros.Circle((0.12, 0.0), radius=0.03, radius_stddev=0.003), 0.89, 0.15
 """The scene of the contacts."""
 ETAS = np.linspace(0.8, 0.95, 61)
@@ -204,21 +200,12 @@ def play_page() -> bytes:
     return picture
 
 
-def reach(
-    obstacles: Sequence[foc_ros.Circle],
-    eta: float = 0.9,
-    strategy: str = 'optimal',
-    *,
-    seconds: float = 1.0,
-    goal: Array = GOAL,
-    c: float = NOISE,
-    **penalties: float,
-) -> foc_ros.Solution:
-    """Return a reach from rest to rest at a goal, past the obstacles on the left."""
-    values = {'foc.noise_x': c, 'foc.noise_y': c, 'likelihood.shortfall': np.inf}
+def reach(strategy: str, eta: float, **penalties: float) -> foc_ros.Solution:
+    """Return a reach from rest to rest past the obstacle of the contacts, on its left."""
+    values = {'foc.noise_x': TOUCHED_NOISE, 'foc.noise_y': TOUCHED_NOISE, 'likelihood.shortfall': np.inf}
     config = Config().with_values(values | {f'foc.{name}': value for name, value in penalties.items()})
-    guess = guess_path(np.zeros(2), goal, STEPS, 0.05)
-    return foc_ros.solve((0.0, 0.0), goal, obstacles, eta, strategy, seconds, config, guess)
+    guess = guess_path(np.zeros(2), GOAL, STEPS, 0.05)
+    return foc_ros.solve((0.0, 0.0), GOAL, [TOUCHED], eta, strategy, config=config, guess=guess)
 
 
 def roll_out(solution: foc_ros.Solution, count: int) -> list[Array]:
@@ -235,13 +222,15 @@ def noise() -> Figure:
         paths, spread = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
         for number, (seconds, shift) in enumerate(((0.5, 0.05), (1.2, -0.05))):
             colour, _ = get_class_style(number)
-            solution = reach([], seconds=seconds, goal=SLANTED)
+            solution = foc_ros.solve((0.0, 0.0), SLANTED, duration_s=seconds)
             up = np.array([0.0, shift])
             for movement in roll_out(solution, 30):
                 paths.plot(*(movement + up).T, color=colour, linewidth=0.5, alpha=0.35)
             paths.plot(*(solution.path + up).T, color=colour, linewidth=2.2)
             for row in range(5, STEPS + 1, 5):
-                _ellipse(paths, solution, row, colour, up)
+                ellipse = draw.make_stddev_ellipse(solution.path[row] + up, solution.covariance[row, :2, :2])
+                ellipse.set(facecolor='none', edgecolor=colour, linewidth=0.9, alpha=0.8, zorder=3)
+                paths.add_patch(ellipse)
             paths.annotate(f'in {seconds:g} s', (0.0, shift), xytext=(-4, 16), textcoords='offset points', color=colour)
             deviation = 1e3 * np.sqrt(solution.covariance[:, 0, 0])
             spread.plot(solution.times, deviation, color=colour, linewidth=2.2, label=f'in {seconds:g} s')
@@ -252,29 +241,9 @@ def noise() -> Figure:
     return figure
 
 
-def surrogate() -> Figure:
-    """Return paths for more and more eta, and how often noisy movements really stay clear."""
-    with open_figure(8.6, 3.4) as figure:
-        paths, shares = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
-        draw_scene(paths, collect_obstacles([CIRCLE]), GOAL[None], (-0.02, 0.32, -0.07, 0.12), named=False)
-        for number, eta in enumerate((0.5, 0.8, 0.95)):
-            colour, dash = get_class_style(number)
-            solution = reach([CIRCLE], eta)
-            paths.plot(*solution.path.T, color=colour, linestyle=dash, linewidth=2.0, label=f'η = {eta:g}')
-            _ellipse(paths, solution, STEPS // 2, colour)
-        paths.legend(frameon=False, loc='upper left', ncols=3)
-        etas = np.array([0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95])
-        clear = [foc_ros.monte_carlo(reach([CIRCLE], float(eta)), SAMPLES).step[0] for eta in etas]
-        shares.plot(etas, clear, marker='o', color=get_class_style(2)[0], label='share of movements\nclear at the worst step')
-        shares.plot((0.5, 1.0), (0.5, 1.0), color='0.4', linestyle='--', label='what was asked for')
-        shares.set(xlabel='wanted η', ylabel='share', ylim=(0.48, 1.02))
-        shares.legend(frameon=False, loc='lower right')
-    return figure
-
-
-def strategies() -> Figure:
-    """Return the figure of the example that compares the strategies."""
-    figure: Figure = run_path(str(ROOT / 'examples' / 'plot_04_strategies.py'))['figure']
+def draw_example(name: str) -> Figure:
+    """Return the figure of a file in examples/."""
+    figure: Figure = run_path(str(ROOT / 'examples' / f'plot_{name}.py'))['figure']
     return figure
 
 
@@ -306,18 +275,11 @@ def likelihood() -> Figure:
     return figure
 
 
-def _ellipse(axes: Any, solution: foc_ros.Solution, row: int, colour: str, shift: Array | float = 0.0) -> None:
-    ellipse = draw.make_stddev_ellipse(solution.path[row] + shift, solution.covariance[row, :2, :2])
-    ellipse.set(facecolor='none', edgecolor=colour, linewidth=0.9, alpha=0.8, zorder=3)
-    axes.add_patch(ellipse)
-
-
 def follow_with_rows_at_steps() -> Array:
     """Return eta and effort (m, 2) along the curve of `lv` where the constraint holds at the steps only, as in `fixed`."""
     foc, found = Config().foc, []
     for s in CURVE:
-        penalties = {'tau': foc.lv_delta * s, 'lam': foc.growth**s}
-        solution = reach([TOUCHED], TOUCHED_ETA, 'fixed', c=TOUCHED_NOISE, **penalties)
+        solution = reach('fixed', TOUCHED_ETA, tau=foc.lv_delta * s, lam=foc.growth**s)
         if solution.status is not foc_ros.Status.SOLVED:
             break
         found.append((solution.eta, solution.effort))
@@ -326,7 +288,7 @@ def follow_with_rows_at_steps() -> Array:
 
 def contacts() -> Figure:
     """Return the picture: the mean against the circle, near the contact; effort over eta."""
-    solution = reach([TOUCHED], TOUCHED_ETA, 'lv', c=TOUCHED_NOISE)
+    solution = reach('lv', TOUCHED_ETA)
     _, time, multiplier = max(solution.multipliers, key=lambda contact: contact[2])
     kept = float(np.sqrt(TOUCHED.radius**2 + TOUCHED.radius_stddev**2 + solution.tau))
     blue, orange = get_class_style(0)[0], get_class_style(1)[0]
@@ -351,7 +313,7 @@ def contacts() -> Figure:
         along = follow_with_rows_at_steps()
         look = {'color': orange, 'marker': '.', 'markersize': 3, 'linestyle': 'none'}
         curves.plot(*along[along[:, 0] > ETAS[0]].T, label='rows at the steps', **look)
-        sliding = [reach([TOUCHED], float(eta), 'lv', c=TOUCHED_NOISE).effort for eta in ETAS]
+        sliding = [reach('lv', float(eta)).effort for eta in ETAS]
         curves.plot(ETAS, sliding, color=blue, linewidth=1.8, label='sliding contacts (lv)')
         curves.set(title='Effort over η', xlabel='η', ylabel='effort [m²/s⁶]', yscale='log', xlim=(ETAS[0], ETAS[-1]))
         curves.set_yticks([5e3, 1e4, 2e4, 4e4], ['5 000', '10 000', '20 000', '40 000'])
@@ -363,7 +325,9 @@ def contacts() -> Figure:
 FIGURES: dict[str, Callable[[], Figure]] = {
     'scene': lambda: scene(*replayed()),
     'api': api,
-    **{f'concept_{each.__name__}': each for each in (noise, surrogate, strategies, classes, likelihood)},
+    **{f'concept_{each.__name__}': each for each in (noise, classes, likelihood)},
+    'concept_surrogate': lambda: draw_example('07_monte_carlo'),
+    'concept_strategies': lambda: draw_example('04_strategies'),
     'contacts': contacts,
 }
 
