@@ -85,14 +85,12 @@ def scene(hand: HandTrajectory, snapshots: list[Prediction]) -> Figure:
     return make_moment_figure(hand, snapshot, span)
 
 
-def pictures(
-    hand: HandTrajectory, snapshots: list[Prediction], chosen: tuple[int, ...] = SHOWN_MOVEMENTS
-) -> Iterator[tuple[Figure, int]]:
+def pictures(hand: HandTrajectory, snapshots: list[Prediction]) -> Iterator[tuple[Figure, int]]:
     """Yield the pictures, each with its duration [ms]."""
     spans = hand.find_movements(Config().estimator.onset_speed)
     goals = np.unique(np.concatenate([each.goal_positions for each in snapshots]), axis=0)
     bounds = compute_bounds(snapshots[0].obstacles, goals, (), hand.positions)
-    for start_ns, end_ns in (spans[number] for number in chosen):
+    for start_ns, end_ns in (spans[number] for number in SHOWN_MOVEMENTS):
         during = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.candidates_with_likelihood]
         tracks = build_candidate_tracks([select_likely(each) for each in during])
         rows = np.unique(np.linspace(0, len(tracks.snapshots) - 1, PICTURES).round().astype(int))

@@ -3,8 +3,8 @@
 """A live node in its own process under stress. Other programs of the machine lengthen all times: run it alone.
 
     python scripts/stress.py soak [--minutes 10]
-    python scripts/stress.py hostile [--seconds 6] [--only SCENE] [--strategy NAME]
-    python scripts/stress.py rates [--seconds 10]
+    python scripts/stress.py hostile [--seconds 6] [--only SCENE ...]
+    python scripts/stress.py rates [--seconds 6]
 
 soak: inputs at 100 Hz and random faults. The exit code is 0 if the memory and the 99th percentile of the cycle time do not grow
 after the first third, no thread or file remains open, no valid pose is lost, and the node has no internal error and stops
@@ -23,20 +23,21 @@ time of a node that predicts once in ten seconds, with the hand and without, as 
 
 from __future__ import annotations
 
+import argparse
 import math
 import os
 import random
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import psutil
-from cyclopts import App, Parameter
 
 from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS, Array
@@ -59,7 +60,6 @@ GROWTH, SLOWER = 1.05, 1.5
 """Largest accepted growth of the memory, and of the 99th percentile of the cycle time, after a third of the time."""
 START_S = 120.0
 """Time within which a node has to start [s]."""
-STRATEGIES = ('lv', 'hc', 'optimal')
 GAP_S, ANSWER_S, PUNCTUAL = 1.3, 0.05, 0.999
 ASK_EVERY = 10
 """Number of periods between two calls of the service."""
@@ -291,8 +291,6 @@ CASES = {
     'N = 400': Case(scatter(6, 0.015, (0.05, -0.06), (0.25, 0.06)), parameters={'foc.steps': 400}),
     '64 goals x 64': Case(scatter(64, 0.006, (0.03, -0.1), (0.27, 0.1)), MANY_GOALS, {'homotopy.max_candidates': 64}),
 }
-
-
 SOAK = Case(ROWS, GOALS, {'homotopy.max_candidates': 2})
 
 
@@ -389,28 +387,6 @@ def measure_intake(seconds: float) -> dict[str, float]:
     return {'poses published [Hz]': hertz, 'cost of 1 kHz [cores]': (used - idle) * 1e3 / hertz, 'without a hand [cores]': idle}
 
 
-app = App(name='stress', help=__doc__, help_format='plaintext', default_parameter=Parameter(negative=()))
-
-
-@app.command
-def soak(*, minutes: float = 10.0) -> int:
-    """Run a node for a long time among faulty publishers and judge it."""
-    with isolated_graph():
-        return report('soak', 'optimal', 60.0 * minutes, is_faulty=True)
-
-
-@app.command
-def hostile(
-    *,
-    seconds: float = 6.0,
-    only: Annotated[tuple[str, ...], Parameter(choices=tuple(CASES))] = tuple(CASES),
-    strategy: Annotated[tuple[str, ...], Parameter(choices=STRATEGIES)] = STRATEGIES,
-) -> int:
-    """Run a node in every scene with every strategy and print a table."""
-    with isolated_graph():
-        return max(report(name, each, seconds) for name in only for each in strategy)
-
-
 def report(name: str, strategy: str, seconds: float, *, is_faulty: bool = False) -> int:
     """Measure a case and print a line; return the exit code."""
     row = measure_case(CASES.get(name, SOAK), strategy, seconds, is_faulty=is_faulty)
@@ -420,15 +396,25 @@ def report(name: str, strategy: str, seconds: float, *, is_faulty: bool = False)
     return int(bool(failures))
 
 
-@app.command
-def rates(*, seconds: float = 10.0) -> int:
-    """Print rates, delays and costs under a hand at 1 kHz."""
+def main() -> int:
+    """Run a part of the command line, and return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('part', choices=('soak', 'hostile', 'rates'))
+    parser.add_argument('--minutes', type=float, default=10.0, help='of soak; default: %(default)g')
+    parser.add_argument('--seconds', type=float, default=6.0, help='of each scene, or of rates; default: %(default)g')
+    parser.add_argument(
+        '--only', nargs='+', choices=CASES, default=list(CASES), metavar='SCENE', help=', '.join(CASES).replace('%', '%%')
+    )
+    chosen = parser.parse_args()
     with isolated_graph():
-        for measure in (measure_rates, measure_intake):
-            for name, value in measure(seconds).items():
-                print(f'{name:40} {value:.4g}', flush=True)
+        if chosen.part == 'soak':
+            return report('soak', 'optimal', 60.0 * chosen.minutes, is_faulty=True)
+        if chosen.part == 'hostile':
+            return max(report(name, each, chosen.seconds) for name in chosen.only for each in ('lv', 'hc', 'optimal'))
+        for name, value in (measure_rates(chosen.seconds) | measure_intake(chosen.seconds)).items():
+            print(f'{name:40} {value:.4g}')
     return 0
 
 
 if __name__ == '__main__':
-    app()
+    sys.exit(main())

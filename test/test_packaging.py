@@ -317,3 +317,15 @@ def test_every_source_begins_with_its_licence():
         lines = [line for line in file.read_text('utf-8').splitlines()[:3] if not line.startswith('#!')]
         header = [f'{COMMENTS[file.suffix]} {line}' for line in HEADER]
         assert lines[:2] == header, f'{file.relative_to(ROOT)} does not begin with {HEADER}'
+
+
+def test_the_checks_with_ros_name_tests_that_exist():
+    for script in ('colcon_check', 'tf2_check'):
+        text = (ROOT / 'scripts' / script).read_text('utf-8')
+        names = [
+            name
+            for braces, name in re.findall(r'test/test_(?:\{([\w,]+)\}|(\w+))\.py', text)
+            for name in (braces or name).split(',')
+        ]
+        assert names, script
+        assert [name for name in names if not (ROOT / 'test' / f'test_{name}.py').is_file()] == [], script
