@@ -14,6 +14,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -25,7 +26,7 @@ from matplotlib.ticker import NullLocator
 from foc_ros.core.obstacles.risk import RiskBound, count_events, k_of_eta
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.solution import Solution, Status
+from foc_ros.core.solution import Status
 from foc_ros.core.types import Array
 from foc_ros.reporting.draw import get_class_style, open_figure, save_figure
 
@@ -37,8 +38,7 @@ import varied_reaches  # type: ignore[import-not-found]
 from page import IMAGES, ROOT, format_table, write_blocks
 
 PAGE = ROOT / 'doc' / 'accuracy.md'
-CASES, SHAPES = ROOT / 'test' / 'reference_cases.json', ROOT / 'test' / 'reference_shapes.json'
-SAMPLES, REACHES = 2000, 200
+SAMPLES, REACHES, STEPS = 2000, 200, 50
 SETTINGS: dict[str, tuple[str, dict[str, float]]] = {
     'lv': ('lv', {}),
     'hc': ('hc', {}),
@@ -51,58 +51,45 @@ SETTINGS: dict[str, tuple[str, dict[str, float]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A reach: its problem as a function of the wanted eta, and a guess (N + 1, 2) [m] from which it is solved."""
+    """A reach in 1 s: its problem as a function of the wanted eta, and a guess (N + 1, 2) [m] from which it is solved."""
 
-    name: str
     problem: Callable[[float], Problem]
     guess: Array
 
-    def solve(self, eta: float, strategy: str, **settings: float) -> Solution:
-        """Solve the problem of an eta by a strategy."""
-        solution: Solution = reach_helpers.solved(self.problem(eta), self.guess, strategy, **settings)
-        return solution
+
+def build_one_obstacle(noise: float) -> Scene:
+    """Return a reach of 0.3 m past one obstacle near the straight line, with a radius of 30 mm ± 3 mm."""
+    guess = reach_helpers.bowed((0, 0), (0.3, 0), STEPS, 0.05)
+    return Scene(lambda eta: reach_helpers.one_obstacle(eta, (noise, noise), steps=STEPS), guess)
 
 
-def build_one_obstacle(noise: float, steps: int = 50) -> Scene:
-    """Return a reach of 0.3 m in 1 s past one obstacle near the straight line, with a radius of 30 mm ± 3 mm."""
-    guess = reach_helpers.bowed((0, 0), (0.3, 0), steps, 0.05)
-    return Scene('one obstacle', lambda eta: reach_helpers.one_obstacle(eta, (noise, noise), steps=steps), guess)
-
-
-def build_random(seed: int, noise: float, steps: int = 50) -> Scene:
-    """Return a reach of 0.28 to 0.45 m in 1 s among one to four random obstacles."""
+def build_random(seed: int, noise: float) -> Scene:
+    """Return a reach of 0.28 to 0.45 m among one to four random obstacles."""
     obstacles, goal, amplitude = reach_helpers.random_scene(np.random.default_rng(seed))
-
-    def build_problem(eta: float) -> Problem:
-        problem: Problem = reach_helpers.reach(obstacles, goal=goal, steps=steps, noise=(noise, noise), eta=eta)
-        return problem
-
-    return Scene(f'random {seed}', build_problem, reach_helpers.bowed((0, 0), goal, steps, amplitude))
+    given = {'goal': goal, 'steps': STEPS, 'noise': (noise, noise)}
+    guess = reach_helpers.bowed((0, 0), goal, STEPS, amplitude)
+    return Scene(lambda eta: reach_helpers.reach(obstacles, eta=eta, **given), guess)
 
 
-def load_reference(file: Path) -> list[tuple[dict[str, Any], Problem, Array]]:
-    """Return cases of `reference_cases.py` or `reference_shapes.py` with their answers, each with its problem and guess."""
-    cases = json.loads(file.read_text(encoding='utf-8'))
-    return [(case, reach_helpers.case_problem(case), reach_helpers.case_guess(case)) for case in cases]
-
-
-def format_agreement(*, has_shapes: bool) -> str:
-    """Return the table of relative differences of effort, or of cost and effort among boxes, capsules, hulls and circles."""
-    peer, columns = ('IPOPT', ['obstacles']) if has_shapes else ('quadprog', ['obstacles', 'c'])
-    head = ['case', *columns, 'η', f'`fixed` / {peer} − 1', '`optimal` / IPOPT − 1', 'η achieved']
-    rows = []
-    for number, (case, problem, guess) in enumerate(load_reference(SHAPES if has_shapes else CASES)):
+def format_agreement(name: str) -> str:
+    """Return the table of relative differences of effort (for `fixed` among shapes: of cost) in test/reference_NAME.json."""
+    has_shapes, rows = name == 'shapes', []
+    head = ['obstacles', 'η', '`fixed` / IPOPT − 1'] if has_shapes else ['obstacles', 'c', 'η', '`fixed` / quadprog − 1']
+    cases = json.loads((ROOT / 'test' / f'reference_{name}.json').read_text(encoding='utf-8'))
+    for number, case in enumerate(cases):
+        problem, guess = reach_helpers.case_problem(case), reach_helpers.case_guess(case)
         reference, least = case['fixed' if has_shapes else 'converged_qp'], case['min_effort_at_eta']
         fixed = reach_helpers.solved(problem, guess, 'fixed', tau=reference['tau'], lam=reference['lam'])
         optimal = reach_helpers.solved(problem, guess, 'optimal')
-        ratio = fixed.effort / reference['effort']
-        cells = [str(len(problem.obstacles)), f'{problem.noise[0]:g}']
         if has_shapes:
             ratio = (fixed.costs['effort'] + fixed.costs['lambda_variance']) / reference['cost']
             cells = [', '.join(each['kind'] for each in case['obstacles'])]
+        else:
+            ratio = fixed.effort / reference['effort']
+            cells = [str(len(problem.obstacles)), f'{problem.noise[0]:g}']
         differences = f'{ratio - 1:.0e}', f'{optimal.effort / least["ipopt_effort"] - 1:.1e}', f'{optimal.eta:.5f}'
         rows.append([str(number), *cells, f'{least["eta"]:g}', *differences])
-    return format_table(head, rows)
+    return format_table(['case', *head, '`optimal` / IPOPT − 1', 'η achieved'], rows)
 
 
 @dataclass
@@ -128,9 +115,8 @@ class Outcomes:
     def add(self, reach: Any, strategy: str, settings: dict[str, float]) -> None:
         """Solve a reach and simulate the solution."""
         is_fixed = strategy == 'fixed'
-        solution = reach_helpers.solved(
-            reach.problem, reach.guess, strategy, **({'tau': reach.tau, 'lam': reach.lam} if is_fixed else settings)
-        )
+        given = {'tau': reach.tau, 'lam': reach.lam} if is_fixed else settings
+        solution = reach_helpers.solved(reach.problem, reach.guess, strategy, **given)
         self.statuses[solution.status] += 1
         if solution.status is not Status.SOLVED or solution.eta == 0.0:
             return
@@ -209,8 +195,7 @@ def _draw_excess(axes: Any, measured: dict[str, Outcomes]) -> None:
     axes.set_xlim(left=-0.02)
 
 
-ETA = 0.977
-SCENES, STEPS = 8, 50
+ETA, SCENES = 0.977, 8
 NOISES = (0.05, 0.15)
 STRATEGIES = ('lv', 'hc', 'optimal')
 CHOICES = (('gaussian', 'step'), ('gaussian', 'path'), ('cantelli', 'step'), ('cantelli', 'path'))
@@ -227,12 +212,8 @@ class Choice:
 
 def measure_bounds() -> dict[tuple[float, str, str, str], Choice]:
     """Solve every scene by every strategy with each noise, bound and risk."""
-    return {
-        (noise, bound, risk, strategy): _measure_choice(noise, bound, risk, strategy)
-        for noise in NOISES
-        for bound, risk in CHOICES
-        for strategy in STRATEGIES
-    }
+    each = ((noise, *choice, strategy) for noise, choice, strategy in product(NOISES, CHOICES, STRATEGIES))
+    return {given: _measure_choice(*given) for given in each}
 
 
 def _measure_choice(noise: float, bound: str, risk: str, strategy: str) -> Choice:
@@ -255,19 +236,14 @@ def format_costs(measured: dict[tuple[float, str, str, str], Choice]) -> str:
     head = ['c', 'bound', 'risk', 'k', *(f'`{name}`: solved | effort' for name in STRATEGIES), 'least share clear: step', 'path']
     head = [cell for each in head for cell in each.split(' | ')]
     rows = []
-    for noise in NOISES:
-        for bound, risk in CHOICES:
-            outcomes = [measured[noise, bound, risk, name] for name in STRATEGIES]
-            factors = sorted(outcomes[0].factors)
-            span = f'{factors[0]:.2f}' + (f' to {factors[-1]:.2f}' if factors[-1] > factors[0] else '')
-            cells = [
-                cell
-                for name, each in zip(STRATEGIES, outcomes, strict=True)
-                for cell in (f'{len(each.efforts)}', _format_ratio(each, measured[noise, *CHOICES[0], name]))
-            ]
-            clear = np.array([shares for each in outcomes for shares in each.clear]).reshape(-1, 2)
-            least = [f'{share:.3f}' for share in clear.min(axis=0)] if len(clear) else ['', '']
-            rows.append([f'{noise:g}', bound, risk, span, *cells, *least])
+    for noise, (bound, risk) in product(NOISES, CHOICES):
+        outcomes = [measured[noise, bound, risk, name] for name in STRATEGIES]
+        factors = sorted(outcomes[0].factors)
+        cells = [f'{noise:g}', bound, risk, f'{factors[0]:.2f}' + (f' to {factors[-1]:.2f}' if factors[-1] > factors[0] else '')]
+        for name, each in zip(STRATEGIES, outcomes, strict=True):
+            cells += [f'{len(each.efforts)}', _format_ratio(each, measured[noise, *CHOICES[0], name])]
+        clear = np.array([shares for each in outcomes for shares in each.clear]).reshape(-1, 2)
+        rows.append([*cells, *([f'{share:.3f}' for share in clear.min(axis=0)] if len(clear) else ['', ''])])
     return format_table(head, rows)
 
 
@@ -302,13 +278,8 @@ def draw_curves() -> Figure:
 
 def _compute_efforts(scene: Scene, strategy: str, etas: Array) -> Array:
     """Return the effort at each eta; NaN if eta is unreachable."""
-    solutions = [scene.solve(float(eta), strategy) for eta in etas]
+    solutions = [reach_helpers.solved(scene.problem(float(eta)), scene.guess, strategy) for eta in etas]
     return np.array([each.effort if each.status is Status.SOLVED else np.nan for each in solutions])
-
-
-def measure_reference() -> dict[str, str]:
-    """Return the comparison with independent solvers."""
-    return {'reference': format_agreement(has_shapes=False), 'shapes': format_agreement(has_shapes=True)}
 
 
 def measure_clear() -> dict[str, str]:
@@ -325,7 +296,7 @@ def measure_curves() -> dict[str, str]:
 
 
 PARTS: dict[str, Callable[[], dict[str, str]]] = {
-    'reference': measure_reference,
+    'reference': lambda: {'reference': format_agreement('cases'), 'shapes': format_agreement('shapes')},
     'guarantee': measure_clear,
     'bounds': lambda: {'bounds': format_costs(measure_bounds())},
     'curves': measure_curves,
