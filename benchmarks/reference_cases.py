@@ -7,7 +7,6 @@
 
 The script does not import `foc_ros`. It implements dynamics, constraints and costs again, from the equations of `doc/model.md`.
 
-- `single_qp`: the QP linearised once, at the guess, by quadprog.
 - `converged_qp`: the reformulated problem at a given (tau, lambda). quadprog solves the full condensed QP, and the obstacle
   constraint is linearised at each solution until the mean converges.
 - `min_effort_at_eta`: the least effort subject to the un-linearised surrogate E + k sqrt(Var) <= 0 at every step, by IPOPT with
@@ -201,10 +200,7 @@ def main() -> None:
         converged, least = solve_converged_qp(case, tau, lam), solve_least_effort(case, [0.8, 0.9, 0.95][len(cases) % 3])
         if converged is None or least is None or converged['sides'] != least['sides']:
             continue
-        first = solve_linearised_qp(case, guess_path(case), tau, lam)
-        assert first is not None
-        single = describe_control(case, first, tau, lam)
-        cases.append(case | {'single_qp': single, 'converged_qp': converged, 'min_effort_at_eta': least})
+        cases.append(case | {'converged_qp': converged, 'min_effort_at_eta': least})
         print(f'{len(cases)}: {len(case["obstacles"])} obstacles, effort {least["ipopt_effort"]:.1f} at eta {least["eta"]}')
     OUTPUT.write_text(json.dumps(cases, indent=1) + '\n', encoding='utf-8')
 
