@@ -8,7 +8,7 @@
 # make lint        ruff, mypy and the import contracts
 # make demo        the demo: the node and the packaged recording
 # make doc         the documentation as HTML, in build/doc/index.html
-# make bench       the benchmark; OPTIONS=--quick for a first look, --json, --markdown, '--only NAME'
+# make bench       the benchmark; OPTIONS=--quick for a first look, --json, '--only NAME'
 # make people      predictions of people, where their recordings are beside the checkout: doc/people.md; OPTIONS=--every 4
 # make colcon      build, start, lint and test with colcon, as in a ROS workspace
 # make dist        build the source distribution and the wheel in build/dist, and try the wheel in an empty environment

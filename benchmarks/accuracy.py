@@ -39,14 +39,12 @@ from page import IMAGES, ROOT, format_table, write_blocks
 
 PAGE = ROOT / 'doc' / 'accuracy.md'
 SAMPLES, REACHES, STEPS = 2000, 200, 50
-SETTINGS: dict[str, tuple[str, dict[str, float]]] = {
-    'lv': ('lv', {}),
-    'hc': ('hc', {}),
-    'optimal': ('optimal', {}),
-    'algorithm1, Δ = 10': ('algorithm1', {}),
-    'algorithm1, Δ = 1.5': ('algorithm1', {'algorithm1_growth': 1.5}),
-    'fixed': ('fixed', {}),
+SETTINGS: dict[str, dict[str, float]] = {
+    **{name: {} for name in ('lv', 'hc', 'optimal', 'algorithm1, Δ = 10')},
+    'algorithm1, Δ = 1.5': {'algorithm1_growth': 1.5},
+    'fixed': {},
 }
+"""Parameters of the strategies; words after a comma tell two apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +128,8 @@ def measure_guarantee() -> dict[str, Outcomes]:
     """Solve all reaches by each strategy and simulate the solutions."""
     measured = {name: Outcomes() for name in SETTINGS}
     for reach in varied_reaches.feasible_reaches(REACHES, tries=3 * REACHES):
-        for name, (strategy, settings) in SETTINGS.items():
-            measured[name].add(reach, strategy, settings)
+        for name, settings in SETTINGS.items():
+            measured[name].add(reach, name.partition(',')[0], settings)
     return measured
 
 
@@ -162,37 +160,28 @@ def format_statuses(measured: dict[str, Outcomes]) -> str:
 
 def draw_guarantee(measured: dict[str, Outcomes]) -> Figure:
     """Draw the share clear over the guaranteed eta, and the excess of each strategy."""
-    with open_figure(9.6, 4.2) as figure:
-        left, right = figure.subplots(1, 2)
-        _draw_shares(left, measured)
-        _draw_excess(right, measured)
-    return figure
-
-
-def _draw_shares(axes: Any, measured: dict[str, Outcomes]) -> None:
     etas = np.linspace(0.0, 0.999, 200)
-    for number, name in enumerate(('lv', 'hc', 'optimal')):
-        each = measured[name]
-        axes.plot(each.guaranteed, each.clear, '.', markersize=4, alpha=0.7, color=get_class_style(number)[0], label=name)
-    normal = [NormalDist().cdf(k_of_eta(eta)) for eta in etas]
-    axes.plot(etas, normal, color='0.3', linestyle='--', label='Φ(k): a normal constraint')
-    axes.plot(etas, etas, color='black', label='η: Cantelli’s bound')
-    axes.set(xlim=(0.59, 0.96), ylim=(0.55, 1.01), xlabel='guaranteed η', ylabel='share clear at the worst obstacle and step')
-    axes.legend(fontsize=8, loc='lower right')
-
-
-def _draw_excess(axes: Any, measured: dict[str, Outcomes]) -> None:
-    values = [each.excess for each in measured.values()]
-    drawn = axes.boxplot(values, orientation='horizontal', whis=(0, 100), widths=0.6, patch_artist=True)
-    for number, box in enumerate(drawn['boxes']):
-        box.set(facecolor=get_class_style(number)[0], alpha=0.6)
-    for median in drawn['medians']:
-        median.set(color='black')
-    axes.axvline(0.0, color='black')
-    axes.set_yticks(range(1, len(measured) + 1), list(measured))
-    axes.invert_yaxis()
-    axes.set(xlabel='share clear − guaranteed η')
-    axes.set_xlim(left=-0.02)
+    with open_figure(9.6, 4.2) as figure:
+        shares, excess = figure.subplots(1, 2)
+        for number, name in enumerate(STRATEGIES):
+            look = {'markersize': 4, 'alpha': 0.7, 'color': get_class_style(number)[0], 'label': name}
+            shares.plot(measured[name].guaranteed, measured[name].clear, '.', **look)
+        normal = [NormalDist().cdf(k_of_eta(eta)) for eta in etas]
+        shares.plot(etas, normal, color='0.3', linestyle='--', label='Φ(k): a normal constraint')
+        shares.plot(etas, etas, color='black', label='η: Cantelli’s bound')
+        shares.set(xlim=(0.59, 0.96), xlabel='guaranteed η', ylim=(0.55, 1.01), ylabel='share clear at the worst step')
+        shares.legend(fontsize=8, loc='lower right')
+        values = [each.excess for each in measured.values()]
+        drawn = excess.boxplot(values, orientation='horizontal', whis=(0, 100), widths=0.6, patch_artist=True)
+        for number, (box, median) in enumerate(zip(drawn['boxes'], drawn['medians'], strict=True)):
+            box.set(facecolor=get_class_style(number)[0], alpha=0.6)
+            median.set(color='black')
+        excess.axvline(0.0, color='black')
+        excess.set_yticks(range(1, len(measured) + 1), list(measured))
+        excess.invert_yaxis()
+        excess.set(xlabel='share clear − guaranteed η')
+        excess.set_xlim(left=-0.02)
+    return figure
 
 
 ETA, SCENES = 0.977, 8
@@ -262,7 +251,10 @@ def draw_curves() -> Figure:
     etas = np.linspace(0.5, 0.95, 181)
     with open_figure(9.6, 3.6) as figure:
         for axes, (name, scene) in zip(figure.subplots(1, 3), scenes.items(), strict=True):
-            efforts = {strategy: _compute_efforts(scene, strategy, etas) for strategy in STRATEGIES}
+            efforts = {}
+            for strategy in STRATEGIES:
+                solutions = [reach_helpers.solved(scene.problem(eta), scene.guess, strategy) for eta in etas.tolist()]
+                efforts[strategy] = np.array([each.effort if each.status is Status.SOLVED else np.nan for each in solutions])
             for number, strategy in enumerate(STRATEGIES):
                 relative = efforts[strategy] / efforts['optimal'][0]
                 axes.plot(etas, relative, color=get_class_style(number)[0], label=strategy, linewidth=1.6)
@@ -274,12 +266,6 @@ def draw_curves() -> Figure:
         figure.axes[0].set_ylabel('effort / least effort at η = 0.5')
         figure.axes[0].legend(fontsize=8)
     return figure
-
-
-def _compute_efforts(scene: Scene, strategy: str, etas: Array) -> Array:
-    """Return the effort at each eta; NaN if eta is unreachable."""
-    solutions = [reach_helpers.solved(scene.problem(float(eta)), scene.guess, strategy) for eta in etas]
-    return np.array([each.effort if each.status is Status.SOLVED else np.nan for each in solutions])
 
 
 def measure_clear() -> dict[str, str]:

@@ -16,7 +16,6 @@ a rule: its weights are variables of the programme, with sum_i w_i = 1 and w >= 
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -220,13 +219,13 @@ class Programme:
         """Return positions (q, 2) at the times of the programme."""
         return np.stack([self.effects @ axis for axis in control.reshape(2, -1)], axis=1)
 
-    def measure_margins(self, control: Array) -> Array:
-        """Return the margins (q, obstacles) [m], computed at the nearest points themselves."""
+    def measure(self, control: Array) -> tuple[Array, Array]:
+        """Return distances from the polygons and margins (q, obstacles) [m], computed at the nearest points themselves."""
         path = self.follow(control)
         variances = np.stack(
             [self.effects**2 @ (c * axis) ** 2 for c, axis in zip(self.case['noise'], control.reshape(2, -1), strict=True)], 1
         )
-        margins = np.empty((len(path), len(self.case['obstacles'])))
+        distances, margins = np.empty((2, len(path), len(self.case['obstacles'])))
         for j, obstacle in enumerate(self.case['obstacles']):
             vertices, (mean, size) = find_vertices(obstacle), required(obstacle)
             for i, time in enumerate(self.times):
@@ -235,33 +234,25 @@ class Programme:
                 square = (point - weights @ vertices) ** 2
                 spread = size + 4.0 * square @ (variances[i] + obstacle.get('centre_stddev', 0.0) ** 2)
                 kept = mean + self.tau if self.k is None else mean + self.k * np.sqrt(spread)
-                margins[i, j] = (distance**2 - kept) / (2 * max(distance, 0.005))
-        return margins
+                distances[i, j], margins[i, j] = distance, (distance**2 - kept) / (2 * max(distance, 0.005))
+        return distances, margins
 
     def solve(self, control: Array) -> Array | None:
         """Return the control of a local minimum near one, or None where IPOPT does not converge."""
-        rows = np.argwhere(self.measure_distances(control) < NEAR_M)
+        rows = np.argwhere(self.measure(control)[0] < NEAR_M)
         for _ in range(4):
             found: Array | None = control
             for slack in SLACKS_M2:
                 found = None if found is None else self.solve_rows(found, rows, slack)
             if found is None:
                 return None
-            more = np.argwhere(self.measure_margins(found) < -TOLERANCE_M)
+            more = np.argwhere(self.measure(found)[1] < -TOLERANCE_M)
             known = set(map(tuple, rows.tolist()))
             more = np.array([row for row in more.tolist() if tuple(row) not in known], dtype=int).reshape(-1, 2)
             if not len(more):
                 return found
             rows, control = np.concatenate((rows, more)), found
         return None
-
-    def measure_distances(self, control: Array) -> Array:
-        """Return distances (q, obstacles) from the polygons [m]."""
-        path, distances = self.follow(control), np.empty((len(self.times), len(self.case['obstacles'])))
-        for j, obstacle in enumerate(self.case['obstacles']):
-            for i, time in enumerate(self.times):
-                distances[i, j] = find_weights(find_vertices(obstacle), path[i] - centre_moved(self.case, obstacle, time))[1]
-        return distances
 
     def solve_rows(self, control: Array, rows: NDArray[np.intp], slack: float) -> Array | None:
         """Solve with margins at some rows, from a control."""
@@ -341,7 +332,7 @@ def solve_from_starts(case: dict[str, Any], programme: Programme, starts: list[A
         if found is None:
             continue
         cost = float(programme.weight @ found**2)
-        deepest = programme.measure_margins(found).min()
+        deepest = programme.measure(found)[1].min()
         print(f'    cost {cost:.6g}, margin {deepest:.1e}, sides {find_sides(case, programme.follow(found), programme.times)}')
         if find_sides(case, programme.follow(found), programme.times) == wanted and cost < least and deepest > -2e-5:
             best, least = found, cost
@@ -353,7 +344,7 @@ def solve_case(case: dict[str, Any], number: int) -> dict[str, Any] | None:
     tau, lam = [(2e-4, 1.0), (2e-4, 1e4), (3e-4, 1e5), (5e-4, 1e6)][number % 4]
     eta = [0.8, 0.9, 0.95][number % 3]
     first = Programme(case, float(np.sqrt(eta / (1 - eta))))
-    if first.measure_distances(start_control(case, 1.0)).min() < 0.012:
+    if first.measure(start_control(case, 1.0))[0].min() < 0.012:
         return None
     starts = [start_control(case, share) for share in AMPLITUDES]
     least = solve_from_starts(case, first, starts)
@@ -363,7 +354,7 @@ def solve_case(case: dict[str, Any], number: int) -> dict[str, Any] | None:
     fixed = solve_from_starts(case, second, starts)
     if fixed is None:
         return None
-    sides, deepest = find_sides(case, second.follow(fixed), second.times), first.measure_margins(least).min()
+    sides, deepest = find_sides(case, second.follow(fixed), second.times), first.measure(least)[1].min()
     return case | {
         'fixed': {
             'tau': tau,
@@ -383,17 +374,16 @@ def solve_case(case: dict[str, Any], number: int) -> dict[str, Any] | None:
 
 
 def main() -> None:
-    """Draw scenes of each number until IPOPT has solved one; numbers may be given, and the other cases are then kept."""
-    numbers = list(map(int, sys.argv[1:])) or list(range(len(KINDS)))
-    for number in numbers:
+    """Draw scenes of each number until IPOPT has solved one."""
+    cases = []
+    for number in range(len(KINDS)):
         generator, solved = np.random.default_rng((SEED, number)), None
         while solved is None:
             solved = solve_case(random_case(generator, number), number)
-        cases = json.loads(OUTPUT.read_text(encoding='utf-8')) if OUTPUT.is_file() else [{}] * len(KINDS)
-        cases[number] = solved
+        cases.append(solved)
         least = solved['min_effort_at_eta']
         print(f'{number}: {KINDS[number]}, effort {least["ipopt_effort"]:.1f} at eta {least["eta"]}', flush=True)
-        OUTPUT.write_text(json.dumps(cases, indent=1) + '\n', encoding='utf-8')
+    OUTPUT.write_text(json.dumps(cases, indent=1) + '\n', encoding='utf-8')
 
 
 if __name__ == '__main__':

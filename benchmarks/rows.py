@@ -7,9 +7,10 @@ CasADi is imported only when a row is measured that compares with its solvers.
 
 from __future__ import annotations
 
+import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -18,7 +19,6 @@ from unittest.mock import patch
 
 import numpy as np
 import scenes
-from measurement import Result, compute_median_ms, time_call, time_in_turn
 
 from foc_ros.analysis.replay import replay
 from foc_ros.core import predict as predictor
@@ -28,8 +28,8 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, resample, warm_start
-from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.solution import Candidate, Solution, Status
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import Solution, Status
 from foc_ros.core.tracks import NO_TRACKS, Tracks
 from foc_ros.core.types import NANOSECONDS
 
@@ -38,6 +38,54 @@ SETTINGS = FocConfig(strategy='optimal')
 TICK_S = 1.0 / scenes.RATE_HZ
 TOLERANCE, SHARP_TOLERANCE = 0.02, 0.05
 """Largest relative difference of efforts: a peer keeps clear at the steps only, and may cut a sharp corner between them."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """Measurement of one row.
+
+    ours, peer: what was timed, in words; ours_ms, peer_ms: the medians of its times [ms]; agree: whether the answers differ by no
+    more than the tolerance; agreement: the difference in words; details: further numbers by name.
+    """
+
+    ours: str
+    ours_ms: float
+    peer: str
+    peer_ms: float
+    agree: bool
+    agreement: str
+    repetitions: int
+    details: dict[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the result as a JSON object; ratio: how many times as long the peer takes."""
+        return {**vars(self), 'ratio': self.peer_ms / self.ours_ms}
+
+
+def time_call(task: Callable[[], object]) -> float:
+    """Return the time of a call [s]."""
+    began = time.perf_counter()
+    task()
+    return time.perf_counter() - began
+
+
+def time_in_turn(tasks: Mapping[str, Callable[[], object]], repetitions: int) -> dict[str, list[float]]:
+    """Run all tasks once untimed, then one after the other `repetitions` times, and return the times.
+
+    Because the tasks take turns, any other load of the machine slows all of them alike.
+    """
+    times: dict[str, list[float]] = {name: [] for name in tasks}
+    for task in tasks.values():
+        task()
+    for _ in range(repetitions):
+        for name, task in tasks.items():
+            times[name].append(time_call(task))
+    return times
+
+
+def compute_median_ms(times: list[float]) -> float:
+    """Return the median of times [s] in milliseconds."""
+    return 1e3 * statistics.median(times)
 
 
 def measure_cold(build: Callable[[], Obstacles], name: str, is_quick: bool) -> Result:
@@ -130,36 +178,28 @@ class TickSequence:
     def __init__(self, reach: scenes.Reach) -> None:
         self.reach, self.index, self.memory = reach, 0, NO_TRACKS
         self.predictions: list[Prediction] = []
-        self.problems: list[Problem] = []
 
-    def tick(self) -> float:
-        """Make the next prediction that does not begin a movement, and return its time [s]."""
+    def tick(self) -> None:
+        """Make the next prediction that does not begin a movement."""
         self.index %= len(self.reach.hands)
         if self.index == 0:
             self.memory = self.predict(NO_TRACKS)[1]
             self.index = 1
-        began = time.perf_counter()
         prediction, self.memory = self.predict(self.memory)
-        seconds = time.perf_counter() - began
         self.index += 1
         self.predictions.append(prediction)
-        return seconds
 
     def predict(self, memory: Tracks) -> tuple[Prediction, Tracks]:
         """Make the prediction of the present tick."""
         reach = self.reach
         return predictor.predict(reach.config, reach.hands[self.index], reach.obstacles, reach.goals, memory)
 
-    def list_problems(self) -> list[tuple[str, Problem]]:
-        """Return label and problem of each candidate of the present tick."""
-        found: list[tuple[str, Problem]] = []
-
-        def record(candidates: Sequence[Candidate], problems: Any, *rest: Any) -> list[PredictedCandidate]:
-            found.extend((each.label, problems[row]) for row, each in enumerate(candidates))
-            return solve_candidates(candidates, problems, *rest)
-
-        with patch.object(predictor, 'solve_candidates', record):
+    def find_problem(self, label: str) -> Problem:
+        """Return the problem of a candidate of the present tick."""
+        with patch.object(predictor, 'solve_candidates', wraps=solve_candidates) as solving:
             self.predict(self.memory)
+        solved = {each.label: problem for call in solving.call_args_list for each, problem in zip(*call.args[:2], strict=True)}
+        found: Problem = solved[label]
         return found
 
     def describe(self) -> str:
@@ -176,27 +216,26 @@ def measure_tick(build: Callable[[], scenes.Reach], scene: str, tolerance: float
     cold = time_call(lambda: sequence.predict(NO_TRACKS))
     sequence.tick()
     best = sequence.predictions[-1].solved_candidates[0]
-    problem = dict(sequence.list_problems())[best.label]
+    problem = sequence.find_problem(best.label)
     peer = build_fastest('IPOPT', problem, best.solution.control)
     arguments = peer.prepare(problem, best.solution.control)
-    times = time_in_turn({'ours': lambda: None, 'peer': lambda: peer.solve(arguments)}, repetitions)
-    ticks = [sequence.tick() for _ in range(repetitions)]
+    times = time_in_turn({'ours': sequence.tick, 'peer': lambda: peer.solve(arguments)}, repetitions)
     control = peer.read_control(problem, peer.solve(arguments))
     return Result(
         f'a warm tick, {scene}',
-        compute_median_ms(ticks),
+        compute_median_ms(times['ours']),
         'IPOPT, its most likely class alone, from our solution of 10 ms ago',
         compute_median_ms(times['peer']),
         *_compare([best.solution], [control if peer.converged else None], tolerance),
         repetitions,
-        {'solved': sequence.describe(), 'slowest_ms': 1e3 * max(ticks), 'first_tick_ms': 1e3 * cold},
+        {'solved': sequence.describe(), 'slowest_ms': 1e3 * max(times['ours']), 'first_tick_ms': 1e3 * cold},
     )
 
 
 def measure_change(values: Mapping[str, object], far: int, change: str, is_quick: bool) -> Result:
     """Compare a warm tick of four classes with one of more obstacles or of other parameters."""
     base = scenes.build_4x8()
-    other = scenes.add_far_obstacles(base, far).change_config(dict(values))
+    other = replace(scenes.add_far_obstacles(base, far), config=base.config.with_values(dict(values)))
     sequences = {'ours': TickSequence(base), 'peer': TickSequence(other)}
     repetitions = 3 if is_quick else 40
     times = time_in_turn({name: each.tick for name, each in sequences.items()}, repetitions)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The benchmark. Each row is a ratio of medians within one run.
 
-    python benchmarks/run.py [--json | --markdown] [--only NAME ...] [--quick]
+    python benchmarks/run.py [--json] [--only NAME ...] [--quick]
 
 Each row is measured in a process of its own, with one thread for BLAS and OpenMP. Ours and the peer take turns on the identical
 problem, and their answers are compared.
@@ -56,29 +56,11 @@ def format_cells(row: Row) -> tuple[str, ...]:
     return row['name'], *numbers, 'yes' if row['agree'] else 'no'
 
 
-def build_markdown(rows: list[Row]) -> str:
-    """Return the rows as a table for doc/speed.md, followed by a description of what each compares."""
-    lines = ['| ' + ' | '.join(HEADINGS) + ' |', '|---' * len(HEADINGS) + '|']
-    lines += ['| ' + ' | '.join((f'`{name}`', *rest)) + ' |' for name, *rest in map(format_cells, rows)]
-    lines += ['']
-    for row in rows:
-        if 'error' not in row:
-            values = ((key, f'{value:.3g}' if isinstance(value, float) else value) for key, value in row['details'].items())
-            details = ''.join(f'; {key} {value}' for key, value in values)
-            lines.append(
-                f'- `{row["name"]}`: {row["ours"]}, against: {row["peer"]}. '
-                f'{row["repetitions"]} repetitions. Agreement: {row["agreement"]}{details}.'
-            )
-    return '\n'.join(lines)
-
-
 def main() -> int:
     """Run the rows of the command line. The exit code is 1 if one could not be measured."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    output = parser.add_mutually_exclusive_group()
-    output.add_argument('--json', action='store_true', help='print a list of {name, ours_ms, peer_ms, ratio, agree, ...}')
-    output.add_argument('--markdown', action='store_true', help='print the table of doc/speed.md')
-    output.add_argument('--in-this-process', action='store_true', help=argparse.SUPPRESS)
+    parser.add_argument('--json', action='store_true', help='print a list of {name, ours_ms, peer_ms, ratio, agree, ...}')
+    parser.add_argument('--in-this-process', action='store_true', help=argparse.SUPPRESS)
     parser.add_argument('--only', nargs='+', choices=ROWS, default=list(ROWS), metavar='NAME', help=', '.join(ROWS))
     parser.add_argument('--quick', action='store_true', help='few repetitions, for a first look')
     chosen = parser.parse_args()
@@ -92,8 +74,6 @@ def main() -> int:
         print(*format_cells(rows[-1]), sep='  ', file=sys.stderr, flush=True)  # a whole run takes minutes
     if chosen.json:
         print(json.dumps(rows, indent=1))
-    elif chosen.markdown:
-        print(build_markdown(rows))
     else:
         show_table(HEADINGS, map(format_cells, rows), 'One thread; ratios of medians, measured in turn')
     return int(any('error' in row for row in rows))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.config import Config, replace_values
+from foc_ros.core.config import Config
 from foc_ros.core.hand.kalman import FilterState, update
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import make_box_polygon
@@ -44,11 +44,11 @@ def build_boxes() -> Obstacles:
     return make_obstacles([[0.12, -0.02], [0.2, -0.04]], 0.01, 0.001, polygons=polygons)
 
 
-def build_guess(amplitude: float = 0.09) -> Array:
+def build_guess() -> Array:
     """Return a minimum-jerk straight line bowed to the left, (N + 1, 2) [m]."""
     s = np.arange(STEPS + 1) / STEPS
     along = 10 * s**3 - 15 * s**4 + 6 * s**5
-    return np.stack((GOAL[0] * along, amplitude * np.sin(np.pi * s)), axis=1)
+    return np.stack((GOAL[0] * along, 0.09 * np.sin(np.pi * s)), axis=1)
 
 
 def build_problem(obstacles: Obstacles, initial_mean: Array | None = None, duration_s: float = DURATION_S) -> Problem:
@@ -81,15 +81,11 @@ class Reach:
     goals: Array
     hands: tuple[FilterState, ...]
 
-    def change_config(self, values: dict[str, object]) -> Reach:
-        """Return the reach with other parameters, by dotted name."""
-        return replace(self, config=replace_values(self.config, values))
-
 
 def build_reach(obstacles: Obstacles, values: dict[str, object], goals: Array = GOAL[None], ticks: int = 30) -> Reach:
     """Return ticks at 100 Hz of a hand that drifts too slowly for a movement to have begun, so that T does not change."""
     fixed = {'duration.model': 'fixed', 'duration.fixed_s': DURATION_S, 'rate_hz': RATE_HZ}
-    config = replace_values(Config(), fixed | values)
+    config = Config().with_values(fixed | values)
     generator = np.random.default_rng(3)
     state: FilterState | None = None
     hands = []

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from assistance_rules import RIVALS
+from assistance import RIVALS
 from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.simulation import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
