@@ -198,9 +198,9 @@ class TickSequence:
         """Return the problem of a candidate of the present tick."""
         with patch.object(predictor, 'solve_candidates', wraps=solve_candidates) as solving:
             self.predict(self.memory)
-        solved = {each.label: problem for call in solving.call_args_list for each, problem in zip(*call.args[:2], strict=True)}
-        found: Problem = solved[label]
-        return found
+        calls = (zip(*call.args[:2], strict=True) for call in solving.call_args_list)
+        problems: dict[str, Problem] = {each.label: problem for call in calls for each, problem in call}
+        return problems[label]
 
     def describe(self) -> str:
         """Return how many candidates were solved, and of how many; the median over the ticks."""

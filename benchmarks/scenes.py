@@ -20,11 +20,8 @@ from foc_ros.core.types import HandSample
 
 Array = NDArray[np.float64]
 
-NOISE = 0.15
-ETA = 0.9
-DURATION_S = 1.0
-STEPS = 50
-RATE_HZ = 100.0
+NOISE, ETA = 0.15, 0.9
+DURATION_S, STEPS, RATE_HZ = 1.0, 50, 100.0
 GOAL = np.array([0.36, 0.0])
 START_NS = 1_000_000_000
 DRIFT = np.array([0.01, 0.004])

@@ -84,7 +84,8 @@ def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> 
             total.ticks += 1
             total.seconds += now.t - before.t
             total.absences += sum(1 < tick - seen.get(way, -SHORT_TICKS) <= SHORT_TICKS for way in found)
-            total.changed += _compute_largest_change(last, found) > CHANGE
+            shares = [{way: each.likelihood for way, each in table.items()} for table in (last, found)]
+            total.changed += any(abs(shares[0].get(way, 0.0) - shares[1].get(way, 0.0)) > CHANGE for way in last | found)
             total.sideways += [compute_sideways_move(last[each], found[each]) for each in last.keys() & found.keys()]
         before, last = now, found
         seen |= dict.fromkeys(found, tick)
@@ -97,11 +98,6 @@ def _is_same_scene(before: Prediction, now: Prediction) -> bool:
         and before.obstacles.ids == now.obstacles.ids
         and np.array_equal(before.obstacles.centre, now.obstacles.centre)
     )
-
-
-def _compute_largest_change(last: dict[int, PredictedCandidate], found: dict[int, PredictedCandidate]) -> float:
-    shares = [{number: each.likelihood for number, each in table.items()} for table in (last, found)]
-    return max((abs(shares[0].get(each, 0.0) - shares[1].get(each, 0.0)) for each in last | found), default=0.0)
 
 
 def compute_sideways_move(before: PredictedCandidate, now: PredictedCandidate) -> float:

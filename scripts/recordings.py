@@ -43,10 +43,8 @@ MOVEMENTS = (4, 6)
 LEAD_NS, EVERY = 200_000_000, 2
 """Time by which a table begins before its movement, and the number of samples of which one is kept: 50 per second."""
 PACKAGED = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
-SEED = 20
-FRAME = 'world'
-HEIGHT = 0.12
-STEP_S = 0.01
+SEED, FRAME = 20, 'world'
+HEIGHT, STEP_S = 0.12, 0.01
 START_NS = 1_767_225_600_000_000_000
 """Stamp of the first message: the first second of 2026, UTC."""
 MOTOR_NOISE = 0.25
@@ -77,9 +75,8 @@ REACHES: list[tuple[bool, int, list[list[float]], float, float]] = [
     (True, 1, [[0.190, -0.060]], 1.10, 1.2),
     (False, 0, [[0.225, 0.042], [0.150, 0.062]], 1.25, 1.3),
 ]
-REST_AT_END_S = 1.0
-SWITCH_S = 0.4
-"""Time after an arrival at which the goals change: the object is put down."""
+REST_AT_END_S, SWITCH_S = 1.0, 0.4
+"""Rest at the end, and time after an arrival at which the goals change: the object is put down [s]."""
 
 
 def minimum_jerk(points: Array, duration_s: float) -> BSpline:

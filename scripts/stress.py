@@ -58,11 +58,9 @@ BURST, BURST_NS, LATE_NS = 20, 100_000, 50_000_000
 """Number of poses sent at once, as after a stall of the network; least difference of their stamps; how late a late one is."""
 GROWTH, SLOWER = 1.05, 1.5
 """Largest accepted growth of the memory, and of the 99th percentile of the cycle time, after a third of the time."""
-START_S = 120.0
-"""Time within which a node has to start [s]."""
+START_S, ASK_EVERY = 120.0, 10
+"""Time within which a node has to start [s], and number of periods between two calls of the clutch."""
 GAP_S, ANSWER_S, PUNCTUAL = 1.3, 0.05, 0.999
-ASK_EVERY = 10
-"""Number of periods between two calls of the service."""
 
 
 class Player:
