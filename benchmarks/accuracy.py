@@ -169,7 +169,8 @@ def draw_guarantee(measured: dict[str, Outcomes]) -> Figure:
         normal = [NormalDist().cdf(k_of_eta(eta)) for eta in etas]
         shares.plot(etas, normal, color='0.3', linestyle='--', label='Φ(k): a normal constraint')
         shares.plot(etas, etas, color='black', label='η: Cantelli’s bound')
-        shares.set(xlim=(0.59, 0.96), xlabel='guaranteed η', ylim=(0.55, 1.01), ylabel='share clear at the worst step')
+        shares.set(xlim=(0.59, 0.96), ylim=(0.55, 1.01), xlabel='guaranteed η')
+        shares.set_ylabel('share clear at the worst obstacle and step')
         shares.legend(fontsize=8, loc='lower right')
         values = [each.excess for each in measured.values()]
         drawn = excess.boxplot(values, orientation='horizontal', whis=(0, 100), widths=0.6, patch_artist=True)
