@@ -11,7 +11,7 @@ estimate of the hand and the same limits of force and slew as the guidance of th
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -118,7 +118,7 @@ def compute_field_force(position: Array, obstacles: Obstacles, strongest: float)
 class _GoalAssistance(Assistance):
     """A rule that knows goals only: a function of position, goals and their probabilities."""
 
-    rule: ClassVar[Callable[[Array, Array, Array], Array]]
+    rule: ClassVar[staticmethod[[Array, Array, Array], Array]]
 
     def __init__(self, task: Task, config: Config) -> None:
         super().__init__(task, config)
@@ -128,7 +128,7 @@ class _GoalAssistance(Assistance):
         """Return the force of the rule for the present probabilities of the goals."""
         probabilities = self._inference.update(position)
         self.is_wrong = int(probabilities.argmax()) != self.task.goal_row
-        return type(self).rule(position, self.task.goals, probabilities)
+        return self.rule(position, self.task.goals, probabilities)
 
 
 class Hindsight(_GoalAssistance):

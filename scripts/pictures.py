@@ -289,13 +289,14 @@ def contacts() -> Figure:
     solution = reach('lv', TOUCHED_ETA)
     _, time, multiplier = max(solution.multipliers, key=lambda contact: contact[2])
     kept = float(np.sqrt(TOUCHED.radius**2 + TOUCHED.radius_stddev**2 + solution.tau))
+    centre: Any = TOUCHED.centre
     blue, orange = get_class_style(0)[0], get_class_style(1)[0]
     fine = interpolate_position(solution.mean, solution.dt, solution.dt * np.linspace(0.0, STEPS, 20 * STEPS + 1))
     contact = interpolate_position(solution.mean, solution.dt, np.array(solution.dt * time))
-    outward = 0.008 * (contact - TOUCHED.centre) / np.linalg.norm(contact - TOUCHED.centre)
+    outward = 0.008 * (contact - centre) / np.linalg.norm(contact - centre)
     with open_figure(9.0, 3.6) as figure:
         touch, curves = figure.subplots(1, 2)
-        touch.add_patch(Circle(TOUCHED.centre, kept, facecolor='none', edgecolor='0.4', linestyle='--'))
+        touch.add_patch(Circle(centre, kept, facecolor='none', edgecolor='0.4', linestyle='--'))
         touch.plot(*fine.T, color=blue, linewidth=1.6)
         touch.plot(*solution.path.T, color=blue, marker='o', markersize=3.5, linestyle='none')
         touch.plot(*contact, color=orange, marker='D', markersize=7, zorder=5)

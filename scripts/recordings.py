@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 import csv
 import tempfile
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -191,14 +192,14 @@ def write_tables(directory: Path) -> None:
         for x, y, _, radius, stddev, name, *box in OBSTACLES
     ]
     columns = 'id', 'x_m', 'y_m', 'radius_m', 'radius_stddev_m', 'size_x_m', 'size_y_m', 'yaw_rad'
-    tables = {
+    tables: dict[str, Sequence[Sequence[str]]] = {
         'recordings': [('recording', 't_s', 'x_m', 'y_m'), *samples],
         'obstacles': [columns, *obstacles],
         'goals': [('x_m', 'y_m'), *([f'{value:.4f}' for value in goal] for goal in FAR)],
     }
-    for name, rows in tables.items():
+    for name, table in tables.items():
         with (directory / f'{name}.csv').open('w', newline='', encoding='utf-8') as stream:
-            csv.writer(stream, lineterminator='\n').writerows(rows)
+            csv.writer(stream, lineterminator='\n').writerows(table)
 
 
 if __name__ == '__main__':
