@@ -24,7 +24,7 @@ from foc_ros.analysis.evaluation.truth import HORIZONS
 from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, flatten, replace_values
 from foc_ros.core.hand.duration import is_passing
-from foc_ros.core.plant.replanning import triple_integrator_goal_map, triple_integrator_process_covariance
+from foc_ros.core.plant.models import TRIPLE_INTEGRATOR
 from foc_ros.core.types import Array
 
 from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
@@ -146,7 +146,8 @@ def widen_covariances(observation: Observation, widenings: Iterable[Sequence[flo
     unit = []  # variances by process noise and by scatter of the end, of 1 each, (k, 2, h)
     for time_s in candidates.time_s.tolist():
         kind = time_s / config.foc.steps, config.foc.steps, is_passing(config.duration)
-        jerk, end = triple_integrator_process_covariance(*kind), triple_integrator_goal_map(*kind) ** 2
+        jerk = TRIPLE_INTEGRATOR.compute_process_covariance(*kind)
+        end = TRIPLE_INTEGRATOR.compute_goal_map(*kind) ** 2
         unit.append([interpolate_steps(each[:, 0, 0], kind[0]) for each in (jerk, end)])
     both = np.tensordot(squares[:, :2], np.array(unit), (1, 1))
     spread = np.multiply.outer(squares[:, 2], late[..., :, None] * late[..., None, :])

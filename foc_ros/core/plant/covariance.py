@@ -32,30 +32,16 @@ control at step k.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
-from foc_ros.core.config import Config, DurationConfig
+from foc_ros.core.config import Config
 from foc_ros.core.hand.duration import is_passing
 from foc_ros.core.solution import Solution
 from foc_ros.core.types import Array, HandState
 
 from .models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
 from .plants import Horizon, apply_impulse_response
-
-
-def compute_predictive_covariance(hand: HandState, dt: float, steps: int, config: Config) -> Array:
-    """Return the covariance (N + 1, n, n) at steps 0..N of dt [s] that all plans of one duration share: all parts but timing."""
-    plant = make_plant_model(config.foc)
-    kind = dt, steps, is_passing(config.duration)
-    covariance = plant.propagate_error(hand.covariance, *kind)
-    if config.foc.process_noise > 0.0:
-        covariance = covariance + config.foc.process_noise**2 * plant.compute_process_covariance(*kind)
-    if config.foc.endpoint_stddev > 0.0:
-        displaced = config.foc.endpoint_stddev * plant.compute_goal_map(*kind)[:, :, :2]
-        covariance = covariance + displaced @ displaced.swapaxes(1, 2)
-    return covariance
 
 
 class SharedCovariances:
@@ -66,28 +52,31 @@ class SharedCovariances:
         self._known: dict[float, Array] = {}
 
     def __getitem__(self, dt: float) -> Array:
-        """Return what `compute_predictive_covariance` does for steps of dt [s]."""
-        if dt not in self._known:
-            self._known[dt] = compute_predictive_covariance(self._hand, dt, self._config.foc.steps, self._config)
-        return self._known[dt]
-
-
-def timing_covariances(
-    solution: Solution, at_rest: bool, config: DurationConfig, plant: PlantModel = TRIPLE_INTEGRATOR
-) -> Iterator[Array]:
-    """Yield the covariances (N + 1, n, n) at steps 0..N due to the unknown duration, and for a hand at rest due to its onset."""
-    if config.spread > 0.0:
-        displaced = config.spread * compute_duration_sensitivity(solution, is_passing(config), plant)
-        yield displaced[:, :, None] * displaced[:, None, :]
-    if at_rest and config.wait_s > 0.0:
-        yield compute_onset_delay_covariance(solution, config.wait_s)
+        """Return the covariance (N + 1, n, n) that all plans of N steps of dt [s] share: all parts but timing."""
+        if dt in self._known:
+            return self._known[dt]
+        foc, plant = self._config.foc, make_plant_model(self._config.foc)
+        kind = dt, foc.steps, is_passing(self._config.duration)
+        covariance = plant.propagate_error(self._hand.covariance, *kind)
+        if foc.process_noise > 0.0:
+            covariance = covariance + foc.process_noise**2 * plant.compute_process_covariance(*kind)
+        if foc.endpoint_stddev > 0.0:
+            displaced = foc.endpoint_stddev * plant.compute_goal_map(*kind)[:, :, :2]
+            covariance = covariance + displaced @ displaced.swapaxes(1, 2)
+        self._known[dt] = covariance
+        return covariance
 
 
 def widen_covariance(solution: Solution, shared: Array, at_rest: bool, config: Config) -> Array:
     """Return the total covariance (N + 1, n, n): of motor noise, of the timing, and what all plans of one duration share."""
     total: Array = solution.covariance + shared
-    for added in timing_covariances(solution, at_rest, config.duration, make_plant_model(config.foc)):
-        total += added
+    duration = config.duration
+    if duration.spread > 0.0:
+        plant = make_plant_model(config.foc)
+        displaced = duration.spread * compute_duration_sensitivity(solution, is_passing(duration), plant)
+        total += displaced[:, :, None] * displaced[:, None, :]
+    if at_rest and duration.wait_s > 0.0:
+        total += compute_onset_delay_covariance(solution, duration.wait_s)
     return total
 
 

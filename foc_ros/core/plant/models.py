@@ -22,6 +22,7 @@ import numpy as np
 
 from foc_ros.core.config import REFERENCE_STEP_S, FocConfig
 from foc_ros.core.errors import InputError
+from foc_ros.core.hand.kalman import compute_gramian
 from foc_ros.core.registry import PLANTS
 from foc_ros.core.solution import Solution
 from foc_ros.core.types import Array
@@ -31,19 +32,12 @@ from .plants import (
     Horizon,
     Plant,
     build_triple_integrator_horizon,
+    compute_state_scale,
     condense,
     discretise_damped_mass,
     discretise_triple_integrator,
 )
-from .replanning import (
-    compute_error_map,
-    compute_goal_map,
-    compute_process_covariance,
-    triple_integrator_error_covariance,
-    triple_integrator_error_map,
-    triple_integrator_goal_map,
-    triple_integrator_process_covariance,
-)
+from .replanning import compute_error_map, compute_goal_map, compute_process_covariance
 
 HAND_STATES = 6
 """x, y, vx, vy, ax, ay of the estimator."""
@@ -87,24 +81,44 @@ class PlantModel:
         """Return the covariance (n, n) of the state for that (6, 6) of the estimate."""
         return hand_covariance[: self.states, : self.states]
 
+    def find_unit(self, dt: float) -> tuple[float, Array]:
+        """Return the step [s] for which maps are computed, and the factors (n,) from the states there to those at a step dt [s].
+
+        They are dt and ones, but for a plant whose maps at one step are those at any other, scaled: its maps are computed once.
+        """
+        return dt, np.ones(self.states)
+
+    def compute_process_noise(self, dt: float) -> Array:
+        """Return the covariance (n, n) that white control noise of unit spectral density adds in a step of dt [s]."""
+        control = self.discretise(dt).B
+        noise: Array = control @ control.T / dt
+        return noise
+
     def compute_goal_map(self, dt: float, steps: int, passing: bool) -> Array:
         """Return K_t, (N + 1, n, n): how a displaced state at the goal displaces the states before it (`replanning`)."""
-        return compute_goal_map(self.build_horizon(dt, steps), passing)
+        unit, scale = self.find_unit(dt)
+        goal_map: Array = _find_goal_map(self, unit, steps, passing) * (scale[:, None] / scale)
+        return goal_map
 
     def compute_error_map(self, dt: float, steps: int, passing: bool) -> Array:
         """Return E_t, (N + 1, n, n): what remains at steps 0..N of an error of the initial state that the operator corrects."""
-        return compute_error_map(self.build_horizon(dt, steps), passing)
+        unit, scale = self.find_unit(dt)
+        error_map: Array = _find_error_map(self, unit, steps, passing) * (scale[:, None] / scale)
+        return error_map
 
     def propagate_error(self, covariance: Array, dt: float, steps: int, passing: bool) -> Array:
         """Return the covariance (N + 1, n, n) at steps 0..N that an estimate of covariance (6, 6) leads to."""
-        error_map = self.compute_error_map(dt, steps, passing)
-        propagated: Array = error_map @ self.project_covariance(covariance) @ error_map.swapaxes(1, 2)
+        unit, scale = self.find_unit(dt)
+        error_map, units = _find_error_map(self, unit, steps, passing), np.outer(scale, scale)
+        propagated: Array = error_map @ (self.project_covariance(covariance) / units) @ error_map.swapaxes(1, 2) * units
         return propagated
 
     def compute_process_covariance(self, dt: float, steps: int, passing: bool) -> Array:
         """Return the covariance (N + 1, n, n) that white control noise of unit spectral density causes at steps 0..N."""
-        plant = self.discretise(dt)
-        return compute_process_covariance(plant, steps, plant.B @ plant.B.T / dt, passing)
+        unit, scale = self.find_unit(dt)
+        scale = (dt / unit) ** 2.5 * scale
+        covariance: Array = _find_process_covariance(self, unit, steps, passing) * (scale[:, None] * scale)
+        return covariance
 
     def compute_end_rate(self, solution: Solution) -> Array:
         """Return the time derivative (n,) of the mean state at the end of a solution, by a backward difference."""
@@ -118,6 +132,21 @@ def _condense(model: PlantModel, dt: float, steps: int) -> Horizon:
     return condense(model.discretise(dt), steps)
 
 
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _find_goal_map(model: PlantModel, dt: float, steps: int, passing: bool) -> Array:
+    return compute_goal_map(model.build_horizon(dt, steps), passing)
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _find_error_map(model: PlantModel, dt: float, steps: int, passing: bool) -> Array:
+    return compute_error_map(model.build_horizon(dt, steps), passing)
+
+
+@lru_cache(maxsize=CACHED_HORIZONS)
+def _find_process_covariance(model: PlantModel, dt: float, steps: int, passing: bool) -> Array:
+    return compute_process_covariance(model.discretise(dt), steps, model.compute_process_noise(dt), passing)
+
+
 class TripleIntegratorModel(PlantModel):
     """The paper's hand, driven by jerk: everything is scaled from the horizon of unit step, which is computed once."""
 
@@ -125,10 +154,12 @@ class TripleIntegratorModel(PlantModel):
         super().__init__(discretise_triple_integrator)
 
     build_horizon = staticmethod(build_triple_integrator_horizon)
-    compute_goal_map = staticmethod(triple_integrator_goal_map)
-    compute_error_map = staticmethod(triple_integrator_error_map)
-    propagate_error = staticmethod(triple_integrator_error_covariance)
-    compute_process_covariance = staticmethod(triple_integrator_process_covariance)
+
+    def find_unit(self, dt: float) -> tuple[float, Array]:  # noqa: D102
+        return 1.0, compute_state_scale(dt)
+
+    def compute_process_noise(self, dt: float) -> Array:  # noqa: D102
+        return np.kron(compute_gramian(dt), np.eye(2)).astype(np.float64)
 
     def compute_end_rate(self, solution: Solution) -> Array:  # noqa: D102
         # the control belongs to the middle of its step: in 50 steps of a reach from rest, the last one is 7 % below the jerk at

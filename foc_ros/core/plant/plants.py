@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
@@ -98,15 +97,6 @@ class Horizon(Record):
         return int(self.states.shape[-1]) - 1
 
     @cached_property
-    def maps(self) -> Array:
-        """Impulse responses of the position, x and y, and their products xx, yy, xy, (5, 2, N + 1).
-
-        Applied to u, the first two give the mean; applied to c^2 u^2, the last three give the covariance.
-        """
-        x, y = self.states[:2]
-        return np.stack((x, y, x * x, y * y, x * y))
-
-    @cached_property
     def products(self) -> Array:
         """Products of the impulse responses of each two states, (n^2, 2, N + 1): applied to c^2 u^2, they give the covariance."""
         products: Array = self.states[:, None] * self.states
@@ -154,13 +144,9 @@ def condense(plant: Plant, steps: int) -> Horizon:
     return Horizon(powers, states, plant.dt)
 
 
-STATE_ORDER = np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0])
-"""Order of each state of the triple integrator as a derivative of the position."""
-
-
 def compute_state_scale(dt: float) -> Array:
     """Diagonal of D, (6,): the triple integrator's state at step dt [s] is D times its state at unit step."""
-    scale: Array = dt**-STATE_ORDER
+    scale: Array = dt ** -np.array([0.0, 0.0, 1.0, 1.0, 2.0, 2.0])
     return scale
 
 
@@ -183,24 +169,6 @@ def build_triple_integrator_horizon(dt: float, steps: int) -> Horizon:
 def find_states_at_goal(n: int, passing: bool = False) -> NDArray[np.bool_]:
     """Return which of n states the goal fixes, (n,): all if the hand comes to rest, all but the velocity if it passes."""
     return np.array([not (passing and 2 <= state < 4) for state in range(n)])
-
-
-class PositionNoise(NamedTuple):
-    """How a control spreads the position over the horizon.
-
-    responses (5, 2, N + 1): impulse responses of x and y and their products xx, yy, xy (`Horizon.maps`); noise_variance (2N,):
-    c^2 for each entry of the stacked control; free (3, N): variances xx, yy, xy that the control does not cause [m^2].
-    """
-
-    responses: Array
-    noise_variance: Array
-    free: Array
-
-
-def position_variances(noise: PositionNoise, control: Array) -> Array:
-    """Return the position covariance at steps 1..N as rows xx, yy, xy, (3, N) [m^2], for a stacked control (2N,)."""
-    variance: Array = noise.free + apply_impulse_response(noise.responses[2:], noise.noise_variance * control**2)[:, 1:]
-    return variance
 
 
 def variance_weights(states: Array, terminal: Array, stage: Array) -> Array:

@@ -20,22 +20,11 @@ R_N have only the rows of the other states.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
-from foc_ros.core.hand.kalman import compute_gramian
 from foc_ros.core.types import Array
 
-from .plants import (
-    CACHED_HORIZONS,
-    Horizon,
-    Plant,
-    compute_state_scale,
-    condense,
-    discretise_triple_integrator,
-    find_states_at_goal,
-)
+from .plants import Horizon, Plant, condense, find_states_at_goal
 
 
 def compute_goal_map(horizon: Horizon, passing: bool = False) -> Array:
@@ -66,52 +55,3 @@ def compute_process_covariance(plant: Plant, steps: int, added: Array, passing: 
         error_map = compute_error_map(condense(plant, left), passing) if left else np.eye(len(added))[None]
         covariance[step + 1 :] += error_map @ added @ error_map.swapaxes(1, 2)
     return covariance
-
-
-@lru_cache(maxsize=CACHED_HORIZONS)
-def _unit_goal_map(steps: int, passing: bool) -> Array:
-    return compute_goal_map(condense(discretise_triple_integrator(1.0), steps), passing)
-
-
-@lru_cache(maxsize=CACHED_HORIZONS)
-def _unit_error_map(steps: int, passing: bool) -> Array:
-    return compute_error_map(condense(discretise_triple_integrator(1.0), steps), passing)
-
-
-@lru_cache(maxsize=CACHED_HORIZONS)
-def _unit_process_covariance(steps: int, passing: bool) -> Array:
-    added = np.kron(compute_gramian(1.0), np.eye(2)).astype(np.float64)
-    return compute_process_covariance(discretise_triple_integrator(1.0), steps, added, passing)
-
-
-def triple_integrator_goal_map(dt: float, steps: int, passing: bool = False) -> Array:
-    """Return `compute_goal_map` of the triple integrator for any dt [s], scaled from the map of unit step."""
-    scale = compute_state_scale(dt)
-    goal_map: Array = _unit_goal_map(steps, passing) * (scale[:, None] / scale[None, :])
-    return goal_map
-
-
-def triple_integrator_error_map(dt: float, steps: int, passing: bool = False) -> Array:
-    """Return `compute_error_map` of the triple integrator for any dt [s], scaled from the map of unit step."""
-    scale = compute_state_scale(dt)
-    error_map: Array = _unit_error_map(steps, passing) * (scale[:, None] / scale[None, :])
-    return error_map
-
-
-def triple_integrator_error_covariance(covariance: Array, dt: float, steps: int, passing: bool = False) -> Array:
-    """Return the covariance (N + 1, 6, 6) at steps 0..N that an initial error of covariance (6, 6) leads to; dt [s]."""
-    return propagate_scaled(_unit_error_map(steps, passing), compute_state_scale(dt), covariance)
-
-
-def triple_integrator_process_covariance(dt: float, steps: int, passing: bool = False) -> Array:
-    """Return D at steps 0..N, (N + 1, 6, 6), for unplanned white jerk of unit spectral density; dt [s]."""
-    scale = dt**2.5 * compute_state_scale(dt)
-    covariance: Array = _unit_process_covariance(steps, passing) * (scale[:, None] * scale[None, :])
-    return covariance
-
-
-def propagate_scaled(maps: Array, scale: Array, covariance: Array) -> Array:
-    """Return E P E', (m, 6, 6), of a covariance P (6, 6) for each E = D M D^-1: maps M (m, 6, 6), scale the diagonal of D."""
-    units = np.outer(scale, scale)
-    after: Array = maps @ (covariance / units) @ maps.swapaxes(1, 2) * units
-    return after
