@@ -22,7 +22,7 @@ def learn_recordings(recordings: Mapping[str, Recording], config: Config) -> tup
 
 
 def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration, ...]:
-    """Return the movements of a recording that end at a goal (`foc_ros.core.learning.movements`), at most the last `MOST_LEARNT`.
+    """Return the movements of a recording that end at a goal (`foc_ros.core.learning.movements`), the last ones.
 
     Raises RecordingError where the recording cannot be read or contains none.
     """

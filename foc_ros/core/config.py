@@ -19,14 +19,10 @@ from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registr
 from .removed import REMOVED
 
 PLANES = ('xy', 'xz', 'yz')
-DURATION_MODELS = ('fixed', 'fitts')
 ARRIVALS = ('rest', 'passing')
 ONLINE = 'online'
 ADAPTATIONS = ('none', ONLINE)
-LEARNINGS = ('none', 'goals', ONLINE)
 BOUNDS = ('cantelli', 'gaussian')
-RISKS = ('step', 'path')
-GUIDANCE_MODES = ('path', 'trajectory')
 MOST_CANDIDATES = 64
 """Largest number of homotopy classes that are solved in one prediction."""
 WIDENS = 'widens the predicted covariance, not the chance constraint'
@@ -74,7 +70,9 @@ class FocConfig(Group):
         'what turns eta into standard deviations: it holds for any distribution, or for a Gaussian one',
         choices=BOUNDS,
     )
-    risk: str = _p('step', 'what eta is about: each obstacle at each step, or all obstacles along the whole path', choices=RISKS)
+    risk: str = _p(
+        'step', 'what eta is about: each obstacle at each step, or all obstacles along the whole path', choices=('step', 'path')
+    )
     strategy: str = _p('optimal', 'how the solver trades clearance against precision', choices=STRATEGIES)
     plant: str = _p('triple_integrator', 'dynamic model of the hand that the control moves', choices=PLANTS)
     plant_mass: float = _p(1.0, 'mass of the plant damped_mass', 'kg', 1e-3, 1e3)
@@ -100,7 +98,7 @@ class FocConfig(Group):
 class DurationConfig(Group):
     """Duration of the movement, and how it ends."""
 
-    model: str = _p('fitts', 'duration of a movement: fixed, or by Fitts law', choices=DURATION_MODELS)
+    model: str = _p('fitts', 'duration of a movement: fixed, or by Fitts law', choices=('fixed', 'fitts'))
     fixed_s: float = _p(1.0, 'duration of model fixed', 's', 0.05, 60.0)
     fitts_a_s: float = _p(0.2, 'intercept of Fitts law', 's', 0.0, 60.0)
     fitts_b_s: float = _p(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
@@ -210,7 +208,7 @@ class ExperienceConfig(Group):
     learning: str = _p(
         'none',
         'what movements that end at a goal say of later ones in the running program: nothing; paths and goals; also ways',
-        choices=LEARNINGS,
+        choices=('none', 'goals', ONLINE),
     )
 
 
@@ -247,7 +245,9 @@ class GuidanceConfig(Group):
         50, 'priority of the thread of guidance under SCHED_FIFO, while it is enabled and if permitted; 0: ordinary', '', 0, 99
     )
     mode: str = _p(
-        'path', 'path: no force along the path, the operator sets the pace; trajectory: also along it', choices=GUIDANCE_MODES
+        'path',
+        'path: no force along the path, the operator sets the pace; trajectory: also along it',
+        choices=('path', 'trajectory'),
     )
     k_max: float = _p(150.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
     f_max: float = _p(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)

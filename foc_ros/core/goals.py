@@ -35,7 +35,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from .hand.straight import compute_straight_effort
 from .prediction import PredictedCandidate
 from .safety_preference import COST_FLOOR
 from .types import Array, HandState
@@ -48,6 +47,26 @@ LEAST_SPREAD_M = 1e-3
 """Least spread of end points, and least distance, with which probabilities of goals are computed [m]."""
 BEYOND = 1.5
 """Farthest goal that nobody announced, relative to the farthest one that was."""
+
+
+def compute_straight_effort(state: Array, goals: Array, times_s: Array) -> Array:
+    """Return the least integral of squared jerk (g,) [m^2/s^5] from a state (3, 2) to rest at goals (g, 2) [m] in times (g,) [s].
+
+    Obstacles are disregarded. This quintic has a closed form (Mueller, Hehn and D'Andrea 2015, doi:10.1109/TRO.2015.2479878). Its
+    jerk is alpha t^2 / 2 + beta t + gamma. With (dp, dv, da), by which a hand without jerk would miss the goal at T,
+
+        (alpha, beta, gamma) = M (dp, dv, da),
+        M = [[720, -360 T, 60 T^2], [-360 T, 168 T^2, -24 T^3], [60 T^2, -24 T^3, 3 T^4]] / T^5.
+    """
+    (x, v, a), T = state, times_s[:, None]
+    dp, dv, da = goals - x - v * T - a * T**2 / 2, -v - a * T, -a
+    alpha = (720 * dp - 360 * T * dv + 60 * T**2 * da) / T**5
+    beta = (-360 * T * dp + 168 * T**2 * dv - 24 * T**3 * da) / T**5
+    gamma = (60 * T**2 * dp - 24 * T**3 * dv + 3 * T**4 * da) / T**5
+    effort = (
+        gamma**2 * T + beta * gamma * T**2 + (beta**2 + alpha * gamma) * T**3 / 3 + alpha * beta * T**4 / 4 + alpha**2 * T**5 / 20
+    )
+    return np.asarray(effort.sum(axis=1))
 
 
 def compare_goals(

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from foc_ros.core.types import Array
 
 
 def hermite(share: Array) -> Array:

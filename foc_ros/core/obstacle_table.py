@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from foc_ros.core.types import Array, Record, as_readonly
 
-SHOWN_NAMES = 5
-"""Number of obstacles that the repr of a table names."""
 UNKNOWN_HEIGHTS = as_readonly(np.array([-np.inf, np.inf]))
 """Lowest and highest point of an obstacle whose height is not known [m]: it blocks at every height."""
 
@@ -43,23 +41,14 @@ class Obstacles(Record):
 
     def __repr__(self) -> str:
         """Count the obstacles and name the first few."""
-        names = ', '.join(self.ids[:SHOWN_NAMES]) + (', ...' if len(self) > SHOWN_NAMES else '')
+        names = ', '.join(self.ids[:5]) + (', ...' if len(self) > 5 else '')
         return f'<Obstacles: {len(self)}{names and f" ({names})"}>'
 
     def take(self, rows: NDArray[np.intp] | list[int]) -> Obstacles:
         """Return the obstacles of the given rows, in that order."""
         index = np.asarray(rows, dtype=np.intp)
-        return Obstacles(
-            tuple(self.ids[i] for i in index),
-            self.centre[index],
-            self.radius[index],
-            self.radius_stddev[index],
-            self.velocity[index],
-            self.centre_covariance[index],
-            self.vertices[index],
-            self.corners[index],
-            self.heights[index],
-        )
+        columns = {name: column[index] for name, column in vars(self).items() if name != 'ids'}
+        return Obstacles(tuple(self.ids[i] for i in index), **columns)
 
     @property
     def extent(self) -> Array:

@@ -63,7 +63,12 @@ class Scene(Record):
             return tables[0] if tables else make_obstacles()
         ids = [name for table in tables for name in table.ids]
         latest = {name: row for row, name in enumerate(ids)}
-        return _concatenate(tables, ids).take(sorted(latest.values()))
+        most = max(table.vertices.shape[1] for table in tables)
+        padded = [
+            replace(each, vertices=np.pad(each.vertices, ((0, 0), (0, most - each.vertices.shape[1]), (0, 0)))) for each in tables
+        ]
+        columns = {name: np.concatenate([vars(each)[name] for each in padded]) for name in vars(padded[0]) if name != 'ids'}
+        return Obstacles(tuple(ids), **columns).take(sorted(latest.values()))
 
     def not_ready_reason(self, stamp_ns: int, timeout_s: float) -> tuple[str, str] | None:
         """Return why nothing can be predicted for a hand pose at a stamp [ns], as (kind, message); None if it can.
@@ -83,22 +88,6 @@ class Scene(Record):
             relation = 'older' if age > 0.0 else 'newer'
             return 'stale', f'obstacles are {abs(age):.3g} s {relation} than the hand pose (scene.timeout_s is {timeout_s:g})'
         return None
-
-
-def _concatenate(tables: list[Obstacles], ids: list[str]) -> Obstacles:
-    most = max(table.vertices.shape[1] for table in tables)
-    vertices = [np.pad(table.vertices, ((0, 0), (0, most - table.vertices.shape[1]), (0, 0))) for table in tables]
-    return Obstacles(
-        tuple(ids),
-        np.concatenate([table.centre for table in tables]),
-        np.concatenate([table.radius for table in tables]),
-        np.concatenate([table.radius_stddev for table in tables]),
-        np.concatenate([table.velocity for table in tables]),
-        np.concatenate([table.centre_covariance for table in tables]),
-        np.concatenate(vertices),
-        np.concatenate([table.corners for table in tables]),
-        np.concatenate([table.heights for table in tables]),
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,7 +68,8 @@ def collect_goals(field: str, goals: ArrayLike | Goal | Iterable[Goal | ArrayLik
     if not isinstance(goals, (Goal, Iterable)) or isinstance(goals, (str, Mapping)):
         raise SceneError(field, 'positions or Goals', repr(goals))
     rows: list[tuple[str, Any]] = [(field, goals)]
-    if not isinstance(goals, Goal) and not _is_position(goals):
+    is_position = len(find_shape(goals)) == 1 and find_shape(goals)[0] > 0 and all(isinstance(each, Number) for each in goals)
+    if not isinstance(goals, Goal) and not is_position:
         rows = [(f'{field}[{row}]', each) for row, each in enumerate(goals)]
     given = [each if isinstance(each, Goal) else Goal(check_position(name, each)) for name, each in rows]
     if not given:
@@ -84,12 +85,6 @@ def collect_goals(field: str, goals: ArrayLike | Goal | Iterable[Goal | ArrayLik
     has_names = any(each.name for each in given)
     objects = tuple(each.object for each in given) if any(each.object for each in given) else ()
     return GoalTable(points[:, :2], points[:, 2] if sizes == {3} else None, names if has_names else (), objects)
-
-
-def _is_position(goals: Any) -> bool:
-    """Return whether something is one position rather than a list of them: numbers alone."""
-    shape = find_shape(goals)
-    return len(shape) == 1 and shape[0] > 0 and all(isinstance(each, Number) for each in goals)
 
 
 def check_number(field: str, value: object, low: float = -FARTHEST, high: float = FARTHEST) -> float:

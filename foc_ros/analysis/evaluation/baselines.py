@@ -8,7 +8,7 @@ counts as the node publishes it: 0. Constant velocity, nearest gap and shortest 
 
 A baseline is added from outside by :func:`register_baseline`; the built-in ones are registered in the same way.
 
-**Straight minimum jerk** is the movement to a goal, obstacles disregarded: `core.hand.straight`.
+**Straight minimum jerk** is the movement to a goal, obstacles disregarded: `core.goals`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from scipy.interpolate import BPoly
 
 from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig
-from foc_ros.core.hand.straight import compute_straight_effort
+from foc_ros.core.goals import compute_straight_effort
 from foc_ros.core.likelihood import OWN_SPREAD, ClassGoals, compute_likelihoods
 from foc_ros.core.registry import Registry
 from foc_ros.core.solution import LEFT, RIGHT

@@ -9,10 +9,8 @@ the shapes do.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial, wraps
-from typing import Any, ParamSpec, TypeVar
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +20,6 @@ from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array
 
 Flags = NDArray[np.bool_]
-P = ParamSpec('P')
-T = TypeVar('T')
 
 ARC = np.pi / 6.0
 """Largest change of direction from one edge of an outline to the next [rad]: 12 edges or more go round a circle."""
@@ -127,39 +123,35 @@ class Outlines:
 
 
 @dataclass(frozen=True)
-class _Call:
-    """A call of a function with obstacles and arrays; calls with the same values are equal."""
+class _Shapes:
+    """Obstacles with radii (n,) as the argument of a cache: those at the same places with equal shapes and radii are equal."""
 
     key: tuple[bytes, ...]
-    run: Callable[[], Any] = field(compare=False)
+    obstacles: Obstacles = field(compare=False)
+    radius: Array = field(compare=False)
+
+    @classmethod
+    def of(cls, obstacles: Obstacles, radius: Array) -> _Shapes:
+        arrays = obstacles.centre, obstacles.vertices, obstacles.corners, radius
+        return cls(tuple([array.tobytes() for array in arrays]), obstacles, radius)
 
 
-@lru_cache(maxsize=KEPT)
-def _answer(call: _Call) -> Any:
-    return call.run()
-
-
-def keep_last(function: Callable[P, T]) -> Callable[P, T]:
-    """Let a function of obstacles and arrays keep its last results, for obstacles that have the same place and shape."""
-
-    @wraps(function)
-    def look_up(*args: P.args, **kwargs: P.kwargs) -> T:
-        arrays = list[NDArray[Any]]()
-        for each in (*args, *kwargs.values()):
-            arrays += [each.centre, each.vertices, each.corners] if isinstance(each, Obstacles) else [np.asarray(each)]
-        name = function.__name__.encode()
-        result: T = _answer(_Call((name, *[array.tobytes() for array in arrays]), partial(function, *args, **kwargs)))
-        return result
-
-    return look_up
-
-
-@keep_last
 def measure_gaps(obstacles: Obstacles) -> tuple[Array, Array]:
     """Return how far the polygons of each two obstacles lie apart (n, n) [m], and the vectors (n, n, 2) [m] across the gaps.
 
     These lead from the second polygon to the first. The distance of an obstacle from itself is infinite.
     """
+    return _measure_gaps(_Shapes.of(obstacles, np.zeros(0)))
+
+
+def outline_obstacles(obstacles: Obstacles, radius: Array) -> Outlines:
+    """Return the outlines of obstacles of a radius (n,) [m]; the same object for obstacles that stay the same."""
+    return _outline(_Shapes.of(obstacles, radius))
+
+
+@lru_cache(maxsize=KEPT)
+def _measure_gaps(shapes: _Shapes) -> tuple[Array, Array]:
+    obstacles = shapes.obstacles
     n, most = obstacles.vertices.shape[:2]
     offset, distance = measure_offsets((obstacles.centre[:, None] + obstacles.vertices).reshape(-1, 2), obstacles)
     is_corner = np.arange(most) < obstacles.corners[:, None]
@@ -173,9 +165,9 @@ def measure_gaps(obstacles: Obstacles) -> tuple[Array, Array]:
     return gap, apart
 
 
-@keep_last
-def outline_obstacles(obstacles: Obstacles, radius: Array) -> Outlines:
-    """Return the outlines of obstacles of a radius (n,) [m]; the same object for obstacles that stay the same."""
+@lru_cache(maxsize=KEPT)
+def _outline(shapes: _Shapes) -> Outlines:
+    obstacles, radius = shapes.obstacles, shapes.radius
     gap, apart = measure_gaps(obstacles)
     both = radius[:, None] + radius
     is_narrow = (gap > both) & (gap < (1.0 + NARROW) * both)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,6 @@ from .limits import (
     shorten,
     step_force,
     turn_along,
-    update_energy,
 )
 from .paths import (
     GuidePaths,
@@ -48,14 +48,10 @@ from .paths import (
     transfer_progress,
 )
 
-HEADING_M = 0.02
-"""Shortest distance ahead on a path at which the heading points [m]."""
 SLOW = 0.02
 """Speed [m/s] from which on the direction of the hand counts more than that of a path as the one along the path."""
 SHARPNESS = 3.0
 """Exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads."""
-YIELD_ACCELERATION = 0.6
-"""Acceleration of the hand against the force from which on there is no force [m/s^2]."""
 LATE_PERIODS = 2.0
 """Longest time between two updates for which the tank is guaranteed, in periods of `guidance.rate_hz`."""
 
@@ -177,9 +173,9 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
     """
     settings = config.guidance
     dt = 0.0 if state.energy is None else given.t - state.t
-    energy = settings.tank
+    energy = settings.tank  # it pays for the work on the hand: E <- min(E - f . dx, E_max)
     if state.energy is not None:
-        energy = update_energy(state.energy, state.force, given.position - state.position, settings.tank)
+        energy = min(state.energy - float(state.force @ (given.position - state.position)), settings.tank)
     status = find_status(settings, given)
     followed, demand = _follow_prediction(config, state.followed, given), _Demand()
     seen = see_margins(followed.margins, given.position)
@@ -189,11 +185,7 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
         demand = _compute_demand(settings, followed, seen, given)
     target = demand.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
     longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
-
-    def find_bound(force: Array) -> float:
-        return _find_bound(settings, seen, energy, force)
-
-    force = step_force(state.force, target, settings.slew * min(dt, longest), find_bound)
+    force = step_force(state.force, target, settings.slew * min(dt, longest), partial(_find_bound, settings, seen, energy))
     change = dt / settings.ramp_s
     authority = state.authority + min(max(demand.authority - state.authority, -change), change)
     reference = given.position + find_deflection(demand.stiffness, force)
@@ -220,7 +212,8 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
     if prediction is None or prediction is before.prediction:
         return before
     obstacles, margins = before.obstacles, before.margins
-    if before.prediction is None or not _is_blocked_alike(prediction, before.prediction):
+    known = before.prediction
+    if known is None or prediction.obstacles is not known.obstacles or prediction.cleared != known.cleared:
         obstacles = prediction.blocking_obstacles.grow(config.scene.hand_radius)
         margins = build_margins(obstacles, config.guidance.margin)
     if not prediction.candidates_with_likelihood:
@@ -232,10 +225,6 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
     travelled = float(np.hypot(*given.velocity)) * max(given.prediction_age_s, 0.0)
     progress = transfer_progress(paths, references, given.position, travelled)
     return Followed(prediction, paths, progress, obstacles, margins)
-
-
-def _is_blocked_alike(prediction: Prediction, other: Prediction) -> bool:
-    return prediction.obstacles is other.obstacles and prediction.cleared == other.cleared
 
 
 def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMargins, given: GuidanceInput) -> _Demand:
@@ -264,21 +253,17 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
     shares = () if followed.prediction is None else (followed.prediction.unknown, followed.prediction.other)
     weights = weigh_candidates(paths.likelihoods, *shares)
     force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0], find_crossing(need, errors))
-    force = yield_to_hand(force, given.acceleration, YIELD_ACCELERATION)
-    heading, line = _find_heading(paths, np.maximum(ahead, progress + HEADING_M), weights, given.position)
+    force = yield_to_hand(force, given.acceleration, 0.6)
+    places = paths.locate(np.maximum(ahead, progress + 0.02))  # a heading points at least 20 mm ahead
+    lines = paths.interpolate(paths.points, places) - given.position
+    heading = weights @ normalize(lines)
     return _Demand(
         turn_along(seen, weights @ errors, force),
         need.share * agreement * np.einsum('c,cab->ab', weights, stiffness),
         agreement,
         settings.authority * min(float(np.hypot(*heading)), 1.0),
-        turn_along(seen, line, normalize(heading)),
+        turn_along(seen, weights @ lines, normalize(heading)),
     )
-
-
-def _find_heading(paths: GuidePaths, ahead: Array, weights: Array, position: Array) -> tuple[Array, Array]:
-    """Return the weighted sum of the unit vectors from the hand to a point of each path, and the line to their weighted mean."""
-    lines = paths.interpolate(paths.points, paths.locate(ahead)) - position
-    return weights @ normalize(lines), weights @ lines
 
 
 def _release(settings: GuidanceConfig, force: Array, dt: float) -> Array:

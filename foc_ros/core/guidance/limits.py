@@ -21,9 +21,6 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import trace_obstacle
 from foc_ros.core.types import Array, Record
 
-ROUNDING = 1e-9
-"""Relative size of differences that are rounding errors."""
-
 
 def find_largest_force(config: GuidanceConfig) -> float:
     """Return the largest force [N]: `f_max`, and not more than the slew limit reduces to zero within `ramp_s`."""
@@ -47,17 +44,9 @@ def step_force(previous: Array, target: Array, most_change: float, find_bound: C
     wanted = shorten(target, find_bound(target))
     stepped = previous + shorten(wanted - previous, most_change)
     stepped = shorten(stepped, find_bound(stepped))
-    if np.hypot(*(stepped - previous)) <= most_change * (1.0 + ROUNDING):
+    if np.hypot(*(stepped - previous)) <= most_change * (1.0 + 1e-9):  # but for rounding
         return stepped
     return shorten(previous, max(float(np.hypot(*previous)) - most_change, 0.0))
-
-
-def update_energy(energy: float, force: Array, displacement: Array, capacity: float) -> float:
-    """Return the energy [J] after a force (2,) [N] was held while the hand moved by a displacement (2,) [m].
-
-    E <- min(E - f . dx, E_max)
-    """
-    return min(energy - float(force @ displacement), capacity)
 
 
 def limit_by_energy(energy: float, slew: float, speed: float, period: float) -> float:
@@ -74,8 +63,6 @@ def limit_by_energy(energy: float, slew: float, speed: float, period: float) -> 
 
 POINTS = 32
 """Number of edges round a circle."""
-TOLERANCE = math.sin(math.pi / POINTS)
-"""Sine of the largest angle between the normal of an edge and the true one of an arc that it stands for."""
 NEAR_M = 0.001
 """Distance [m] from a margin within which there is no force into it."""
 
@@ -90,9 +77,6 @@ class Margins(Record):
     start: Array
     edge: Array
     normal: Array
-
-    def __len__(self) -> int:
-        return len(self.start)
 
 
 def build_margins(obstacles: Obstacles, growth: float) -> Margins:
@@ -150,9 +134,9 @@ def turn_along(seen: SeenMargins, line: Array, force: Array) -> Array:
 def measure_opposing_distance(seen: SeenMargins, force: Array) -> float:
     """Return the distance [m] of the hand from the nearest edge into which a force (2,) leads; infinite if there is none.
 
-    Edges whose normal is within `TOLERANCE` of a right angle to the force count as well.
+    Edges whose normal is nearly at a right angle to the force count as well: the arc that they stand for may have other normals.
     """
-    is_opposing = seen.normal @ force < TOLERANCE * float(np.hypot(*force))
+    is_opposing = seen.normal @ force < math.sin(math.pi / POINTS) * float(np.hypot(*force))
     return float(seen.distance[is_opposing].min(initial=np.inf))
 
 

@@ -112,8 +112,7 @@ def transfer_progress(paths: GuidePaths, known: dict[str, Array], position: Arra
     known: references (2,) [m] by label; travelled: the way of the hand since the stamp of the prediction [m].
     """
     points = np.array([known.get(label, position) for label in paths.labels]).reshape(-1, 2)
-    low = np.zeros(len(points))
-    return paths.find_nearest(points, low, np.full(len(points), travelled + WINDOW_M))
+    return paths.find_nearest(points, np.zeros(len(points)), np.full(len(points), travelled + WINDOW_M))
 
 
 def advance_progress(paths: GuidePaths, progress: Array, position: Array, velocity: Array, dt: float) -> Array:
@@ -144,8 +143,6 @@ PRECISION_LOW, PRECISION_HIGH = 100.0, 2500.0
 """Precisions between which the stiffness grows from 0 to `k_max` [1/m^2]: standard deviations of 100 mm and of 20 mm."""
 POSITION_STDDEV = 0.002
 """Standard deviation that is added to that of every predicted position [m]: that of a good tracker and of its registration."""
-SINGULAR = 1e-6
-"""Stiffness below which a direction counts as one without any, as a share of the largest one."""
 
 
 def compute_stiffness(covariances: Array, config: GuidanceConfig) -> Array:
@@ -175,13 +172,9 @@ def project_out(stiffness: Array, tangents: Array) -> Array:
 def find_deflection(stiffness: Array, force: Array) -> Array:
     """Return the smallest deflection e (2,) [m] for which K e is a force (2,) [N], as far as K (2, 2) [N/m] can give it."""
     values, axes = np.linalg.eigh(stiffness)
-    is_stiff = values > SINGULAR * max(values[-1], 1e-300)
+    is_stiff = values > 1e-6 * max(values[-1], 1e-300)  # others are directions without any
     deflection: Array = axes @ np.where(is_stiff, axes.T @ force / np.where(is_stiff, values, 1.0), 0.0)
     return deflection
-
-
-INSTANTS = 13
-"""Number of instants within the look-ahead at which the distance from the obstacles is computed."""
 
 
 class Need(NamedTuple):
@@ -208,7 +201,7 @@ def find_need(settings: GuidanceConfig, obstacles: Obstacles, position: Array, v
         return Need(settings.lookahead_s, 1.0, np.zeros(2))
     if not len(obstacles):
         return Need(0.0, 0.0, np.zeros(2))
-    times = np.linspace(0.0, settings.lookahead_s, INSTANTS)
+    times = np.linspace(0.0, settings.lookahead_s, 13)
     points = position + times[:, None] * velocity
     offsets, distances = measure_offsets(points, obstacles)
     heights = distances - obstacles.radius

@@ -33,12 +33,8 @@ LEAST_S, MOST_S = 0.3, 10.0
 """Limits of the time to go [s]: near its goal a hand corrects for about that long; plans beyond the other limit say nothing."""
 PACE_AFTER = 0.3
 """Share of the expected duration after which the present speed counts."""
-SLOWEST = 1e-6
-"""Lower limit of the speed in divisions [m/s]."""
 CHANGE_S = 0.25
 """Time in which the time to go grows, or falls faster than time goes by, by a factor of e at most [s]."""
-SHORTEST_S = 1e-6
-"""Lower limit of the expected duration in divisions [s]."""
 
 
 def compute_movement_time(distance: float, config: DurationConfig) -> float:
@@ -85,8 +81,8 @@ def estimate_times_to_go(hand: HandState, goals: Array, config: DurationConfig) 
     else:
         since_s = (hand.stamp_ns - hand.onset_ns) / NANOSECONDS
         began = hand.onset_position.tolist()
-        whole = [max(compute_movement_time(math.dist(began, goal), config), SHORTEST_S) for goal in places]
-        speed = max(math.hypot(hand.mean[2], hand.mean[3]), SLOWEST)
+        whole = [max(compute_movement_time(math.dist(began, goal), config), 1e-6) for goal in places]
+        speed = max(math.hypot(hand.mean[2], hand.mean[3]), 1e-6)
         factors = [
             (since_s + distance / speed) / duration
             for distance, duration in zip(distances, whole, strict=True)

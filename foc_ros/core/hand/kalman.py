@@ -137,42 +137,11 @@ def compute_gramian(dt: float) -> Array:
     )
 
 
-_UNIT_ROOT = np.linalg.cholesky(compute_gramian(1.0))
-"""C for dt = 1 s."""
-_ROOT_ORDERS = np.array([[2.5], [1.5], [0.5]])
-"""Powers of dt with which the rows of C scale, (3, 1)."""
-
-
-def triangularise(columns: Array) -> Array:
-    """Return the lower triangular L (n, n) with L L' = M M' for columns M (n, q), q >= n; its diagonal is not negative."""
-    _, upper = np.linalg.qr(columns.T)
-    lower: Array = upper.T * np.copysign(1.0, upper.diagonal())
-    return lower
-
-
 def expand_to_both_axes(covariance: Array) -> Array:
     """Return the covariance (6, 6) of x, y, vx, vy, ax, ay from the one (3, 3) that all axes share."""
     both = np.zeros((6, 6))
     both[::2, ::2] = both[1::2, 1::2] = covariance
     return both
-
-
-def filter_step(
-    mean: Array, height_mean: Array, root: Array, dt: float, position: Array, height: float, density: float, stddev: float
-) -> tuple[Array, Array, Array, Array]:
-    """Return mean (6,), mean of the height (3,), covariance (6, 6) and root (3, 3) after dt [s] and a sample.
-
-    position (2,) and height are those of the sample [m]; density: of the jerk; stddev: of each coordinate of the sample [m].
-    """
-    step = compute_transition(dt)
-    corrected = triangularise(np.hstack((step @ root, density * dt**_ROOT_ORDERS * _UNIT_ROOT)))
-    first = corrected[0, 0]
-    deviation = math.hypot(first, stddev)
-    states = step @ np.column_stack((mean.reshape(3, 2), height_mean))
-    innovation = np.array([*position, height]) - states[0]
-    states += np.outer(corrected[:, 0] * (first / deviation / deviation), innovation)
-    corrected[:, 0] *= stddev / deviation
-    return states[:, :2].ravel(), states[:, 2].copy(), expand_to_both_axes(corrected @ corrected.T), corrected
 
 
 def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
@@ -185,10 +154,23 @@ def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
     return FilterState(*hand, height_mean=height_mean, root=root)
 
 
+_UNIT_ROOT = np.linalg.cholesky(compute_gramian(1.0))
+"""C for dt = 1 s; its rows scale with these powers of dt."""
+_ROOT_ORDERS = np.array([[2.5], [1.5], [0.5]])
+
+
 def _update_state(state: FilterState, sample: HandSample, dt: float, config: EstimatorConfig) -> FilterState:
     """Propagate a state to the stamp of the sample, correct it by the position, and update the movement."""
-    measured, settings = (dt, sample.position, sample.height), (config.jerk_density, config.position_stddev)
-    found = filter_step(state.mean, state.height_mean, state.root, *measured, *settings)
+    step = compute_transition(dt)
+    _, upper = np.linalg.qr(np.hstack((step @ state.root, config.jerk_density * dt**_ROOT_ORDERS * _UNIT_ROOT)).T)
+    root = upper.T * np.copysign(1.0, upper.diagonal())
+    first = root[0, 0]
+    deviation = math.hypot(first, config.position_stddev)
+    states = step @ np.column_stack((state.mean.reshape(3, 2), state.height_mean))
+    innovation = np.array([*sample.position, sample.height]) - states[0]
+    states += np.outer(root[:, 0] * (first / deviation / deviation), innovation)
+    root[:, 0] *= config.position_stddev / deviation
+    found = states[:, :2].ravel(), states[:, 2].copy(), expand_to_both_axes(root @ root.T), root
     mean, height_mean, covariance, root = map(as_readonly, found)
     onset_ns, onset_position = _update_movement(state, sample.stamp_ns, mean, covariance, config)
     hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id

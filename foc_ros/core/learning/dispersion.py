@@ -33,7 +33,6 @@ import numpy as np
 
 from foc_ros.core.config import CovarianceConfig, clip_values
 from foc_ros.core.prediction import PredictedCandidate
-from foc_ros.core.solution import Solution
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 
 from .posterior import GridPosterior
@@ -46,11 +45,6 @@ HORIZONS_S = (0.25, 0.5, 1.0)
 """Times ahead at which predicted positions are judged [s]."""
 SAMPLE_S = 0.1
 """Interval at which predictions are judged [s]."""
-DEPENDENT_S = 1.0
-"""Time within which errors count as one observation [s]."""
-VARIANCE_FLOOR = 1e-12
-"""Variance that is added to that of a predicted position [m^2], so that its density is finite."""
-
 REST_SHARE = 2.0 / 3.0
 """Power of the factor for now for a hand at rest."""
 
@@ -132,7 +126,7 @@ class Dispersion(Record):
         taking_part = [each for each in candidates if each.likelihood > 0.0]
         if since_s < SAMPLE_S or not taking_part:
             return self
-        count = min(since_s / DEPENDENT_S, 1.0)
+        count = min(since_s, 1.0)  # the errors within 1 s count as one
         made = [make_forecast(stamp_ns, ahead_s, count, taking_part, config) for ahead_s in HORIZONS_S]
         later = [each for each in made if each.due_ns > self.hand.stamp_ns]  # a prediction may take longer than the first time
         return replace(self, taken_ns=stamp_ns, forecasts=(*self.forecasts, *later))
@@ -155,14 +149,10 @@ def make_forecast(
         means.append((1.0 - after) * solution.mean[row, :2] + after * solution.mean[row + 1, :2])
         covariances.append((1.0 - after) * solution.covariance[row, :2, :2] + after * solution.covariance[row + 1, :2, :2])
     share = np.array(shares)
-    covariance = np.array(covariances) / interpolate_factors(share, config)[:, None, None] ** 2 + VARIANCE_FLOOR * np.eye(2)
+    covariance = np.array(covariances) / interpolate_factors(share, config)[:, None, None] ** 2
+    covariance += 1e-12 * np.eye(2)  # so that the density of a known position is finite
     due_ns, weight = stamp_ns + round(ahead_s * NANOSECONDS), np.array([each.likelihood for each in candidates])
     return Forecast(due_ns, count, share, weight, np.array(means), covariance)
-
-
-def compute_factors(solution: Solution, config: CovarianceConfig) -> Array:
-    """Return the factors (N + 1,) on the standard deviations of a solution at its steps."""
-    return interpolate_factors(np.linspace(0.0, 1.0, len(solution.mean)), config)
 
 
 def interpolate_factors(share: Array, config: CovarianceConfig) -> Array:
@@ -178,5 +168,5 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig, *,
     if at_rest:
         config = replace(config, near=config.near**REST_SHARE)
     solution = candidate.solution
-    covariance = solution.covariance * compute_factors(solution, config)[:, None, None] ** 2
+    covariance = solution.covariance * interpolate_factors(np.linspace(0.0, 1.0, len(solution.mean)), config)[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))

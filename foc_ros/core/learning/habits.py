@@ -36,12 +36,6 @@ from .movements import find_goal_at_end
 
 SAME_GOAL_M = 0.02
 """Distance within which a goal outside of obstacles is the one of before [m]."""
-MOST_LEFT = 0.5
-"""A reach ends at the nearest goal if it leaves no more than this share of its first distance: hands touch edges of objects."""
-LEAST_M = 1e-3
-"""Least distance of a goal with which its probability is computed [m]."""
-MOST_KNOWN = 64
-"""Number of goals that are remembered, the last ones."""
 PRIOR_REACHES = 3
 """Number of reaches as many as which it counts that they should end at their goals."""
 
@@ -114,10 +108,11 @@ class Habits(Record):
     def _end(self, reach: Reach, beta: float) -> Habits:
         """Return the habits after a reach, which counts if it ended at a goal."""
         goal, left = find_goal_at_end(reach.position[None], reach.goals)
-        if left > MOST_LEFT * math.dist(reach.onset, reach.goals[goal]):
+        # a reach may leave half of its first distance, because hands touch edges of objects
+        if left > 0.5 * math.dist(reach.onset, reach.goals[goal]):
             return self.interrupt()
         first = np.hypot(*(self.find_ends(reach.goals) - reach.onset).T)
-        expected = normalise_logs(-2.0 * beta * np.log(np.maximum(first, LEAST_M)))
+        expected = normalise_logs(-2.0 * beta * np.log(np.maximum(first, 1e-3)))  # a goal at the hand has a finite one
         before = [self._find(*each) for each in zip(reach.names, reach.goals, strict=True)]
         now = [
             KnownGoal(name, place, each.reached + (row == goal), each.expected + float(expected[row]))
@@ -125,7 +120,7 @@ class Habits(Record):
         ]
         others = [each for each in self.known if all(each is not other for other in before)]
         missed = self.missed + reach.position - reach.goals[goal]
-        return Habits(tuple([*others, *now][-MOST_KNOWN:]), None, self.reaches + 1, missed)
+        return Habits(tuple([*others, *now][-64:]), None, self.reaches + 1, missed)
 
     def _find(self, name: str | None, place: Array) -> KnownGoal:
         """Return what is known of a goal, nothing where it is new."""

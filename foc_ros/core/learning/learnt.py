@@ -24,9 +24,6 @@ from .movements import Movements
 from .pace import Pace
 from .recordings import NO_LIBRARY, Library
 
-DISPERSED_BY = ('foc', 'duration', 'covariance', 'estimator')
-"""Groups of parameters on which errors and covariances depend."""
-
 
 class Knowledge(NamedTuple):
     """What a prediction is made with besides parameters and scene.
@@ -91,7 +88,8 @@ class Learnt:
 
     def reconfigure(self, before: Config, now: Config) -> Learnt:
         """Return what still holds with other parameters: what depends on one that changed is forgotten."""
-        is_dispersed = any(getattr(before, name) != getattr(now, name) for name in DISPERSED_BY)
+        dispersed_by = ('foc', 'duration', 'covariance', 'estimator')  # errors and covariances depend on these
+        is_dispersed = any(getattr(before, name) != getattr(now, name) for name in dispersed_by)
         is_recorded = (before.experience.learning, before.estimator) == (now.experience.learning, now.estimator)
         return Learnt(
             self.pace if before.duration == now.duration else Pace(),

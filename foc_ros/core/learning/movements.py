@@ -27,15 +27,11 @@ from foc_ros.core.types import NANOSECONDS, Array, HandState, Record
 
 from .recordings import MOST_NEAR
 
-StampedState = tuple[int, Array]
-"""A stamp [ns] and the state then (4,): x, y, vx, vy [m, m/s]."""
 AROUND_S = 1.0
 """Time before the onset and after the goal that a demonstration contains [s]: predictions near either end look that far."""
 SHORTEST_M = 0.05
 """Least length of a movement that is learnt [m]."""
-MOST_LEARNT = MOST_NEAR
-"""Number of demonstrations that are kept, the newest ones: as many as count in one prediction."""
-STEP_NS, AROUND_NS, AROUND_STEPS = round(STEP_S * NANOSECONDS), round(AROUND_S * NANOSECONDS), round(AROUND_S / STEP_S)
+STEP_NS = round(STEP_S * NANOSECONDS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,15 +39,15 @@ class Movements(Record):
     """What was learnt of the movements so far, and the present one.
 
     learnt: demonstrations, the newest last; refused: number of movements that are no demonstration; refusal: the reason for the
-    last of them; hand: its last state; states: the last ones, `STEP_S` apart; onset_ns, ended_ns: when the present movement
-    began, and came to rest; scene: of the last state that moved.
+    last of them; hand: its last state; states: the last ones, `STEP_S` apart, each a stamp [ns] with x, y, vx, vy then, (4,) [m,
+    m/s]; onset_ns, ended_ns: when the present movement began, and came to rest; scene: of the last state that moved.
     """
 
     learnt: tuple[Demonstration, ...] = ()
     refused: int = 0
     refusal: str = ''
     hand: HandState | None = None
-    states: tuple[StampedState, ...] = ()
+    states: tuple[tuple[int, Array], ...] = ()
     onset_ns: int | None = None
     ended_ns: int | None = None
     scene: Scene = field(default_factory=Scene)
@@ -59,7 +55,12 @@ class Movements(Record):
     def follow(self, hand: HandState, scene: Scene, *, is_restart: bool) -> Movements:
         """Return the movements after the next state of the hand; is_restart: whether its filter began anew."""
         before = self.interrupt() if is_restart else self.finish() if self._is_over(hand) else self
-        states = sample_states(before.states, before.hand, hand)
+        states, last = before.states, before.hand
+        if last is not None:  # those that are due between the last sample and this one
+            due = np.arange(last.stamp_ns // STEP_NS + 1, hand.stamp_ns // STEP_NS + 1) * STEP_NS
+            share = (due - last.stamp_ns)[:, None] / (hand.stamp_ns - last.stamp_ns)
+            between = (1.0 - share) * last.mean[:4] + share * hand.mean[:4]
+            states = (*states, *zip(due.tolist(), between, strict=True))[-MOST_STATES:]
         if hand.onset_ns is not None:
             onset_ns = hand.onset_ns if before.onset_ns is None else before.onset_ns
             return replace(before, hand=hand, states=states, onset_ns=onset_ns, ended_ns=None, scene=scene)
@@ -79,14 +80,14 @@ class Movements(Record):
             found = self._record()
         except RecordingError as error:
             return replace(ended, refused=self.refused + 1, refusal=str(error))
-        return replace(ended, learnt=(*self.learnt, found)[-MOST_LEARNT:])
+        return replace(ended, learnt=(*self.learnt, found)[-MOST_NEAR:])  # as many as count in one prediction
 
     def _is_over(self, hand: HandState) -> bool:
         """Tell whether the present movement had ended before the next state of the hand."""
         if self.hand is None or self.ended_ns is None:
             return False
         if hand.onset_ns is None:
-            return hand.stamp_ns - self.ended_ns >= AROUND_NS
+            return hand.stamp_ns - self.ended_ns >= AROUND_S * NANOSECONDS
         goals = self.scene.goals
         return goals is not None and len(goals) > 0 and find_goal_at_end(self.hand.mean[None, :2], goals)[1] <= AT_GOAL_M
 
@@ -111,18 +112,9 @@ class Movements(Record):
         if length_m < SHORTEST_M or distance_m > AT_GOAL_M:
             wanted = f'expected a movement of at least {SHORTEST_M:g} m that ends within {AT_GOAL_M:g} m of a goal'
             raise RecordingError(f'{wanted}, got {length_m:.3g} m that end {distance_m:.3g} m from the nearest')
-        kept = states[max(first - AROUND_STEPS, 0) : first + len(path) + AROUND_STEPS]
+        around = round(AROUND_S / STEP_S)
+        kept = states[max(first - around, 0) : first + len(path) + around]
         return record_demonstration(hand.frame_id, np.vstack([path, goals[goal]]), self.scene.obstacles(hand.stamp_ns), kept)
-
-
-def sample_states(states: tuple[StampedState, ...], before: HandState | None, hand: HandState) -> tuple[StampedState, ...]:
-    """Return states with those that are due between the hand before and now, of which the newest MOST_STATES are kept."""
-    if before is None or hand.stamp_ns // STEP_NS == before.stamp_ns // STEP_NS:
-        return states
-    due = np.arange(before.stamp_ns // STEP_NS + 1, hand.stamp_ns // STEP_NS + 1) * STEP_NS
-    share = (due - before.stamp_ns)[:, None] / (hand.stamp_ns - before.stamp_ns)
-    between = (1.0 - share) * before.mean[:4] + share * hand.mean[:4]
-    return (*states, *zip(due.tolist(), between, strict=True))[-MOST_STATES:]
 
 
 REMAINING_SHARE = 0.25

@@ -50,8 +50,6 @@ FACTORS = as_readonly(np.exp(LOG_FACTORS))
 """Factors that are judged."""
 PRECISION = 31.0
 """By how much the logarithm of the probability falls per unit of the loss of a movement."""
-SMALLEST_SPREAD = 1e-3
-"""Smallest spread with which the factor is weighed: a smaller one says that durations are known."""
 OTHER_ARRIVAL = 3.0
 """By how much the logarithm of the probability of another arrival than that of the parameters is smaller [nat]."""
 AHEAD_S = 0.5
@@ -162,7 +160,7 @@ class Pace(Record):
         if not self.is_known:
             return config.arrival, 1.0
         axes, row = (np.arange(len(ARRIVALS), dtype=float), LOG_FACTORS), ARRIVALS.index(config.arrival)
-        prior = GridPosterior.from_normal(axes, (np.inf, max(config.spread, SMALLEST_SPREAD)))
+        prior = GridPosterior.from_normal(axes, (np.inf, max(config.spread, 1e-3)))
         posterior = prior.add(-PRECISION * self.losses)
         if self.movements:
             is_other = np.array([[each != config.arrival] for each in ARRIVALS])

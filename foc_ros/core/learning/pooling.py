@@ -4,7 +4,7 @@
 
 The recordings e that pass the next row as a candidate does, displaced so that they begin at the hand, are at a time t from now at
 x_e with weights w_e, which fade out over the FADE_S before a recording ends or parts from the class. With P the covariance of the
-position of the hand and b = `experience.VELOCITY_STDDEV`, by which their velocities differ from that of the hand,
+position of the hand and b = `recordings.VELOCITY_STDDEV`, by which their velocities differ from that of the hand,
 
     n = sum w_e,   r = sum w_e x_e / n,   R = sum w_e (x_e - r) (x_e - r)' / n + P + (b t / 2)^2 I.
 
@@ -19,10 +19,9 @@ Velocity and acceleration change by the derivatives of m' - m. Given the positio
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.obstacle_table import Obstacles
@@ -30,7 +29,7 @@ from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.prediction import PredictedCandidate
 from foc_ros.core.solution import Solution
-from foc_ros.core.types import Array, Record, as_readonly
+from foc_ros.core.types import Array, as_readonly
 
 FADE_S = 0.25
 """Time over which the weight of a recording falls to zero before its end [s]."""
@@ -38,26 +37,8 @@ EXACT = 1e-12
 """Variance of a position that is known [m^2]: that of a micrometre."""
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedPaths(Record):
-    """What e recordings do from now on, at m times: paths (e, m, 2) [m] that begin at the hand, and their weights (e, m)."""
-
-    paths: Array
-    weights: Array
-
-    def take(self, rows: NDArray[np.bool_]) -> RecordedPaths:
-        """Return some of the recordings."""
-        return RecordedPaths(self.paths[rows], self.weights[rows])
-
-
-def fade_weights(weight: Array, left_s: Array, times: Array) -> Array:
-    """Return the weights (e, m) at times (m,) [s] of recordings with a weight (e,) that go on for left_s (e,) [s]."""
-    faded: Array = weight[:, None] * np.clip((left_s[:, None] - times) / FADE_S, 0.0, 1.0)
-    return faded
-
-
 def pool_path(
-    solution: Solution, recorded: RecordedPaths, position_covariance: Array, drift: float, prior_count: float
+    solution: Solution, paths: Array, weights: Array, position_covariance: Array, drift: float, prior_count: float
 ) -> Solution:
     """Return a solution with the mean and the covariance that recordings change; effort, costs and eta stay those of the plan.
 
@@ -65,8 +46,8 @@ def pool_path(
     ----------
     solution
         The plan; its motor covariance remains.
-    recorded
-        Recordings at the times of the plan.
+    paths, weights
+        What e recordings do at the m times of the plan: paths (e, m, 2) [m] that begin at the hand, and their weights (e, m).
     position_covariance
         That of the hand now (2, 2) [m^2].
     drift
@@ -74,8 +55,7 @@ def pool_path(
     prior_count
         The number n_0 of recordings as which the plan counts.
     """
-    times, paths, weights = solution.times, recorded.paths, recorded.weights
-    count = weights.sum(axis=0)
+    times, count = solution.times, weights.sum(axis=0)
     covered = int(np.flatnonzero(count >= 0.5 * count[0])[-1])
     shares = np.divide(weights, count, out=np.zeros_like(weights), where=count > 0.0)
     centre = np.einsum('em,emi->mi', shares, paths)

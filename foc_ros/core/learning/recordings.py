@@ -36,10 +36,10 @@ from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_de
 from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.prediction import PredictedCandidate
-from foc_ros.core.solution import Candidate, Solution
+from foc_ros.core.solution import Candidate
 from foc_ros.core.types import Array, HandState, Record
 
-from .pooling import RecordedPaths, fade_weights, pool_path, stays_in_class
+from .pooling import FADE_S, pool_path, stays_in_class
 
 MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""
@@ -86,14 +86,6 @@ class Evidence(Record):
     is_at_goal: NDArray[np.bool_]
 
 
-@dataclass(frozen=True, eq=False)
-class Agreement(Record):
-    """Of a class and e recordings: is_same (e,): whether they are of it; until_s (e,) [s]: how long they may lead its path."""
-
-    is_same: NDArray[np.bool_]
-    until_s: Array
-
-
 def make_library(given: Sequence[Demonstration], learnt: Sequence[Demonstration] = ()) -> Library:
     """Return the library of demonstrations, of which those with states are recordings; learnt: those that show no ways."""
     found = (*given, *learnt)
@@ -116,12 +108,9 @@ def make_library(given: Sequence[Demonstration], learnt: Sequence[Demonstration]
 NO_LIBRARY = make_library(())
 
 
-def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals: Array, widening: float = 1.0) -> Evidence:
-    """Find the recordings that count: nearest first, at most MOST_NEAR, only those whose obstacles are where they were.
-
-    widening: factor on the distances at which a recording counts less.
-    """
-    scale = widening * np.repeat([POSITION_STDDEV, VELOCITY_STDDEV], 2)
+def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals: Array) -> Evidence:
+    """Find the recordings that count: nearest first, at most MOST_NEAR, only those whose obstacles are where they were."""
+    scale = np.repeat([POSITION_STDDEV, VELOCITY_STDDEV], 2)
     apart = (((library.states - hand.mean[:4]) / scale) ** 2).sum(axis=2)
     state = apart.argmin(axis=1)
     weight = np.exp(-0.5 * apart[np.arange(len(apart)), state])
@@ -167,18 +156,30 @@ def pool_recordings(
     decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
     of_ways = evidence.weight * library.shows_ways[evidence.row]
-    counts, on_ways = (np.array([each[one.is_same].sum() for one in agreements]) for each in (evidence.weight, of_ways))
+    counts, on_ways = (np.array([each[is_same].sum() for is_same, _ in agreements]) for each in (evidence.weight, of_ways))
     likelihoods = update_likelihoods(np.array([each.likelihood for each in taken]), counts, on_ways, decisions)
     pooled = []
-    for each, share, agreement in zip(taken, likelihoods.tolist(), agreements, strict=True):
-        recorded = follow_recordings(library, evidence, agreement.until_s, hand, each.times)
-        pooled.append(replace(each, likelihood=share, solution=_pool_path(each, recorded, agreement, hand, obstacles)))
+    for each, share, (is_same, until_s) in zip(taken, likelihoods.tolist(), agreements, strict=True):
+        paths, weights = follow_recordings(library, evidence, until_s, hand, each.times)
+        solution, uncertainty = each.solution, (hand.covariance[:2, :2], 0.5 * VELOCITY_STDDEV)
+        for is_used in (until_s > 0.0, is_same):
+            if not is_used.any():
+                break
+            found = pool_path(each.solution, paths[is_used], weights[is_used], *uncertainty, PRIOR_COUNT_PATH)
+            if stays_in_class(each, found, obstacles):
+                solution = found
+                break
+        pooled.append(replace(each, likelihood=share, solution=solution))
     pooled.sort(key=lambda each: (-each.likelihood, each.label))
     return pooled + [each for each in candidates if not each.has_likelihood]
 
 
-def compare_with_class(candidate: Candidate, evidence: Evidence, obstacles: Obstacles, next_row: NDArray[np.intp]) -> Agreement:
-    """Compare the recordings with the class of a candidate: its goal, and its sides of all obstacles in its label.
+def compare_with_class(
+    candidate: Candidate, evidence: Evidence, obstacles: Obstacles, next_row: NDArray[np.intp]
+) -> tuple[NDArray[np.bool_], Array]:
+    """Return which recordings (e,) are of the class of a candidate, and how long (e,) [s] they may lead its path.
+
+    They are of the class if they have its goal, and its sides of all obstacles in its label.
 
     A recording may lead the path until it passes an obstacle on another side, or the last obstacle if its goal is another one;
     not at all if that obstacle is in the next row, which is empty where only goals differ, or not known to the recording.
@@ -193,13 +194,13 @@ def compare_with_class(candidate: Candidate, evidence: Evidence, obstacles: Obst
     until_s[(is_other & (np.isin(columns, next_row) | (sides == 0))).any(axis=1)] = 0.0
     if not len(next_row):
         until_s[~is_at_goal] = 0.0
-    return Agreement(is_at_goal & ~is_other.any(axis=1), until_s)
+    return is_at_goal & ~is_other.any(axis=1), until_s
 
 
-def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand: HandState, times: Array) -> RecordedPaths:
-    """Return where recordings lead the hand at times (m,) [s] from now, each with its weight up to until_s (e,) [s].
+def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand: HandState, times: Array) -> tuple[Array, Array]:
+    """Return where recordings lead the hand at times (m,) [s] from now, (e, m, 2) [m], and their weights (e, m).
 
-    Paths are linear between states, and stay at the last one.
+    They have a weight up to until_s (e,) [s]. Paths are linear between states, and stay at the last one.
     """
     row, ends = evidence.row[:, None], library.ends[evidence.row]
     at = np.minimum(evidence.state[:, None] + times / STEP_S, ends[:, None])
@@ -208,25 +209,7 @@ def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand
     paths = (1.0 - share) * library.states[row, before, :2] + share * library.states[row, before + 1, :2]
     paths += (hand.mean[:2] - library.states[evidence.row, evidence.state, :2])[:, None]
     left_s = np.minimum(STEP_S * (ends - evidence.state), until_s)
-    return RecordedPaths(paths, fade_weights(evidence.weight, left_s, times))
-
-
-def _pool_path(
-    candidate: PredictedCandidate,
-    recorded: RecordedPaths,
-    agreement: Agreement,
-    hand: HandState,
-    obstacles: Obstacles,
-) -> Solution:
-    """Return the solution with the path that recordings change."""
-    for is_used in (agreement.until_s > 0.0, agreement.is_same):
-        if not is_used.any():
-            break
-        uncertainty = hand.covariance[:2, :2], 0.5 * VELOCITY_STDDEV
-        pooled = pool_path(candidate.solution, recorded.take(is_used), *uncertainty, PRIOR_COUNT_PATH)
-        if stays_in_class(candidate, pooled, obstacles):
-            return pooled
-    return candidate.solution
+    return paths, evidence.weight[:, None] * np.clip((left_s[:, None] - times) / FADE_S, 0.0, 1.0)
 
 
 def update_likelihoods(likelihoods: Array, counts: Array, on_ways: Array, decisions: Decisions) -> Array:
