@@ -26,9 +26,8 @@ from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.plant.covariance import compute_duration_sensitivity, compute_onset_delay_covariance
-from foc_ros.core.plant.models import TRIPLE_INTEGRATOR
+from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, compute_error_map
 from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
-from foc_ros.core.plant.replanning import compute_error_map
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import NANOSECONDS, HandSample, HandState, SampleStatus

@@ -12,7 +12,7 @@ from foc_ros.core.classes.library import MOST_STATES
 from foc_ros.core.config import Config, CovarianceConfig, replace_values
 from foc_ros.core.hand.duration import compute_movement_time, scale_durations
 from foc_ros.core.learning import movements as learning
-from foc_ros.core.learning.dispersion import REST_SHARE, Dispersion
+from foc_ros.core.learning.dispersion import Dispersion
 from foc_ros.core.learning.pace import Pace
 from foc_ros.core.learning.recordings import PRIOR_COUNT
 from foc_ros.core.obstacle_table import make_obstacles
@@ -154,7 +154,7 @@ def test_factors_scale_the_covariance_and_nothing_else():
     for one, other in zip(plain, scaled, strict=True):
         for before, after in zip(one.candidates, other.candidates, strict=True):
             at_rest.append(bool(after.covariance[0, 0, 0] < 3.9 * before.covariance[0, 0, 0]))
-            factors = 2.0 ** np.linspace(REST_SHARE if at_rest[-1] else 1.0, 1.0, len(after.mean))
+            factors = 2.0 ** np.linspace(2.0 / 3.0 if at_rest[-1] else 1.0, 1.0, len(after.mean))
             np.testing.assert_allclose(after.covariance, factors[:, None, None] ** 2 * before.covariance, rtol=1e-12)
             np.testing.assert_array_equal(after.mean, before.mean)
             np.testing.assert_array_equal(after.motor_covariance, before.motor_covariance)

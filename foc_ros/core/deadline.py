@@ -15,15 +15,7 @@ class OutOfTimeError(Exception):
 
 @dataclass
 class StepTimes:
-    """Times between two checks of a deadline, or of the deadlines taken from it.
-
-    Attributes
-    ----------
-    longest_s
-        The longest of them so far [s].
-    checked_at
-        The moment of the last check, by `time.perf_counter()` [s]; infinite before the first one.
-    """
+    """The longest time between two checks of a deadline, or of those taken from it [s], and the moment of the last one."""
 
     longest_s: float = 0.0
     checked_at: float = math.inf

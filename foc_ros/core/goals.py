@@ -19,7 +19,7 @@ x + v T / 2 the goal that takes least effort. As a density of the goal, M^-2 is 
     k(g) = s^2 / (pi (|g - e|^2 + s^2)^2),   s^2 = (v T)^2 / 60 + `foc.endpoint_stddev`^2.
 
 Announced goals are points, of which each is as likely as another; other goals are anywhere within A, the circle about the onset
-whose radius is `BEYOND` times the distance of the farthest goal. The odds of another goal are those of `likelihood.other_goal`
+whose radius is 1.5 times the distance of the farthest goal. The odds of another goal are those of `likelihood.other_goal`
 times the factor
 
     (A mean_i k(g_i))^-c,   c = min(1, 2 distance from the onset / least distance of a goal from there).
@@ -45,8 +45,6 @@ HALF_WAY = 1.875
 """Time left half way of a minimum-jerk movement, relative to remaining distance over speed there."""
 LEAST_SPREAD_M = 1e-3
 """Least spread of end points, and least distance, with which probabilities of goals are computed [m]."""
-BEYOND = 1.5
-"""Farthest goal that nobody announced, relative to the farthest one that was."""
 
 
 def compute_straight_effort(state: Array, goals: Array, times_s: Array) -> Array:
@@ -112,7 +110,7 @@ def find_other_share(hand: HandState, goals: Array, durations_s: Sequence[float]
     away = ((goals - position - velocity * (common_s / 2.0)) ** 2).sum(axis=1)
     distances = np.hypot(*(goals - hand.onset_position).T)
     density = float(np.mean(square / (np.pi * (away + square) ** 2)))
-    area = np.pi * (BEYOND * max(float(distances.max()), LEAST_SPREAD_M)) ** 2
+    area = np.pi * (1.5 * max(float(distances.max()), LEAST_SPREAD_M)) ** 2
     moved = 2.0 * math.dist(position, hand.onset_position) / max(float(distances.min()), LEAST_SPREAD_M)
     odds: float = prior / (1.0 - prior) * (area * density) ** -min(1.0, moved)
     return odds / (1.0 + odds)

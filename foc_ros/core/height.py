@@ -37,9 +37,6 @@ from .prediction import HeightTrajectory, PredictedCandidate
 from .solution import Solution, Status
 from .types import Array, HandState
 
-CLEAR_STDDEVS = 2.0
-"""Standard deviations of the predicted height by which it has to clear an obstacle that is to be ignored."""
-
 
 class HeightPredictor:
     """Predicts the height of a hand on its way to any of its goals.
@@ -84,7 +81,7 @@ class HeightPredictor:
             dt = duration_s / self._config.foc.steps
             height = self._predict(row, dt)
             assert height is not None
-            margin = scene.hand_radius + CLEAR_STDDEVS * height.stddev
+            margin = scene.hand_radius + 2.0 * height.stddev
             band = height.mean[:, 0] + np.stack((-margin, margin))
             is_cleared &= find_cleared(obstacles, place, goal, self.compute_progress(goal, dt), band, dt)
         return is_cleared

@@ -16,7 +16,7 @@ from .deadline import NEVER, Deadline
 from .errors import FocError
 from .hand.kalman import FilterState, describe_jump, update
 from .learning.learnt import Knowledge, Learnt
-from .learning.recordings import Library, make_library
+from .learning.recordings import make_library
 from .obstacle_table import Obstacles
 from .predict import predict
 from .prediction import Prediction
@@ -279,13 +279,9 @@ class Pipeline:
         """Replace what was learnt, and the library if it has other recordings now."""
         recordings = learnt.movements.learnt
         if recordings is not self.learnt.movements.learnt:
-            self._library = self._make_library(recordings)
+            is_given = self.config.experience.learning == ONLINE
+            self._library = make_library((*self.given, *recordings)) if is_given else make_library(self.given, recordings)
         self.learnt = learnt
-
-    def _make_library(self, recordings: Sequence[Demonstration]) -> Library:
-        if self.config.experience.learning == ONLINE:
-            return make_library((*self.given, *recordings))
-        return make_library(self.given, recordings)
 
     def _find_not_ready_reason(self) -> tuple[str, str] | None:
         """Return why the pipeline cannot predict, as (kind, message), judged by stamps; the node also judges by its clocks."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
-from foc_ros.core.solution import ROUNDING, Candidate, Solution, Status, name_goal
+from foc_ros.core.solution import Candidate, Solution, Status, name_goal
 from foc_ros.core.types import NANOSECONDS, Array, Record
 
 from .errors import InputError
@@ -171,7 +171,7 @@ class PredictedCandidate:
             times = np.asarray(t, dtype=float)
         except (TypeError, ValueError):
             times = np.array(np.nan)
-        if not ((times >= 0.0) & (times <= end * (1.0 + ROUNDING))).all():
+        if not ((times >= 0.0) & (times <= end * (1.0 + 1e-9))).all():
             raise InputError('t', f'seconds from now in [0, {end:.6g}], the end of the prediction', repr(t))
         checked: Array = np.minimum(times, end)
         return checked

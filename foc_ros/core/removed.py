@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-CHOICES = 'nothing is learnt from choices any more'
 RECORDINGS = 'how much recordings count is fixed'
 REMOVED = {
     'duration.time_cost': 'durations follow Fitts law or are fixed, and their pace is learnt',
@@ -14,7 +13,7 @@ REMOVED = {
     'likelihood.planning_spread': 'it is 1 until the pace of the operator is known from one movement, and then 0.3',
     'likelihood.beta_beyond': 'ways beyond the next row are equally likely to an operator who looks ahead',
     'likelihood.heading_bias': 'reaches that bend are learnt as recordings: experience.learning',
-    'likelihood.adaptation': CHOICES,
+    'likelihood.adaptation': 'nothing is learnt from choices any more',
     'likelihood.hold_s': 'it is 0.2 s',
     'likelihood.smoothing_s': 'it is 0.1 s',
     'likelihood.margin': 'it is 0.05',

@@ -18,8 +18,6 @@ from .errors import SceneError
 
 LEFT, RIGHT = 1, -1
 """Side on which a path passes an obstacle, seen in the direction of travel."""
-ROUNDING = 1e-9
-"""Relative error of a time that may be that of rounding."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

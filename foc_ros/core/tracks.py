@@ -45,8 +45,6 @@ SMOOTHING_S = 0.1
 """Time constant of the filter of the likelihoods [s]: half the time in which people react to what they see."""
 LEAD = 0.05
 """Lead in likelihood that another class needs to become the most likely one: equal ones do not swap by noise."""
-LEAST_UNKNOWN = 1e-6
-"""Unknown share that counts as none."""
 MOVED_M = 0.01
 """A goal that moves by more than this between two predictions is another goal, and an obstacle is another obstacle [m]."""
 
@@ -169,7 +167,7 @@ class Tracks(Record):
         weights = [(1.0 - gain) * before.get(each.way, 0.0) + gain * each.likelihood for each in taking_part]
         weights = share_among_goals(weights, taking_part)
         unknown = (1.0 - gain) * self.rest.unknown + gain * rest.unknown
-        unknown = unknown if unknown >= LEAST_UNKNOWN else 0.0
+        unknown = unknown if unknown >= 1e-6 else 0.0
         total = sum(weights) + unknown
         factor = (1.0 - rest.other) / total if total else 1.0
         ranked = [replace(each, likelihood=factor * weight) for each, weight in zip(taking_part, weights, strict=True)]

@@ -7,8 +7,6 @@ decisions that tell candidates apart.
 May import `foc_ros.core.plant`, `obstacles`, `hand` and the ground modules.
 """
 
-from .guess import timed
-from .names import named_obstacles
 from .search import Search, Turn, search
 from .sides import compute_swept_angles, find_path_sides
 
@@ -17,7 +15,5 @@ __all__ = [
     'Turn',
     'compute_swept_angles',
     'find_path_sides',
-    'named_obstacles',
     'search',
-    'timed',
 ]

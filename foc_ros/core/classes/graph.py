@@ -26,11 +26,6 @@ from .sides import count_crossings
 Rows = NDArray[np.intp]
 Crossings = NDArray[np.int8]
 
-BOTH_SIDES = 1e-15
-"""Product of two cross products [m^4] up to which the neighbours of a vertex count as being on one side of a line, or on it."""
-SHORTEST = 1e-12
-"""Least length of a line [m]: vertices of different outlines may coincide."""
-
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
@@ -64,7 +59,7 @@ class Nodes:
             edge = self.points[neighbour[rows]] - at
             aside = np.column_stack([edge[:, 1], -edge[:, 0]])
             left.append(aside @ points.T - (aside * at).sum(axis=1)[:, None])
-        flags: Flags = left[0] * left[1] >= -BOTH_SIDES
+        flags: Flags = left[0] * left[1] >= -1e-15  # on one side of the line, or on it [m^4]
         return flags
 
     def find_tangents(self) -> tuple[Rows, Rows]:
@@ -79,11 +74,6 @@ class Nodes:
             pairs.append(np.array([own[row], later[column]]))
         tail, head = np.concatenate(pairs, axis=1)
         return tail, head
-
-    def find_edges(self) -> tuple[Rows, Rows]:
-        """Return the rows at both ends of the edges of the outlines, whatever covers them in the middle."""
-        tail = np.flatnonzero(self.is_free & self.is_free[self.following])
-        return tail, self.following[tail]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +124,8 @@ class Graph(Record):
         """Return the length of the shortest path from each node to a goal [m], infinite if there is none."""
         first = np.append(self.first, self.first[-1] + len(goal.nodes))
         head, length = np.append(self.head, goal.nodes), np.append(self.length, goal.length)
-        lines = csr_matrix((np.maximum(length, SHORTEST), head, first), shape=(len(first) - 1, len(first) - 1))
+        length = np.maximum(length, 1e-12)  # vertices of different outlines may coincide
+        lines = csr_matrix((length, head, first), shape=(len(first) - 1, len(first) - 1))
         rest: list[float] = dijkstra(lines, indices=len(first) - 2)[:-1].tolist()
         return rest
 
@@ -142,8 +133,15 @@ class Graph(Record):
 @lru_cache(maxsize=KEPT)
 def build_graph(outlines: Outlines) -> Graph:
     """Build the visibility graph of outlines; the last graphs are kept."""
-    nodes = _list_nodes(outlines)
-    tail, head = np.concatenate([nodes.find_tangents(), nodes.find_edges()], axis=1)
+    points = outlines.vertices[np.arange(outlines.vertices.shape[1]) < outlines.count[:, None]]
+    owner, number = np.repeat(np.arange(len(outlines)), outlines.count), np.arange(len(points))
+    ends = np.cumsum(outlines.count) - 1
+    begins = ends - outlines.count + 1
+    following = np.where(number == ends[owner], begins[owner], number + 1)
+    previous = np.where(number == begins[owner], ends[owner], number - 1)
+    nodes = Nodes(outlines, points, previous, following, owner, ~outlines.hold(points, owner))
+    edges = np.flatnonzero(nodes.is_free & nodes.is_free[nodes.following])  # of the outlines, whatever covers them in the middle
+    tail, head = np.concatenate([nodes.find_tangents(), (edges, nodes.following[edges])], axis=1)
     is_open = ~outlines.block(nodes.points[tail], nodes.points[head])
     tail, head = tail[is_open], head[is_open]
     length = np.hypot(*(nodes.points[head] - nodes.points[tail]).T)
@@ -152,15 +150,3 @@ def build_graph(outlines: Outlines) -> Graph:
     order = np.argsort(tails, kind='stable')
     first = np.searchsorted(tails[order], np.arange(len(nodes.points) + 1))
     return Graph(nodes, first, heads[order], np.append(length, length)[order], np.concatenate([crossings, -crossings])[order])
-
-
-def _list_nodes(outlines: Outlines) -> Nodes:
-    """Return the vertices of outlines."""
-    points = outlines.vertices[np.arange(outlines.vertices.shape[1]) < outlines.count[:, None]]
-    owner, number = np.repeat(np.arange(len(outlines)), outlines.count), np.arange(len(points))
-    last = np.cumsum(outlines.count) - 1
-    first = last - outlines.count + 1
-    following = np.where(number == last[owner], first[owner], number + 1)
-    previous = np.where(number == first[owner], last[owner], number - 1)
-    is_free = ~outlines.hold(points, owner)
-    return Nodes(outlines, points, previous, following, owner, is_free)

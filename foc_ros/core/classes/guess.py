@@ -19,14 +19,8 @@ from .sides import sweep
 
 SLOPE = 0.5
 """A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
-MAX_SPEED_RATIO = 2.5
-"""Largest ratio of v T to L for which the timing does not overshoot."""
 ROOM = 0.002
 """Distance from the grown obstacles that a guess keeps where there is room [m]."""
-ROOMS = ROOM, ROOM, 0.0
-"""To this distance from the grown obstacles a guess is moved after each smoothing [m]: the last smoothing uses up the room."""
-CLEAR = 1e-12
-"""Depth in a grown obstacle that does not count [m]."""
 
 
 def compute_path_lengths(path: Array) -> Array:
@@ -41,7 +35,7 @@ def compute_progress(length: float, speed: float, duration_s: float, steps: int)
     and begin backwards with v < 0, so v is kept between these bounds.
     """
     t = np.linspace(0.0, 1.0, steps + 1)
-    carried = min(max(speed * duration_s, 0.0), MAX_SPEED_RATIO * length)
+    carried = min(max(speed * duration_s, 0.0), 2.5 * length)
     along = length * t**3 * (10.0 + t * (6.0 * t - 15.0)) + carried * t * (1.0 + t**2 * (t * (8.0 - 3.0 * t) - 6.0))
     return np.clip(along, 0.0, length)
 
@@ -104,12 +98,12 @@ def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacl
     near = np.flatnonzero((apart < names.radius - obstacles.radius + ROOM + step).any(axis=0))
     shapes = obstacles.take(near)
     wanted = _measure_wanted(before, list(goals), shapes, names, near)
-    for room in ROOMS:
+    for room in (ROOM, ROOM, 0.0):  # the last smoothing uses up the room
         guesses[:, 1:-1] += (guesses[:, :-2] + guesses[:, 2:] - 2.0 * guesses[:, 1:-1]) / 4.0
         guesses = _push(guesses, wanted + room, shapes)
     guesses = _push(guesses, wanted, shapes)
     _, distance = measure_offsets(guesses.reshape(-1, 2), shapes)
-    is_clear = (distance.reshape(wanted.shape) >= wanted - CLEAR).all(axis=2, keepdims=True)
+    is_clear = (distance.reshape(wanted.shape) >= wanted - 1e-12).all(axis=2, keepdims=True)
     guesses = np.where(is_clear, guesses, before)
     angles = [sweep(each[:, :, None] - shapes.centre) for each in (guesses, before)]
     apart = np.abs(angles[0] - angles[1]).max(axis=1, initial=0.0)

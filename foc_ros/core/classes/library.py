@@ -23,25 +23,17 @@ from foc_ros.core.solution import LEFT, RIGHT, Candidate
 from foc_ros.core.types import Array, HandState, Record
 
 from .guess import compute_path_lengths, timed
-from .names import name_course, named_obstacles
+from .names import find_names, name_course, take_near
 from .sides import find_path_sides
 
 NEAR = 0.02
 """Largest distance of an obstacle or a goal from its place in the demonstration [m]."""
-ASIDE = 0.1
-"""Largest distance of the hand from the demonstrated path [m]."""
 POINTS = 65
 """Number of points of a demonstrated path."""
-PARTS = 4
-"""Each segment of such a path is compared with the obstacles at so many points: these lie about 2 mm apart."""
 STEP_S, MOST_STATES = 0.05, 400
 """Time from one state of a recording to the next [s], and the largest number of states."""
 DIGITS = 6
 """Decimals of the coordinates: a micrometre is exact enough and keeps the file small."""
-STATE_DIGITS = 5
-"""Decimals of the states of recordings, which are many."""
-MOST = 2
-"""Number of recalled candidates that are solved at most, besides the `max_candidates` that the search finds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +98,7 @@ def record_demonstration(frame_id: str, path: Array, obstacles: Obstacles, state
     ids = tuple(sorted(sides))
     centre = obstacles.centre[[obstacles.ids.index(identity) for identity in ids]]
     passed = frame_id, ids, tuple([sides[identity] for identity in ids]), centre.round(DIGITS)
-    return Demonstration(*passed, evenly, None if states is None else states.round(STATE_DIGITS))
+    return Demonstration(*passed, evenly, None if states is None else states.round(5))  # there are many
 
 
 def is_same_demonstration(one: Demonstration, other: Demonstration) -> bool:
@@ -133,14 +125,16 @@ def recall_demonstrations(
     found: Sequence[Candidate],
     previous: Sequence[Candidate],
 ) -> tuple[Candidate, ...]:
-    """Return the found candidates and at most MOST demonstrated ones of other classes, in the order of their length.
+    """Return the found candidates and at most two demonstrated ones of other classes, in the order of their length.
 
     goals (g, 2) [m]; previous: the candidates of the previous prediction. A demonstrated path is moved to the present hand and
     goal. It is kept only if it still passes every obstacle on the side on which it did, and runs through none.
     """
     if not library:
         return tuple(found)
-    names = [sorted(ids) for ids in named_obstacles(hand.mean[:2], goals, obstacles, config.clearance, previous)]
+    near = take_near(obstacles, hand.mean[:2], goals)
+    is_named = find_names(hand.mean[:2], goals, near, config.clearance, previous).is_named
+    names = [sorted(near.ids[row] for row in np.flatnonzero(each).tolist()) for each in is_named]
     labels, recalled = {one.label for one in found}, []
     for demonstration in library:
         if not demonstration.matches(hand.frame_id, obstacles):
@@ -160,8 +154,13 @@ def recall_demonstrations(
             if label not in labels:
                 labels.add(label)
                 recalled.append(Candidate(label, goal, named, guess, float(compute_path_lengths(rest)[-1])))
-    recalled.sort(key=_rank)
-    return tuple(sorted([*found, *recalled[:MOST]], key=_rank)) if recalled else tuple(found)
+    if not recalled:
+        return tuple(found)
+
+    def rank(candidate: Candidate) -> tuple[float, str]:
+        return round(candidate.length, 9), candidate.label
+
+    return tuple(sorted([*found, *sorted(recalled, key=rank)[:2]], key=rank))
 
 
 def _name(goal: int, names: Sequence[str], sides: Mapping[str, int]) -> tuple[str, tuple[tuple[str, int], ...]]:
@@ -173,11 +172,11 @@ def _name(goal: int, names: Sequence[str], sides: Mapping[str, int]) -> tuple[st
 def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
     """Return the rest of a path from where it is nearest to the hand, with its ends moved to hand and goal (2,) [m].
 
-    The result is None if the hand is farther than ASIDE from the path, or at its end.
+    The result is None if the hand is farther than 0.1 m from the path, or at its end.
     """
     apart = np.hypot(*(path - hand).T)
     nearest = int(apart.argmin())
-    if apart[nearest] > ASIDE or nearest == len(path) - 1:
+    if apart[nearest] > 0.1 or nearest == len(path) - 1:
         return None
     rest = path[nearest:]
     share = np.linspace(0.0, 1.0, len(rest))[:, None]
@@ -187,7 +186,7 @@ def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
 
 def _is_free(path: Array, obstacles: Obstacles) -> bool:
     """Tell whether no point of a path lies in an obstacle, other than those that hold its first or its last point."""
-    share = np.arange(PARTS)[:, None] / PARTS
+    share = np.arange(4)[:, None] / 4  # points lie about 2 mm apart
     points = (path[:-1, None] + share * (path[1:] - path[:-1])[:, None]).reshape(-1, 2)
     _, distance = measure_offsets(np.vstack([points, path[-1:]]), obstacles)
     is_inside = distance < obstacles.radius
@@ -197,7 +196,3 @@ def _is_free(path: Array, obstacles: Obstacles) -> bool:
 def _is_near(points: Array, others: Array) -> bool:
     """Tell whether all points (n, 2) lie within NEAR of others (n, 2) [m]."""
     return bool((np.hypot(*(points - others).T) <= NEAR).all())
-
-
-def _rank(one: Candidate) -> tuple[float, str]:
-    return round(one.length, 9), one.label

@@ -22,14 +22,6 @@ from .graph import Rows
 from .outlines import Flags, Outlines, measure_gaps, outline_obstacles
 from .sides import compute_bearings, is_between
 
-MOST = 64
-"""Largest number of obstacles in names and graphs."""
-FAR_SIDE = 2.0
-"""An obstacle is out of the way if the path round its far side is longer than this times the straight line."""
-ENTER = 0.005
-"""An obstacle that was in no name to a goal enters the names only if it is this much within the bounds [m]."""
-NARROWER = 0.004
-"""A gap that a candidate went through stays open until it is this much, or the clearance, too narrow [m]."""
 OPEN = 1e-6
 """Width of a gap that is kept open [m]."""
 MIN_SIZE = 1e-6
@@ -57,35 +49,9 @@ def name_course(sides: Sequence[tuple[str, int]]) -> str:
     return ''.join([('+' if side == LEFT else '-') + identity for identity, side in sides])
 
 
-def named_obstacles(
-    hand: Array, goals: Array, obstacles: Obstacles, clearance: float, previous: Sequence[Candidate]
-) -> list[set[str]]:
-    """Return the ids of the obstacles that the names of the paths to each goal contain.
-
-    Parameters
-    ----------
-    hand, goals : Array
-        Positions (2,) and (g, 2) [m].
-    obstacles : Obstacles
-        The obstacles.
-    clearance : float
-        Distance that the hand needs from an obstacle [m].
-    previous : Sequence[Candidate]
-        The candidates of the previous prediction.
-
-    Returns
-    -------
-    list[set[str]]
-        Ids for each goal.
-    """
-    obstacles = take_near(obstacles, hand, goals)
-    names = find_names(hand, goals, obstacles, clearance, previous)
-    return [{obstacles.ids[row] for row in np.flatnonzero(is_named)} for is_named in names.is_named]
-
-
 def take_near(obstacles: Obstacles, hand: Array, goals: Array) -> Obstacles:
-    """Return the obstacles that names may contain and graphs consist of: those with the least detour, MOST of them."""
-    return cull_obstacles(obstacles, hand, goals, 0.0, MOST)
+    """Return the obstacles that names may contain and graphs consist of: the 64 with the least detour."""
+    return cull_obstacles(obstacles, hand, goals, 0.0, 64)
 
 
 def find_names(
@@ -96,11 +62,14 @@ def find_names(
     previous: Sequence[Candidate],
     objects: Sequence[str | None] = (),
 ) -> Names:
-    """Find out which obstacles the names contain; arguments as in `named_obstacles`, and the obstacle that each goal is.
+    """Find out which obstacles the names contain.
 
     An obstacle is named if the foot of some point of its polygon lies between hand and goal, and it either blocks the straight
     line or a path round its far side is short enough. As no other obstacle has an influence, a name stays the same if other
     obstacles appear, vanish or move.
+
+    hand (2,), goals (g, 2) [m]; clearance: distance that the hand needs from an obstacle [m]; previous: the candidates of the
+    previous prediction; objects: the id of the obstacle that each goal is.
     """
     sides = _tabulate_sides(obstacles, previous)
     radius = _keep_gaps_open(obstacles, np.maximum(obstacles.radius + clearance, MIN_SIZE), clearance, sides)
@@ -109,7 +78,7 @@ def find_names(
     slack = np.zeros((len(goals), len(obstacles)))
     goal_of = np.array([candidate.goal for candidate in previous], dtype=np.intp)
     for goal in {candidate.goal for candidate in previous if candidate.goal < len(goals)}:
-        slack[goal] = np.where(sides[goal_of == goal].any(axis=0), 0.0, ENTER)
+        slack[goal] = np.where(sides[goal_of == goal].any(axis=0), 0.0, 0.005)  # a new one has to be 5 mm within the bounds
     is_named = _find_named(outline_obstacles(obstacles, radius), obstacles, hand, goals, blocks, slack)
     return Names(radius, distance[0] <= radius, distance[1:] <= radius, blocks, is_named)
 
@@ -124,7 +93,8 @@ def _find_named(outlines: Outlines, obstacles: Obstacles, hand: Array, goals: Ar
     is_beside = is_between(polygons, corners, *ends, slack[goal, row])
     goal, row = goal[is_beside], row[is_beside]
     near, begin, end = outlines.take(row).shrink(scale[goal, row]), np.broadcast_to(hand, (len(row), 2)), goals[goal]
-    limit = FAR_SIDE * np.maximum(np.hypot(*(end - begin).T), MIN_SIZE) - slack[goal, row]
+    # an obstacle is out of the way if the path round its far side is longer than twice the straight line
+    limit = 2.0 * np.maximum(np.hypot(*(end - begin).T), MIN_SIZE) - slack[goal, row]
     is_named[goal, row] = near.cut(begin, end) | (_measure_far_side(near, begin, end) <= limit)
     return is_named
 
@@ -146,7 +116,7 @@ def _keep_gaps_open(obstacles: Obstacles, radius: Array, clearance: float, sides
     if not len(first):
         return radius
     missing = radius[first] + radius[second] - measure_gaps(obstacles)[0][first, second]
-    is_kept = (missing > -OPEN) & (missing < min(NARROWER, clearance))
+    is_kept = (missing > -OPEN) & (missing < min(0.004, clearance))  # narrower gaps are closed
     reduced = radius.copy()
     np.minimum.at(reduced, first[is_kept], radius[first[is_kept]] - (missing[is_kept] / 2.0 + OPEN))
     return reduced

@@ -21,10 +21,6 @@ from foc_ros.core.types import Array
 
 Flags = NDArray[np.bool_]
 
-ARC = np.pi / 6.0
-"""Largest change of direction from one edge of an outline to the next [rad]: 12 edges or more go round a circle."""
-STAND_OUT = 0.001
-"""Largest distance of an outline from its shape [m]."""
 NARROW = 0.04
 """An outline stands out of its shape by less than this share of the radius; a gap is narrow below this share of both radii."""
 SAME = 1e-7
@@ -200,7 +196,8 @@ def _trace(vertices: bytes, radius: float, touching: bytes) -> tuple[Array, Arra
     edges = edges[np.hypot(*edges.T) > GRAZE]
     directions = np.sort(np.arctan2(-edges[:, 0], edges[:, 1])) if len(edges) else np.zeros(1)
     wide = np.diff(directions, append=directions[0] + 2.0 * np.pi)
-    widest = min(ARC, 2.0 * np.arccos(radius / (radius + STAND_OUT)))
+    # 12 edges or more go round a circle, and the outline stands out of the shape by 1 mm at most
+    widest = min(np.pi / 6.0, 2.0 * np.arccos(radius / (radius + 0.001)))
     parts = np.maximum(np.ceil(wide / widest - SAME), 1.0).astype(int)
     arcs = [first + turn * np.arange(k) / k for first, turn, k in zip(directions, wide, parts, strict=True)]
     angles = np.sort(np.mod(np.concatenate([*arcs, np.frombuffer(touching)]), 2.0 * np.pi))

@@ -29,8 +29,6 @@ from .sides import find_offsets, sweep
 Rows = NDArray[np.int64]
 WALL = -1
 """The row of an obstacle that is in none."""
-NO_OBSTACLES = np.zeros(0, dtype=np.intp)
-"""Rows of no obstacles."""
 
 
 def find_direction(start: Array, goals: Array) -> Array:
@@ -88,7 +86,7 @@ class Decisions(NamedTuple):
     next_gap: NDArray[np.intp]
     way: NDArray[np.intp]
     woven: NDArray[np.intp]
-    next_row: NDArray[np.intp] = NO_OBSTACLES
+    next_row: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
 
 
 def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArray[np.int8]:

@@ -28,12 +28,6 @@ STATES, STATES_PER_CANDIDATE = 1000, 300
 """Number of states that the search for one goal may look at; a few dozen are enough for four candidates."""
 OFF_HAND = 1e-9
 """A goal that lies on the hand is moved away by this much [m]."""
-DIGITS = 9
-"""Paths rank by their length to so many decimals: rounding errors do not decide between equal lengths."""
-FINENESS = 257
-"""Number of points at which a path is compared with obstacles that are not in the graph."""
-GRAZE = 1e-6
-"""Depth of a path in such an obstacle that does not count [m]."""
 
 
 class PathClass(NamedTuple):
@@ -110,11 +104,12 @@ class SearchScene:
         ids = [self._near.ids[row] for row in rows[named].tolist()]
         order = sorted(range(len(ids)), key=ids.__getitem__)
         query = PathQuery(graph, hand, lines, rest, named, self._velocity, self._max_states, deadline)
+        # paths rank by their length to the nanometre: rounding errors do not decide between equal lengths
         for tied in find_shortest_paths(query, self.notes):
             classes = []
             for key, points, swept in tied:
                 sides = tuple([(ids[row], LEFT if swept[row] < 0.0 else RIGHT) for row in order])
-                classes.append(PathClass(round(key, DIGITS), f'goal{goal}:{name_course(sides)}', goal, sides, points))
+                classes.append(PathClass(round(key, 9), f'goal{goal}:{name_course(sides)}', goal, sides, points))
             yield from [each for each in sorted(classes) if not self._is_left_out(each.points)]
 
     def make_candidates(
@@ -147,9 +142,9 @@ class SearchScene:
         if not len(self._others):
             return False
         along = compute_path_lengths(points)
-        at = np.linspace(0.0, along[-1], FINENESS)
+        at = np.linspace(0.0, along[-1], 257)
         _, distance = measure_offsets(np.column_stack([np.interp(at, along, axis) for axis in points.T]), self._others)
-        is_met = bool((distance < self._others.radius + self._clearance - GRAZE).any())
+        is_met = bool((distance < self._others.radius + self._clearance - 1e-6).any())
         self.notes['left_out'] += is_met
         return is_met
 

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import find_offset, tabulate_edges
+from foc_ros.core.obstacles.geometry import TURN, find_offset, tabulate_edges
 from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.prediction import PredictedCandidate
 from foc_ros.core.solution import LEFT, RIGHT, Solution
 from foc_ros.core.types import Array, Record
-
-TURN = 2.0 * np.pi
 
 
 def count_crossings(begin: Array, end: Array) -> NDArray[np.int8]:

@@ -42,7 +42,6 @@ from foc_ros.core.config import EstimatorConfig
 from foc_ros.core.errors import InputError
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, SampleStatus, as_readonly
 
-ONSET_STDDEVS = 3.0
 JUMP_STDDEVS = 10.0
 JUMP_SPEED = 5.0
 """Change of velocity between two samples that no hand has [m/s]."""
@@ -183,7 +182,7 @@ def _update_movement(
     """Begin, continue or end a movement; return stamp and position (2,) of its onset, None at rest."""
     onset_ns, onset_position, speed = state.onset_ns, state.onset_position, math.hypot(mean[2], mean[3])
     if onset_ns is None:
-        if speed <= max(config.onset_speed, ONSET_STDDEVS * math.sqrt(covariance[2, 2])):
+        if speed <= max(config.onset_speed, 3.0 * math.sqrt(covariance[2, 2])):
             return None, None
         onset_ns, onset_position = stamp_ns, mean[:2]
     elif speed < config.onset_speed / 2.0:

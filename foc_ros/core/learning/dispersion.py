@@ -10,7 +10,7 @@ time t ahead, by a factor that leads from `covariance.near` = f now to `covarian
 
 A hand that is on its way follows a plan closely. How it arrives, when, and what it does then are known less well, however near
 the end is. A hand at rest may begin to move at any time, and what holds for one on its way holds less for it: f counts with the
-power `REST_SHARE`.
+power 2/3.
 
 Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reached the times h of `HORIZONS_S`. With its position
 x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
@@ -45,8 +45,6 @@ HORIZONS_S = (0.25, 0.5, 1.0)
 """Times ahead at which predicted positions are judged [s]."""
 SAMPLE_S = 0.1
 """Interval at which predictions are judged [s]."""
-REST_SHARE = 2.0 / 3.0
-"""Power of the factor for now for a hand at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +164,7 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig, *,
     if config.near == config.far == 1.0:
         return candidate
     if at_rest:
-        config = replace(config, near=config.near**REST_SHARE)
+        config = replace(config, near=config.near ** (2.0 / 3.0))
     solution = candidate.solution
     covariance = solution.covariance * interpolate_factors(np.linspace(0.0, 1.0, len(solution.mean)), config)[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))

@@ -56,10 +56,6 @@ AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
 SAMPLE_S = 0.1
 """Interval at which states of a movement are judged [s]."""
-MOST_GOALS = 8
-"""Number of goals with which a state is judged at most: those that the hand has come nearer to most."""
-SAME_GOAL_M = 0.05
-"""Distance within which a goal is the same one from one state to the next [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +89,9 @@ class PresentMovement(Record):
         return replace(followed, waiting=(*followed.waiting, hand))
 
     def match(self, goals: Array) -> PresentMovement:
-        """Return the movement with other goals (g, 2) [m], which keep the errors of those at the same places."""
+        """Return the movement with other goals (g, 2) [m], which keep the errors of those within 50 mm of them."""
         distances = np.linalg.norm(goals[:, None] - self.goals, axis=-1)
-        rows, is_same = distances.argmin(axis=1), distances.min(axis=1) <= SAME_GOAL_M
+        rows, is_same = distances.argmin(axis=1), distances.min(axis=1) <= 0.05
         errors, moved = self.errors[rows] * is_same[:, None, None], self.moved[rows] * is_same
         return replace(self, goals=goals, errors=as_readonly(errors), moved=as_readonly(moved))
 
@@ -115,7 +111,7 @@ class PresentMovement(Record):
         ahead_s = min(AHEAD_S, float(seconds[-1]))
         reached = np.array([np.interp(ahead_s, seconds, [each.mean[axis] for each in path]) for axis in (0, 1)])
         left, left_before = (np.linalg.norm(self.goals - each, axis=1) for each in (reached, hand.mean[:2]))
-        rows = np.sort((left - left_before).argsort(kind='stable')[:MOST_GOALS])
+        rows = np.sort((left - left_before).argsort(kind='stable')[:8])  # the goals that the hand has come nearer to most
         goals, errors, moved = self.goals[rows], self.errors.copy(), self.moved.copy()
         for row, scaled in enumerate(_scale_all(config)):
             times = np.array([estimate_times_to_go(hand, goals, each) for each in scaled]).T

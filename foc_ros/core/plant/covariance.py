@@ -5,7 +5,7 @@
 None of these parts belongs to the chance constraint: the operator knows the own hand and intention better than we do, and plans
 margins for motor noise only. A prediction, however, is as uncertain as
 
-- the state that it starts from, whose error the operator corrects on the way (`replanning`);
+- the state that it starts from, whose error the operator corrects on the way (`models`);
 - the control between the plans: unplanned control noise (`foc.process_noise`), which is corrected likewise;
 - the end of the movement. Movements end beside the marked goal, by `foc.endpoint_stddev` along each axis, and earlier or later
   than the expected T, by `duration.spread` T. A plan that ends at T + delta has at T still to move by delta X'(T), with X' the
@@ -13,7 +13,7 @@ margins for motor noise only. A prediction, however, is as uncertain as
 
       cov(X(T)) = endpoint_stddev^2 diag(1, 1, 0, ...) + (spread T)^2 X'(T) X'(T)',
 
-  and with least effort they displace the state at step t by K_t (`replanning`) times as much. From rest to rest over a distance
+  and with least effort they displace the state at step t by K_t (`models`) times as much. From rest to rest over a distance
   L, with s = t / T, the standard deviations are (10 s^3 - 15 s^4 + 6 s^5) endpoint_stddev and 30 L spread s^3 (1 - s)^2. Where
   the goal is passed at any velocity, the effect of the duration on this velocity is neglected.
 - the beginning. The plan for a hand at rest begins now, but the hand begins after an unknown time d. Given only the mean of d,

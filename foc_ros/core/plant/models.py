@@ -3,7 +3,7 @@
 """Plant models: what the predictor has to know of the plant that the parameter `foc.plant` names.
 
 The estimator follows position, velocity and acceleration of the hand, whatever the plant. A plant model takes the part of this
-estimate that is its own state, and says how errors of the state evolve when the operator corrects them (`replanning`).
+estimate that is its own state, and says how errors of the state evolve when the operator corrects them.
 
 What else depends on the plant:
 
@@ -11,6 +11,22 @@ What else depends on the plant:
   durations describe the hand and are the same for every plant.
 - `foc.process_noise` is white noise of the control. For the triple integrator the covariance that it adds in a step is exact; for
   other plants the noise is held constant over a step.
+
+**Errors under replanning.**
+The operator sees the hand and plans anew from where it is: whatever the true state, the plan ends at the goal. The control
+u = R_N^+ d moves the end by d with least effort, and moves the state at step t by K_t d, K_t = R_t R_N^+. An error e of the
+initial state would move the end by A^N e. The operator corrects this, so that the error at step t is (A^t - K_t A^N) e, and zero
+at step N. Without the correction, the uncertainty of the acceleration would grow with t^2 over the whole horizon, although the
+hand of a seeing operator does not.
+
+Unplanned control noise, white and of unit spectral density, adds a covariance G to the state in every step (for jerk: the
+Gramian of the Kalman filter), and is corrected from then on like any other error:
+
+    D(t) = sum_{k < t} E_{N-k-1}(t - k - 1) G E_{N-k-1}(t - k - 1)',
+
+with E_m the map of an error m steps before the goal. For jerk, this is t^5 / 20 at first, as in the filter's model, and small at
+the goal. Where the goal does not fix the velocity, errors of the velocity are not corrected: A^N and R_N have only the rows of
+the other states.
 """
 
 from __future__ import annotations
@@ -36,11 +52,41 @@ from .plants import (
     condense,
     discretise_damped_mass,
     discretise_triple_integrator,
+    find_states_at_goal,
 )
-from .replanning import compute_error_map, compute_goal_map, compute_process_covariance
 
 HAND_STATES = 6
 """x, y, vx, vy, ax, ay of the estimator."""
+
+
+def compute_goal_map(horizon: Horizon, passing: bool = False) -> Array:
+    """Return K_t at steps 0..N, (N + 1, n, n): how a displaced state at the goal displaces the plan of least effort to it.
+
+    passing: the goal does not fix the velocity; the columns of states that the goal does not fix are zero.
+    """
+    fixed = find_states_at_goal(len(horizon.powers[-1]), passing)
+    last = horizon.last[fixed]
+    # the rows have different units (m, m/s, ...), so they are scaled to unit length first
+    scale = 1.0 / np.sqrt((last**2).sum(axis=1))
+    goal_map = np.zeros_like(horizon.powers)
+    goal_map[1:, :, fixed] = horizon.response @ (np.linalg.pinv(scale[:, None] * last) * scale)
+    return goal_map
+
+
+def compute_error_map(horizon: Horizon, passing: bool = False) -> Array:
+    """Return what remains of an initial error at steps 0..N, (N + 1, n, n); passing: the goal does not fix the velocity."""
+    error_map: Array = horizon.powers - compute_goal_map(horizon, passing) @ horizon.powers[-1]
+    return error_map
+
+
+def compute_process_covariance(plant: Plant, steps: int, added: Array, passing: bool) -> Array:
+    """Return D at steps 0..N, (N + 1, n, n), for a covariance `added` (n, n) that each step adds and the operator corrects."""
+    covariance = np.zeros((steps + 1, *added.shape))
+    for step in range(steps):
+        left = steps - step - 1
+        error_map = compute_error_map(condense(plant, left), passing) if left else np.eye(len(added))[None]
+        covariance[step + 1 :] += error_map @ added @ error_map.swapaxes(1, 2)
+    return covariance
 
 
 class PlantModel:
@@ -95,7 +141,7 @@ class PlantModel:
         return noise
 
     def compute_goal_map(self, dt: float, steps: int, passing: bool) -> Array:
-        """Return K_t, (N + 1, n, n): how a displaced state at the goal displaces the states before it (`replanning`)."""
+        """Return K_t, (N + 1, n, n): how a displaced state at the goal displaces the states before it."""
         unit, scale = self.find_unit(dt)
         goal_map: Array = _find_goal_map(self, unit, steps, passing) * (scale[:, None] / scale)
         return goal_map

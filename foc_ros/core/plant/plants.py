@@ -184,13 +184,10 @@ def variance_weights(states: Array, terminal: Array, stage: Array) -> Array:
 def apply_impulse_response(responses: Array, control: Array) -> Array:
     """Return the q quantities at steps 0..N, (q, N + 1), from responses (q, 2, N + 1) and a stacked control (2N,)."""
     quantities, channels, times = responses.shape
-    moved: Array = responses.reshape(quantities, -1) @ _shift_control(control, channels, times)
-    return moved
-
-
-def _shift_control(control: Array, channels: int, times: int) -> Array:
-    """Return the control at step s - m for each channel and each m, s = 0..N, (2 (N + 1), N + 1); zero before step 0."""
+    # the control at step s - m for each channel and each m, s = 0..N, (2 (N + 1), N + 1); zero before step 0
     padded = np.zeros((channels, 2 * times - 1))
     padded[:, times - 1 : -1] = control.reshape(channels, -1)
     row, item = padded.strides
-    return as_strided(padded[:, times - 1 :], (channels, times, times), (row, -item, item)).reshape(channels * times, times)
+    shifted = as_strided(padded[:, times - 1 :], (channels, times, times), (row, -item, item))
+    moved: Array = responses.reshape(quantities, -1) @ shifted.reshape(channels * times, times)
+    return moved

@@ -51,14 +51,10 @@ class Response:
 
     def at(self, times: Array) -> Array:
         """Return the response of x and y at times (q,) in steps to the stacked control, (q, 2, 2N)."""
-        step, weight = self.find_weights(times)
+        step, share = self.locate(times)
+        weight = hermite(share)
         response: Array = (weight[:, None] @ self.within.reshape(self.steps, 4, -1)[step])[:, 0]
         return response.reshape(len(times), 2, self.within.shape[-1])
-
-    def find_weights(self, times: Array) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.intp]], Array]:
-        """Return the step (...) in which each time lies, and the weights (..., 4) of what is known at both ends of it."""
-        step, share = self.locate(times)
-        return step, hermite(share)
 
     def locate(self, times: Array) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.intp]], Array]:
         """Return the step in which each time lies, and the share of it that has passed."""
@@ -98,18 +94,14 @@ def _multiply(one: Array, other: Array) -> Array:
     return np.stack((one[:, 0] * other[:, 0], one[:, 1] * other[:, 1], mixed), axis=1)
 
 
-LEAST_POINTS = 50
-"""Number of points from which a curve looks smooth."""
-
-
 def compute_curve(path: Array, velocity: Array, dt: float) -> Array:
-    """Return points (m, 2) [m] on the mean path, m > LEAST_POINTS: the positions of the steps and, where needed, some between.
+    """Return m > 50 points (m, 2) [m] on the mean path, which looks smooth then: the steps and, where needed, some between.
 
     path, velocity (N + 1, 2) [m, m/s]: at steps dt [s] apart. Equal parts of a step lie between two points. A path of more steps,
     or of one point, is returned as it is.
     """
     steps = len(path) - 1
-    parts = -(-LEAST_POINTS // max(steps, 1))
+    parts = -(-50 // max(steps, 1))
     if steps < 1 or parts == 1:
         return path
     return sample_curve(path, velocity, dt, parts)
