@@ -22,7 +22,6 @@ PLANES = ('xy', 'xz', 'yz')
 ARRIVALS = ('rest', 'passing')
 ONLINE = 'online'
 ADAPTATIONS = ('none', ONLINE)
-BOUNDS = ('cantelli', 'gaussian')
 MOST_CANDIDATES = 64
 """Largest number of homotopy classes that are solved in one prediction."""
 WIDENS = 'widens the predicted covariance, not the chance constraint'
@@ -68,7 +67,7 @@ class FocConfig(Group):
     bound: str = _p(
         'cantelli',
         'what turns eta into standard deviations: it holds for any distribution, or for a Gaussian one',
-        choices=BOUNDS,
+        choices=('cantelli', 'gaussian'),
     )
     risk: str = _p(
         'step', 'what eta is about: each obstacle at each step, or all obstacles along the whole path', choices=('step', 'path')

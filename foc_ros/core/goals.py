@@ -6,9 +6,10 @@ The effort of a movement falls with the fifth power of its duration, and a farth
 a hand that moves fast would seem to go to the farthest goal. With T_i the time to go to goal i and v the speed of the hand, the
 goals are therefore compared for the common time
 
-    T = max(`LEAST_COMMON_S`, min_i min(T_i, `HALF_WAY` D_i / v)),
+    T = max(0.5 s, min_i min(T_i, 1.875 D_i / v)),
 
-with the distance D_i of the goal: the second term is what a hand half way of a minimum-jerk movement has left. M_i(T) is the
+with the distance D_i of the goal: the last term is what a hand half way of a minimum-jerk movement has left, and the first one
+what a hand that is at one goal takes to go to another. M_i(T) is the
 least integral of squared jerk that brings the hand to rest at goal i at T. The costs of all candidates to a goal get the factor
 M_i(T) / J_i, with the cost J_i of the best one. Ratios between candidates to one goal stay as they are. Obstacles decide on the
 way, and not on the goal (`likelihood.decide_goals`): people want an object that stands behind others no less.
@@ -39,10 +40,6 @@ from .prediction import PredictedCandidate
 from .safety_preference import COST_FLOOR
 from .types import Array, HandState
 
-LEAST_COMMON_S = 0.5
-"""Least common time: a hand that is at one goal may still go to another, and this takes a movement [s]."""
-HALF_WAY = 1.875
-"""Time left half way of a minimum-jerk movement, relative to remaining distance over speed there."""
 LEAST_SPREAD_M = 1e-3
 """Least spread of end points, and least distance, with which probabilities of goals are computed [m]."""
 
@@ -94,7 +91,7 @@ def find_common_time(hand: HandState, goals: Array, durations_s: Sequence[float]
     """Return the time to go for which goals (g, 2) [m] with times to go [s] are compared [s]."""
     speed, nearest = math.hypot(*hand.mean[2:4]), float(np.hypot(*(goals - hand.mean[:2]).T).min())
     shortest = min(durations_s)
-    return max(LEAST_COMMON_S, min(shortest, HALF_WAY * nearest / speed) if speed > 0.0 else shortest)
+    return max(0.5, min(shortest, 1.875 * nearest / speed) if speed > 0.0 else shortest)
 
 
 def find_other_share(hand: HandState, goals: Array, durations_s: Sequence[float], prior: float, spread_m: float) -> float:

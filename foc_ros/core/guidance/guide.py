@@ -48,8 +48,6 @@ from .paths import (
     transfer_progress,
 )
 
-SLOW = 0.02
-"""Speed [m/s] from which on the direction of the hand counts more than that of a path as the one along the path."""
 SHARPNESS = 3.0
 """Exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads."""
 LATE_PERIODS = 2.0
@@ -247,7 +245,8 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
     places = paths.locate(ahead)
     stiffness = compute_stiffness(paths.interpolate(paths.covariances, places), settings)
     if settings.mode == 'path':
-        stiffness = project_out(stiffness, normalize(given.velocity + SLOW * paths.find_tangents(progress)))
+        # from 20 mm/s on, the direction of the hand counts more than that of the path
+        stiffness = project_out(stiffness, normalize(given.velocity + 0.02 * paths.find_tangents(progress)))
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
     errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
     shares = () if followed.prediction is None else (followed.prediction.unknown, followed.prediction.other)

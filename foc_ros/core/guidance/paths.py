@@ -24,8 +24,6 @@ from foc_ros.core.types import Array, Record
 
 WINDOW_M = 0.02
 """Length of path [m] on both sides of the progress within which the nearest point is sought."""
-CORRECTION_S = 0.05
-"""Time constant with which the progress approaches the nearest point [s]."""
 
 
 class Places(NamedTuple):
@@ -119,7 +117,7 @@ def advance_progress(paths: GuidePaths, progress: Array, position: Array, veloci
     """Return the progress (c,) [m] a time `dt` [s] later.
 
     It moves with the velocity v of the hand along the tangent u, and approaches the point s* that is nearest to the hand within
-    `WINDOW_M` with the time constant T of `CORRECTION_S`, so that it is continuous:
+    `WINDOW_M` with the time constant T = 0.05 s, so that it is continuous:
 
         s <- s + u . v dt,    s <- s + (1 - exp(-dt / T)) (s* - s).
     """
@@ -128,7 +126,7 @@ def advance_progress(paths: GuidePaths, progress: Array, position: Array, veloci
         np.maximum(progress + dt * np.minimum(np.maximum(paths.find_tangents(progress) @ velocity, -1e3), 1e3), 0.0), ends
     )
     nearest = paths.find_nearest(np.broadcast_to(position, (len(moved), 2)), moved - WINDOW_M, moved + WINDOW_M)
-    advanced: Array = np.minimum(np.maximum(moved + (1.0 - np.exp(-dt / CORRECTION_S)) * (nearest - moved), 0.0), ends)
+    advanced: Array = np.minimum(np.maximum(moved + (1.0 - np.exp(-dt / 0.05)) * (nearest - moved), 0.0), ends)
     return advanced
 
 

@@ -29,10 +29,6 @@ CONSTANTS = {
     'fitts': {'fitts_a_s': 1.0, 'fitts_b_s': 1.0},
 }
 """By model, the constants that determine durations, each with its power in a factor on all durations."""
-LEAST_S, MOST_S = 0.3, 10.0
-"""Limits of the time to go [s]: near its goal a hand corrects for about that long; plans beyond the other limit say nothing."""
-PACE_AFTER = 0.3
-"""Share of the expected duration after which the present speed counts."""
 CHANGE_S = 0.25
 """Time in which the time to go grows, or falls faster than time goes by, by a factor of e at most [s]."""
 
@@ -68,9 +64,10 @@ def is_passing(config: DurationConfig) -> bool:
 
 
 def estimate_times_to_go(hand: HandState, goals: Array, config: DurationConfig) -> list[float]:
-    """Return the time to go [s] to each goal (g, 2) [m], between `LEAST_S` and `MOST_S`.
+    """Return the time to go [s] to each goal (g, 2) [m].
 
-    During a movement this is the expected duration from its onset, less the time since then. After `PACE_AFTER` of it, all
+    It is 0.3 s at least, for which a hand corrects near its goal, and 10 s at most: plans beyond that say nothing.
+    During a movement it is the expected duration from its onset, less the time since then. After 0.3 of it, all
     expected durations are multiplied by the smallest factor with which, for one of the goals, the present speed suffices for the
     remaining distance. At rest it is the expected duration from here.
     """
@@ -86,8 +83,8 @@ def estimate_times_to_go(hand: HandState, goals: Array, config: DurationConfig) 
         factors = [
             (since_s + distance / speed) / duration
             for distance, duration in zip(distances, whole, strict=True)
-            if since_s >= PACE_AFTER * duration
+            if since_s >= 0.3 * duration
         ]
         factor = max(1.0, min(factors, default=1.0))
         expected = [factor * duration - since_s for duration in whole]
-    return [min(max(each, LEAST_S), MOST_S) for each in expected]
+    return [min(max(each, 0.3), 10.0) for each in expected]

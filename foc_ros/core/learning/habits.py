@@ -12,9 +12,9 @@ If reaches to a goal are Poisson events, w_i is the posterior mean of their rate
 ratio is a gamma distribution with the mean 1 and the variance c.
 
 Two goals are the same if each is the only goal in the obstacle with the same id. Goals outside of obstacles are the same if they
-are at the same place.
+lie within 20 mm of each other.
 
-Reaches are expected to end at the mean displacement from their goal of the n earlier ones, times n / (n + `PRIOR_REACHES`).
+Reaches are expected to end at the mean displacement from their goal of the n earlier ones, times n / (n + 3).
 """
 
 from __future__ import annotations
@@ -33,11 +33,6 @@ from foc_ros.core.scene import Scene
 from foc_ros.core.types import Array, HandState, Record
 
 from .movements import find_goal_at_end
-
-SAME_GOAL_M = 0.02
-"""Distance within which a goal outside of obstacles is the one of before [m]."""
-PRIOR_REACHES = 3
-"""Number of reaches as many as which it counts that they should end at their goals."""
 
 
 class KnownGoal(NamedTuple):
@@ -103,7 +98,7 @@ class Habits(Record):
 
     def find_ends(self, goals: Array) -> Array:
         """Return where reaches to goals (g, 2) [m] are expected to end, (g, 2) [m]."""
-        return goals + self.missed / (self.reaches + PRIOR_REACHES)
+        return goals + self.missed / (self.reaches + 3)
 
     def _end(self, reach: Reach, beta: float) -> Habits:
         """Return the habits after a reach, which counts if it ended at a goal."""
@@ -126,7 +121,7 @@ class Habits(Record):
         """Return what is known of a goal, nothing where it is new."""
         same = (each for each in self.known if each.name == name)
         if name is None:
-            same = (each for each in same if math.dist(each.place, place) <= SAME_GOAL_M)
+            same = (each for each in same if math.dist(each.place, place) <= 0.02)
         return min(same, key=lambda each: math.dist(each.place, place), default=KnownGoal(name, place))
 
 

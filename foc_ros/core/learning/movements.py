@@ -117,8 +117,6 @@ class Movements(Record):
         return record_demonstration(hand.frame_id, np.vstack([path, goals[goal]]), self.scene.obstacles(hand.stamp_ns), kept)
 
 
-REMAINING_SHARE = 0.25
-"""A movement that leaves no more than this share of its first distance to a goal has covered the distance."""
 AT_GOAL_M = 0.05
 """A path that ends no farther from a goal than this ends at it [m]."""
 
@@ -148,6 +146,6 @@ def find_goal_at_end(positions: Array, goals: Array) -> tuple[int, float]:
 
 
 def has_covered_distance(positions: Array, goal: Array) -> bool:
-    """Tell whether a path (m, 2) [m] came to within REMAINING_SHARE of its first distance from a goal (2,) [m]."""
+    """Tell whether a path (m, 2) [m] came to within a quarter of its first distance from a goal (2,) [m]."""
     distance = np.hypot(*(positions - goal).T)
-    return bool(distance.min() <= REMAINING_SHARE * distance[0])
+    return bool(distance.min() <= 0.25 * distance[0])

@@ -11,7 +11,7 @@ the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the hand 
 A movement that has covered most of its distance to a goal counts with c = 1. In the present one, c is the distance of the hand
 from the onset relative to that of the goal, at most 1, and the goal is the one for which the least loss is smallest.
 
-With sigma of `duration.spread`, c of `PRECISION` and w of `OTHER_ARRIVAL` for the arrival that `duration.arrival` does not name,
+With sigma of `duration.spread`, c of `PRECISION` and w = 3 nat for the arrival that `duration.arrival` does not name,
 the posterior of arrival and factor is
 
     log P = -(log f / sigma)^2 / 2 - w - c sum l_f.
@@ -50,8 +50,6 @@ FACTORS = as_readonly(np.exp(LOG_FACTORS))
 """Factors that are judged."""
 PRECISION = 31.0
 """By how much the logarithm of the probability falls per unit of the loss of a movement."""
-OTHER_ARRIVAL = 3.0
-"""By how much the logarithm of the probability of another arrival than that of the parameters is smaller [nat]."""
 AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
 SAMPLE_S = 0.1
@@ -160,7 +158,7 @@ class Pace(Record):
         posterior = prior.add(-PRECISION * self.losses)
         if self.movements:
             is_other = np.array([[each != config.arrival] for each in ARRIVALS])
-            row = int(posterior.add(-OTHER_ARRIVAL * is_other).weights().sum(axis=1).argmax())
+            row = int(posterior.add(-3.0 * is_other).weights().sum(axis=1).argmax())
         if self.present is not None:
             posterior = posterior.add(-PRECISION * self.present.compute_losses())
         return ARRIVALS[row], float(np.exp(posterior.given(row).mean()[0]))

@@ -18,10 +18,10 @@ the goal, and as n_1 = `PRIOR_COUNT_BEYOND` for the way; the recordings are obse
 with the p_G and p_W of the model in the fractions p_W / p_G and p_i / p_W.
 
 The path of a class is pooled with the recordings that take its gap in the next row, each up to where it passes an obstacle on
-another side than the class. If this path leaves the class or enters an obstacle, only the recordings of the
-class count, and if that one does so too, the path stays that of the plan. Effort and eta are always those of the plan. Without
-recordings near the hand, all is the model. Recordings of the running program change the likelihoods of goals and the paths only,
-unless `experience.learning` is `online`: people vary their ways between obstacles more than where they go.
+another side than the class. If this path leaves the class or enters an obstacle, only the recordings of the class count, and if
+that one does so too, the path stays that of the plan. Effort and eta are always those of the plan. Without recordings near the
+hand, all is the model. Recordings of the running program change the likelihoods of goals and the paths only, unless
+`experience.learning` is `online`: people vary their ways between obstacles more than where they go.
 
 **Pooled paths.**
 The recordings e that pass the next row as a candidate does, displaced so that they begin at the hand, are at a time t from now at

@@ -5,7 +5,8 @@
 The footprint of an obstacle is a range of progress, the coordinate along the line from the hand to the goal: whatever way leads
 around the other obstacles, the hand has about the progress of the free movement. An obstacle is cleared if the band of predicted
 heights is above it, or below it, during the whole time in which the hand has the progress of the footprint. The footprint is
-longer than the obstacle by `SLACK` on both sides, because a way around obstacles has not quite the progress of the free movement.
+longer than the obstacle by 0.45 of the distance to the goal on both sides, because a way around obstacles has not quite the
+progress of the free movement.
 Obstacles beyond the goal are judged as if they were at the goal, and those behind the hand as if they were at the hand.
 """
 
@@ -50,10 +51,6 @@ def cull_obstacles(obstacles: Obstacles, hand: Array, goals: Array, duration_s: 
     return obstacles.take(np.sort(kept))
 
 
-SLACK = 0.45
-"""Part of the distance to the goal by which a footprint is longer on both sides."""
-
-
 def find_cleared(obstacles: Obstacles, hand: Array, goal: Array, progress: Array, band: Array, dt: float) -> NDArray[np.bool_]:
     """Return which obstacles the hand passes above or below on its way to a goal, (n,).
 
@@ -75,7 +72,7 @@ def find_cleared(obstacles: Obstacles, hand: Array, goal: Array, progress: Array
     corners = obstacles.vertices @ direction
     times = dt * np.arange(len(progress))[:, None]
     centre = (obstacles.centre - hand) @ direction + times * (obstacles.velocity @ direction)
-    reach = obstacles.radius + SLACK * distance
+    reach = obstacles.radius + 0.45 * distance
     near = np.minimum(centre + corners.min(axis=1) - reach, progress.max())
     far = np.maximum(centre + corners.max(axis=1) + reach, progress.min())
     behind, ahead = progress[:, None] < near, progress[:, None] > far
