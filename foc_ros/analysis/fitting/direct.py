@@ -55,7 +55,7 @@ POSITION_STDDEV, JERK_DENSITY = 'estimator.position_stddev', 'estimator.jerk_den
 FADING = 'estimator.acceleration_time_s'
 FADING_TIMES_S = (0.0, *np.geomspace(0.01, 0.5, 60).tolist())
 """Times that are tried; 0: the acceleration lasts."""
-CONSTANTS = {model: {f'duration.{name}': power for name, power in powers.items()} for model, powers in MODEL_CONSTANTS.items()}
+CONSTANTS = {model: tuple(f'duration.{name}' for name in names) for model, names in MODEL_CONSTANTS.items()}
 """By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""
@@ -197,8 +197,7 @@ def find_samples(hand: RecordedHand, config: Config) -> list[tuple[HandState, Ar
 def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the constants of the configured model of duration."""
     samples = [moving for hand in hands if (moving := find_samples(hand, config))]
-    powers = CONSTANTS[config.duration.model]
-    names, exponents = tuple(powers), np.array(list(powers.values()))
+    names = CONSTANTS[config.duration.model]
     if not samples:
         return Findings(undetermined=dict.fromkeys(names, 'no recording has a movement that ends near a goal'))
     given = np.array([flatten(config)[name] for name in names], dtype=float)
@@ -212,14 +211,14 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
         ]
         return np.array([np.mean(each) for each in errors])
 
-    tried = [given * factor**exponents for factor in FACTORS]
+    tried = [given * factor for factor in FACTORS]
     errors = np.array([compute_errors(each) for each in tried])
     settings = [dict(zip(names, each.tolist(), strict=True)) for each in tried]
     _, undetermined = SettingTable.from_errors(errors.T, settings).determine(settings[FACTORS.index(1.0)])
     if undetermined:
         return Findings(undetermined=undetermined)
     best, found = _find_best_factor(errors), Findings()
-    value = given * best**exponents
+    value = given * best
     if len(names) > 1:
         distances = np.array([np.hypot(*(each[0][1] - each[0][0].onset_position)) for each in samples])  # type: ignore[operator]
         deviation_bits = float(np.log2(distances / config.duration.target_width + 1.0).std())
@@ -232,9 +231,8 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
                 'their ratio is kept'
             )
     factors = np.percentile(resample(lambda rows: _find_best_factor(errors[:, rows]), errors.shape[1]) / best, CENTRAL)
-    for name, each, power in zip(names, value.tolist(), exponents, strict=True):
-        resampled = each * factors**power
-        found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, each), resampled, 'time to go')
+    for name, each in zip(names, value.tolist(), strict=True):
+        found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, each), each * factors, 'time to go')
     return found
 
 

@@ -14,7 +14,7 @@ stays unless another one is better by more than chance.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -52,8 +52,7 @@ Key = tuple[str, int]
 
 def make_noise_settings(config: Config) -> list[Config]:
     """Return the configuration, and it with other noise."""
-    powers = {'foc.noise_x': 1.0, 'foc.noise_y': 1.0}
-    return [config, *(_scale(config, powers, factor) for factor in NOISES)]
+    return [config, *(_scale(config, ('foc.noise_x', 'foc.noise_y'), factor) for factor in NOISES)]
 
 
 def make_eta_settings(config: Config, may_be_lower: bool) -> list[Config]:
@@ -78,12 +77,10 @@ def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> lis
     ]
 
 
-def _scale(config: Config, powers: Mapping[str, float], factor: float) -> Config:
-    """Multiply each of the parameters by its power of a factor."""
+def _scale(config: Config, names: Iterable[str], factor: float) -> Config:
+    """Multiply each of the parameters by a factor."""
     before = flatten(config)
-    return replace_values(
-        config, {name: clip_to_bounds(name, factor**power * float(before[name])) for name, power in powers.items()}
-    )
+    return replace_values(config, {name: clip_to_bounds(name, factor * float(before[name])) for name in names})
 
 
 @dataclass(frozen=True)

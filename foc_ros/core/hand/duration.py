@@ -24,11 +24,8 @@ import math
 from foc_ros.core.config import DurationConfig, clip_values
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
-CONSTANTS = {
-    'fixed': {'fixed_s': 1.0},
-    'fitts': {'fitts_a_s': 1.0, 'fitts_b_s': 1.0},
-}
-"""By model, the constants that determine durations, each with its power in a factor on all durations."""
+CONSTANTS = {'fixed': ('fixed_s',), 'fitts': ('fitts_a_s', 'fitts_b_s')}
+"""By model, the constants that determine durations, and are proportional to them."""
 CHANGE_S = 0.25
 """Time in which the time to go grows, or falls faster than time goes by, by a factor of e at most [s]."""
 
@@ -42,8 +39,7 @@ def compute_movement_time(distance: float, config: DurationConfig) -> float:
 
 def scale_durations(config: DurationConfig, factor: float) -> DurationConfig:
     """Return the configuration by which all movements take longer by a factor; constants stay within their bounds."""
-    powers = CONSTANTS[config.model]
-    return clip_values(config, {name: getattr(config, name) * factor**power for name, power in powers.items()})
+    return clip_values(config, {name: getattr(config, name) * factor for name in CONSTANTS[config.model]})
 
 
 def limit_change(expected_s: float, before_s: float, elapsed_s: float) -> float:
