@@ -68,9 +68,10 @@ def collect_goals(field: str, goals: ArrayLike | Goal | Iterable[Goal | ArrayLik
     if not isinstance(goals, (Goal, Iterable)) or isinstance(goals, (str, Mapping)):
         raise SceneError(field, 'positions or Goals', repr(goals))
     rows: list[tuple[str, Any]] = [(field, goals)]
-    is_position = len(find_shape(goals)) == 1 and find_shape(goals)[0] > 0 and all(isinstance(each, Number) for each in goals)
-    if not isinstance(goals, Goal) and not is_position:
-        rows = [(f'{field}[{row}]', each) for row, each in enumerate(goals)]
+    if not isinstance(goals, Goal):
+        shape, values = find_shape(goals), list(goals)
+        if len(shape) != 1 or not values or not all(isinstance(each, Number) for each in values):  # it is no position
+            rows = [(f'{field}[{row}]', each) for row, each in enumerate(values)]
     given = [each if isinstance(each, Goal) else Goal(check_position(name, each)) for name, each in rows]
     if not given:
         raise SceneError(field, 'at least one position', 'none')

@@ -23,10 +23,11 @@ from typing import NamedTuple
 import numpy as np
 
 from foc_ros.core.deadline import Deadline
+from foc_ros.core.obstacles.geometry import TURN
 from foc_ros.core.types import Array
 
 from .graph import Crossings, Graph, Lines, Rows
-from .sides import TURN, compute_bearings, count_crossings
+from .sides import compute_bearings, count_crossings
 
 TIE = 2e-9
 """Paths are given together if their keys differ by less [m]: they may rank alike to the nanometre."""

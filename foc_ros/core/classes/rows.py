@@ -91,9 +91,9 @@ class Decisions(NamedTuple):
 
 def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArray[np.int8]:
     """Return LEFT or RIGHT, (k, n): the side on which the mean path of each solution passes each obstacle."""
-    angles = np.zeros((len(solutions), len(obstacles)))
-    for rows, _, offset in find_offsets(solutions, obstacles):
-        angles[rows] = sweep(offset)
+    if not solutions:
+        return np.zeros((0, len(obstacles)), dtype=np.int8)
+    angles = sweep(find_offsets(solutions, obstacles)[1])
     return np.where(angles < 0.0, LEFT, RIGHT).astype(np.int8)
 
 

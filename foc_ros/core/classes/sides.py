@@ -8,7 +8,7 @@ and the directions of the two ends, as seen from the centre, give the angle that
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,30 +150,22 @@ def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obst
     """
     if not outcomes:
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
-    count = len(outcomes), len(obstacles)
-    swept, passing_s = np.zeros(count), np.zeros(count)
-    edges = tabulate_edges(obstacles.vertices, obstacles.corners)
-    for rows, dt, offset in find_offsets([each.solution for each in outcomes], obstacles):
-        swept[rows] = sweep(offset)
-        distance = find_offset(offset[..., 0], offset[..., 1], edges).distance
-        passing_s[rows] = dt[:, None] * _find_minima(distance)
+    dt, offset = find_offsets([each.solution for each in outcomes], obstacles)
+    swept, edges = sweep(offset), tabulate_edges(obstacles.vertices, obstacles.corners)
+    passing_s = dt[:, None] * _find_minima(find_offset(offset[..., 0], offset[..., 1], edges).distance)
     is_opposite = np.abs(swept[:, None] - swept) > np.pi
     after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)
     return BranchTimes(after_s, np.isinf(after_s).argmax(axis=1))
 
 
-def find_offsets(solutions: Sequence[Solution], obstacles: Obstacles) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
-    """Yield the solutions with equally many steps together: rows (r,), steps dt (r,) [s], and offsets (r, N + 1, n, 2) [m].
+def find_offsets(solutions: Sequence[Solution], obstacles: Obstacles) -> tuple[Array, Array]:
+    """Return the steps dt (k,) [s] of one or more solutions, and offsets (k, N + 1, n, 2) [m] at their equally many steps.
 
     Offsets are those of the mean path from the centre of each obstacle, which moves from where it is now.
     """
-    steps = np.array([len(each.mean) - 1 for each in solutions], dtype=np.intp)
-    for count in np.unique(steps).tolist():
-        rows = np.flatnonzero(steps == count)
-        path = np.stack([solutions[row].path for row in rows.tolist()])
-        dt = np.array([solutions[row].dt for row in rows.tolist()])
-        drift = dt[:, None, None, None] * obstacles.velocity
-        yield rows, dt, path[:, :, None] - centre_trajectories(obstacles.centre, drift, count)
+    path, dt = np.stack([each.path for each in solutions]), np.array([each.dt for each in solutions])
+    drift = dt[:, None, None, None] * obstacles.velocity
+    return dt, path[:, :, None] - centre_trajectories(obstacles.centre, drift, path.shape[1] - 1)
 
 
 def _find_minima(distance: Array) -> Array:
