@@ -32,7 +32,6 @@ try:
     import matplotlib as mpl
     from matplotlib.colors import to_rgba
     from matplotlib.figure import Figure as Figure
-    from matplotlib.lines import Line2D as Line2D
     from matplotlib.patches import Circle, Ellipse, Patch, Polygon
     from matplotlib.rcsetup import cycler
 except ImportError as error:

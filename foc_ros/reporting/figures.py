@@ -20,7 +20,7 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
 from . import draw
-from .draw import Bounds, Figure, Line2D, Span, compute_bounds, open_figure
+from .draw import Bounds, Figure, Span, compute_bounds, open_figure
 from .views import HandTrajectory, build_snapshot
 
 WIDTH_IN = 6.4
@@ -140,6 +140,8 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
 
     The text is as small as the place needs. A second call replaces the legend of the first.
     """
+    from matplotlib.lines import Line2D
+
     figure, name = axes.figure, f'legend {id(axes)}'
     for earlier in [each for each in figure.axes if each.get_gid() == name]:
         earlier.remove()
