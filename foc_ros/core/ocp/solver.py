@@ -157,17 +157,15 @@ class Solver:
         plan = self._planner.plan(now)
         rows, before, share = plan.rows, now.at.loss[plan.rows].copy(), 1.0
         now.iterations[rows] += 1
-        is_open = ~self._end(now, plan)
+        place = np.flatnonzero(~self._end(now, plan))
         for _ in range(MOST_TRIALS):
-            if not is_open.any():
+            if not len(place):
                 break
-            failed = self._step(now, plan, np.flatnonzero(is_open), share, may_end=share == 1.0)
-            is_open[:] = False
-            is_open[failed] = True
+            place = self._step(now, plan, place, share)
             # what rounding hides is not worth another trial
-            stalled = is_open & (plan.gain < STALLED_GAIN)
-            now.is_done[rows[stalled]] = now.is_settled[rows[stalled]] = True
-            is_open &= ~stalled
+            is_stalled = plan.gain[place] < STALLED_GAIN
+            stalled, place = rows[place[is_stalled]], place[~is_stalled]
+            now.is_done[stalled] = now.is_settled[stalled] = True
             share *= SHORTER
         now.bound[rows] = np.maximum(before, now.at.loss[rows])
         others = ~np.isin(now.contacts.problem, rows)
@@ -175,19 +173,22 @@ class Solver:
         now.multipliers = np.concatenate((now.multipliers[others], plan.multipliers))
         now.gain[rows] = plan.gain
         # the next QP has rows where the steps failed: if it fails too, there is no better place near
-        stuck = is_open & now.has_failed[rows]
-        now.has_failed[rows] = is_open
-        now.is_done[rows[stuck]] = True
-        now.is_settled[rows[stuck]] = plan.gain[stuck] < STALLED_GAIN
+        failed = rows[place]
+        now.is_done[failed[now.has_failed[failed]]] = True
+        now.has_failed[rows] = False
+        now.has_failed[failed] = True
 
-    def _step(self, now: Iterates, plan: Plan, place: Indices, share: float, *, may_end: bool) -> Indices:
-        """Take a share of some steps of a plan where that brings enough in their class; return the places of the others."""
-        rows = plan.rows[place]
+    def _step(self, now: Iterates, plan: Plan, place: Indices, share: float) -> Indices:
+        """Take a share of some steps of a plan where that brings enough in their class; return the places of the others.
+
+        A whole step may be the last one of its problem.
+        """
+        rows, is_whole = plan.rows[place], share == 1.0
         control = now.control[rows] + share * plan.step[place]
         at = self.evaluate(rows, control, now.k[rows] + share * (plan.k[place] - now.k[rows]))
         bound = now.bound[rows] - SUFFICIENT * share * plan.gain[place] + ROUNDING
         is_good = (at.loss <= bound) & (np.abs(at.angles - now.angles[rows]) < np.pi).all(axis=1)
-        if may_end:
+        if is_whole:
             # Newton steps converge quadratically: what is left is less than that by which this one missed what its QP foretold.
             # Rows at the steps alone creep from one to the next.
             missed = np.abs(now.at.loss[rows] - at.loss - plan.fall[place])
@@ -202,7 +203,7 @@ class Solver:
         now.control[good] = control[is_good]
         now.k[good] = np.clip(at.factor[is_good], 0.0, self.wanted_k[good])
         now.at.put(good, at, is_good, rows)
-        if may_end:
+        if is_whole:
             now.trial = at.contacts.take(np.isin(at.contacts.problem, rows[~is_good]))
         return place[~is_good]
 
