@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from operator import itemgetter
 
 import numpy as np
 
@@ -179,9 +178,9 @@ def estimate_unfollowed(
 ) -> list[PredictedCandidate]:
     """Return the classes that the search has seen and that are no candidates, each with an estimated effort and safety.
 
-    Each candidate leads to an estimate (`compare_efforts`), of which the largest is taken: classes that are not followed have the
-    longest paths, with turns that cost more than their length tells. They are ranked with the candidates by the same rule, and
-    what they get is the unknown share.
+    The estimate follows from the candidate that costs most for the length of its path (`compare_efforts`): classes that are not
+    followed have the longest paths, with turns that cost more than their length tells. These classes are ranked with the
+    candidates by the same rule, and what they get is the unknown share.
 
     Parameters
     ----------
@@ -196,9 +195,10 @@ def estimate_unfollowed(
     if not known:
         return []
     estimated = []
+    reference = max(known, key=lambda each: each.cost / compute_detour_effort(*_measure(each.candidate)))
     for candidate in [each for each in unfollowed if each.label not in names]:
-        cost, reference = max([(compare_efforts(candidate, each) * each.cost, each) for each in known], key=itemgetter(0))
         dt = durations_s[candidate.goal] / (len(candidate.guess) - 1)
+        cost = compare_efforts(candidate, reference) * reference.cost
         solution = replace(
             reference.solution,
             status=Status.ESTIMATED,
