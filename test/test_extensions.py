@@ -95,7 +95,7 @@ def test_a_plant_is_solved_by_every_strategy(strategy):
     config = foc_ros.Config().with_values({'foc.plant': 'double', 'foc.noise_x': 0.05, 'foc.noise_y': 0.05})
     for each in foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy=strategy, config=config):
         assert each.status is Status.SOLVED
-        assert each.mean.shape == (51, 4)
+        assert each.mean.shape == (31, 4)
         assert foc_ros.monte_carlo(each.solution, 1000).step[2] >= 0.9
 
 
