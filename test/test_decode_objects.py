@@ -18,7 +18,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from foc_ros.analysis.replay import replay
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.shapes import make_box_polygon
+from foc_ros.core.obstacles.polygons import make_box_polygon
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.types import SampleStatus
 from foc_ros.io.topics import OPTIONAL, TYPES

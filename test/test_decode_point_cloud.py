@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.shapes import Box, make_box_polygon
+from foc_ros.core.obstacles.polygons import make_box_polygon
+from foc_ros.core.obstacles.shapes import Box
 from foc_ros.ros.messages import decode_objects
 from foc_ros.ros.messages.decode_objects import MarkerTable
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
