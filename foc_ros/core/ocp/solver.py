@@ -141,10 +141,11 @@ class Solver:
     def _postpone(self, now: Iterates) -> None:
         """Leave unlikely classes to the next prediction whose QPs promise little of what they lack to the best class.
 
+        A class whose loss has just risen goes on, because what its QP has promised was not there.
         Where the wanted eta is a condition, every class is solved to its end: whether it meets eta decides, not what it costs.
         """
         behind = self.objective.compare(now.at.loss)
-        is_enough = (behind > UNLIKELY) & (self.objective.beta * now.gain < SMALL_PART * behind)
+        is_enough = (behind > UNLIKELY) & (self.objective.beta * now.gain < SMALL_PART * behind) & (now.at.loss < now.bound)
         now.is_waiting |= ~now.is_done & is_enough & ~self._is_condition
         now.is_done |= now.is_waiting
 
