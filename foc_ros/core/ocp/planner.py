@@ -24,8 +24,9 @@ BESIDE = 0.6
 
 These rows hold the mean where it is then, so that a contact slides by about as much in an iteration.
 """
-APART = 0.05
-"""Time from other contacts beyond which one that held the mean off is kept: along a side there may be two [steps]."""
+APART = 0.25
+"""Least time from other rows of the same obstacle of one where it held the mean off, and of one where a path would leap over it
+[steps]: along a side there may be two, but more of them keep contacts from sliding."""
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5
@@ -35,9 +36,9 @@ FREE = 1e-3
 """Part of the wanted safety factor that is missing where it is chosen with the control."""
 ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
-LEAP, LEAP_OF_DISTANCE, LEAP_APART = 0.02, 1e-3, 0.25
+LEAP, LEAP_OF_DISTANCE = 0.02, 1e-3
 """Broken margin, relative to the scene, for which a row is added: where margins hold against uncertainty, which shows what a path
-leaps over, and where they are but distances. Its least time from other rows [steps]. More rows keep contacts from sliding."""
+leaps over, and where they are but distances."""
 CURVED = 1.0
 """Gain of a step below which second derivatives of the margins count: farther away they tell nothing."""
 ACCURACY = 3e-10
@@ -112,7 +113,7 @@ class Planner:
         bound = -(LEAP if self.margins.is_chance else LEAP_OF_DISTANCE) * self.margins.extent[rows, None, None]
         row, obstacle, place = np.nonzero(mark_lowest(margin) & (margin < bound))
         found = Contacts(rows[row], obstacle, self.margins.times[place])
-        return found.take(~_is_known(found, plan.contacts, LEAP_APART))
+        return found.take(~_is_known(found, plan.contacts, APART))
 
     def solve(self, now: Iterates, rows: Indices, further: Contacts) -> Plan:
         """Return the solutions of the QPs of some problems (r,); further: places that have rows besides the contacts."""
