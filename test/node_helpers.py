@@ -18,13 +18,7 @@ OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
 ROWS = [(0.15, 0.02, 0.0, 0.03)]
 CROWD = [(0.01 * (i % 100) - 0.35, 0.05 + 0.01 * (i // 100), 0.0, 0.004) for i in range(10_000)]
 GOALS = [(0.3, 0.0, 0.0)]
-QUICK = {
-    'foc.steps': 20,
-    'homotopy.max_candidates': 2,
-    'scene.timeout_s': 0.0,
-    'estimator.hand_timeout_s': 0.0,
-    'budget_s': 0.0,
-}
+QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2, 'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0, 'budget_s': 0.0}
 """Parameters for quick predictions, without time limits that a slow machine would exceed."""
 RELIABLE = {f'qos_overrides./{name}.subscription.reliability': 'reliable' for name in ('hand_pose', 'obstacles')}
 """Reliable inputs, so that a test can wait until all of them are received."""

@@ -57,11 +57,7 @@ def collision_object(
 
 
 def detection(
-    place: Sequence[float],
-    size: Sequence[float],
-    name: str = '',
-    turned: dict[str, float] | None = None,
-    frame_id: str = '',
+    place: Sequence[float], size: Sequence[float], name: str = '', turned: dict[str, float] | None = None, frame_id: str = ''
 ) -> Any:
     """Return a Detection3D."""
     make = OBJECT_TYPES.make

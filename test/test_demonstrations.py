@@ -15,20 +15,11 @@ from hypothesis import strategies as st
 from foc_ros.analysis.replay import Replay
 from foc_ros.cli.main import main
 from foc_ros.core.classes import find_path_sides
-from foc_ros.core.classes.library import (
-    STEP_S,
-    GuessTiming,
-    recall_demonstrations,
-    record_demonstration,
-)
+from foc_ros.core.classes.library import STEP_S, GuessTiming, recall_demonstrations, record_demonstration
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
 from foc_ros.core.learning.learnt import Knowledge
-from foc_ros.core.learning.recordings import (
-    NO_LIBRARY,
-    PRIOR_COUNT,
-    make_library,
-)
+from foc_ros.core.learning.recordings import NO_LIBRARY, PRIOR_COUNT, make_library
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predict import predict

@@ -18,11 +18,7 @@ from report_samples import START_NS, prediction, predictions, samples, widen
 from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import Status
-from foc_ros.reporting.draw import (
-    ELLIPSES_PER_CANDIDATE,
-    GHOST_COLOUR,
-    get_candidate_style,
-)
+from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, GHOST_COLOUR, get_candidate_style
 from foc_ros.reporting.figures import make_moment_figure, make_scene_figure, plot_prediction, write_picture
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot, list_unsolved
 from foc_ros.ros.messages.ranking import find_drawn_curve

@@ -13,14 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, DurationConfig, EstimatorConfig, replace_values
 from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go
-from foc_ros.core.hand.kalman import (
-    JUMP_SPEED,
-    JUMP_STDDEVS,
-    FilterState,
-    compute_gramian,
-    compute_transition,
-    update,
-)
+from foc_ros.core.hand.kalman import JUMP_SPEED, JUMP_STDDEVS, FilterState, compute_gramian, compute_transition, update
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
@@ -241,8 +234,7 @@ def first(time_s, onset_ns=0):
 
 
 @pytest.mark.parametrize(
-    ('time_s', 'expected'),
-    [(0.0, MEAN), (0.1, [0.0, 0.0, 0.16, 0.2, 0.0, 0.0]), (0.5, [0.0, 0.0, 0.0, 0.6, 0.0, 0.0])],
+    ('time_s', 'expected'), [(0.0, MEAN), (0.1, [0.0, 0.0, 0.16, 0.2, 0.0, 0.0]), (0.5, [0.0, 0.0, 0.0, 0.6, 0.0, 0.0])]
 )
 def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to(time_s, expected):
     np.testing.assert_allclose(first(time_s), expected, atol=1e-12)

@@ -222,8 +222,7 @@ def ask_of(observed, name=PATH_CLASS):
 
 
 @pytest.mark.parametrize(
-    ('velocity', 'side'),
-    [((1.0, 0.6), L), ((1.0, -0.6), R), ((1.0, 0.1), R), ((0.0, 0.2), L), ((-0.5, 0.2), L)],
+    ('velocity', 'side'), [((1.0, 0.6), L), ((1.0, -0.6), R), ((1.0, 0.1), R), ((0.0, 0.2), L), ((-0.5, 0.2), L)]
 )
 def test_constant_velocity_passes_the_obstacle_on_its_line_or_on_the_side_to_which_it_turns(velocity, side):
     observed = observation(TWO_CLASSES, centre=[(1.0, 0.3)], hand=(0.0, 0.0, *velocity, 0.0, 0.0))

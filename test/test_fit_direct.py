@@ -8,13 +8,7 @@ from evaluation_samples import reach as resting_reach
 from fit_recordings import GOALS, reach, recorded_hand
 
 from foc_ros.analysis.fitting import SettingTable
-from foc_ros.analysis.fitting.direct import (
-    FADING,
-    fit_duration,
-    fit_estimator,
-    fit_fading,
-    fit_wait,
-)
+from foc_ros.analysis.fitting.direct import FADING, fit_duration, fit_estimator, fit_fading, fit_wait
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.hand.kalman import compute_gramian, compute_transition
 from foc_ros.core.obstacle_table import make_obstacles
@@ -47,13 +41,7 @@ END = '8, the end of the values tried, explains the recordings best'
             lambda b, w: -0.01 * ((b - 6) ** 2 + (w - 2) ** 2), VALUES, (None, None), {BETA: FLAT, WEAVING: FLAT}, id='flat'
         ),
         pytest.param(lambda b, w: 10 * b - 10 * (w - 2) ** 2, VALUES, (None, 2.0), {BETA: END}, id='best at the end'),
-        pytest.param(
-            lambda b, w: -10 * b - 10 * (w - 2) ** 2,
-            np.append(0.0, VALUES),
-            (0.0, 2.0),
-            {},
-            id='best at a bound',
-        ),
+        pytest.param(lambda b, w: -10 * b - 10 * (w - 2) ** 2, np.append(0.0, VALUES), (0.0, 2.0), {}, id='best at a bound'),
     ],
 )
 def test_what_a_table_of_log_likelihoods_determines(log_likelihood, values, expected, undetermined):

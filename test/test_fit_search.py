@@ -106,12 +106,7 @@ def test_worse_positions_are_named_with_both_errors():
 
 @pytest.mark.parametrize(
     ('answer', 'options', 'is_written'),
-    [
-        (None, (), False),
-        (None, ('--allow', 'positions'), True),
-        ('y', (), True),
-        ('', (), False),
-    ],
+    [(None, (), False), (None, ('--allow', 'positions'), True), ('y', (), True), ('', (), False)],
 )
 def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
     tmp_path, monkeypatch, capsys, answer, options, is_written

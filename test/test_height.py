@@ -47,12 +47,7 @@ def predict_over(obstacles, height, goal_height, **changes):
 
 @pytest.mark.parametrize(
     'changes',
-    [
-        {},
-        {'foc.goal_weight': 1e7},
-        {'duration.arrival': 'passing'},
-        {'foc.plant': 'damped_mass', 'foc.plant_damping': 3.0},
-    ],
+    [{}, {'foc.goal_weight': 1e7}, {'duration.arrival': 'passing'}, {'foc.plant': 'damped_mass', 'foc.plant_damping': 3.0}],
     ids=str,
 )
 def test_it_is_the_solution_of_the_plane_without_obstacles(changes):

@@ -13,12 +13,7 @@ from nav_msgs.msg import Path
 from node_helpers import ERROR, GOALS, OK, ROWS, TYPES, WARN, Bench, begin, figures, hand_path, stamps
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.parameter import Parameter
-from rclpy.qos import (
-    QoSDurabilityPolicy,
-    QoSLivelinessPolicy,
-    QoSProfile,
-    qos_profile_sensor_data,
-)
+from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, qos_profile_sensor_data
 from ros_helpers import graph
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger

@@ -9,19 +9,7 @@ import ros_required  # noqa: F401
 import numpy as np
 import pytest
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
-from node_helpers import (
-    CROWD,
-    GOALS,
-    OK,
-    TYPES,
-    WARN,
-    Bench,
-    begin,
-    figures,
-    hand_path,
-    list_labels,
-    stamps,
-)
+from node_helpers import CROWD, GOALS, OK, TYPES, WARN, Bench, begin, figures, hand_path, list_labels, stamps
 from process_helpers import Player, ended, parameters, running
 from std_msgs.msg import Float64
 

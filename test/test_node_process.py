@@ -49,10 +49,7 @@ def client():
 
 @pytest.mark.parametrize(
     ('command', 'number'),
-    [
-        ([sys.executable, '-m', 'foc_ros', 'node'], signal.SIGINT),
-        ([entry_point('foc_node')], signal.SIGTERM),
-    ],
+    [([sys.executable, '-m', 'foc_ros', 'node'], signal.SIGINT), ([entry_point('foc_node')], signal.SIGTERM)],
     ids=['command', 'entry point'],
 )
 def test_a_working_node_stops_without_an_error(ros, command, number):

@@ -16,20 +16,7 @@ import numpy as np
 import pytest
 from bag_helpers import write_bag, write_parameters
 from message_helpers import SECOND, marker, marker_array, pose_array, pose_stamped
-from node_helpers import (
-    CROWD,
-    GOALS,
-    OK,
-    ROWS,
-    TYPES,
-    WARN,
-    Bench,
-    begin,
-    figures,
-    hand_path,
-    list_labels,
-    stamps,
-)
+from node_helpers import CROWD, GOALS, OK, ROWS, TYPES, WARN, Bench, begin, figures, hand_path, list_labels, stamps
 from rosgraph_msgs.msg import Clock
 
 from foc_ros.core.config import Config

@@ -13,12 +13,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
-from foc_ros.core.plant.plants import (
-    Plant,
-    condense,
-    discretise_damped_mass,
-    discretise_triple_integrator,
-)
+from foc_ros.core.plant.plants import Plant, condense, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.registry import PLANTS
 from foc_ros.core.tracks import NO_TRACKS

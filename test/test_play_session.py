@@ -180,10 +180,7 @@ def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_s
     assert asyncio.run(work(page, 'compare'))['text'].endswith(' Not used: trial_002 (nothing could be predicted).')
 
 
-NO_POSITIONS = {
-    'displacement_m': {'likelihood-weighted': {'average': {'0.5': None}}},
-    'nlpd': {'foc': {'0.5': None}},
-}
+NO_POSITIONS = {'displacement_m': {'likelihood-weighted': {'average': {'0.5': None}}}, 'nlpd': {'foc': {'0.5': None}}}
 
 
 def test_what_is_impossible_is_refused(page):

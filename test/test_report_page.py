@@ -27,11 +27,7 @@ HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
 def report(tmp_path_factory):
     made, directory = samples(2), tmp_path_factory.mktemp('report')
     write_report(
-        directory,
-        HOSTILE,
-        build_hand_trajectory(made),
-        [build_snapshot(each) for each in predictions(made)],
-        {HOSTILE: HOSTILE},
+        directory, HOSTILE, build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], {HOSTILE: HOSTILE}
     )
     return directory
 

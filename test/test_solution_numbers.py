@@ -16,13 +16,7 @@ from scipy.interpolate import CubicHermiteSpline
 from foc_ros.core.config import FocConfig
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import Edges, find_offset
-from foc_ros.core.obstacles.risk import (
-    RiskBound,
-    compute_safety_factor,
-    eta_of_k,
-    k_of_eta,
-    size_moments,
-)
+from foc_ros.core.obstacles.risk import RiskBound, compute_safety_factor, eta_of_k, k_of_eta, size_moments
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Shape, collect_obstacles
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem

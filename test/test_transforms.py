@@ -9,16 +9,7 @@ from types import SimpleNamespace
 import ros_required  # noqa: F401
 import numpy as np
 import pytest
-from message_helpers import (
-    SECOND,
-    cloud,
-    marker,
-    marker_array,
-    obstacle_table,
-    pose_array,
-    pose_stamped,
-    transform,
-)
+from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped, transform
 from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures
 from scipy.spatial.transform import Rotation
 
