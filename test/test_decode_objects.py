@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bag_helpers import CONFIG, messages, ns
-from message_helpers import SECOND, pose_stamped
+from message_helpers import SECOND
 from object_messages import OBJECT_TYPES, STORE, collision_object, detection, detections
 from rosbags.rosbag2 import StoragePlugin, Writer
 
@@ -19,10 +19,7 @@ from foc_ros.analysis.replay import replay
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import make_box_polygon
-from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import SampleStatus
 from foc_ros.io.topics import OPTIONAL, TYPES
-from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
 from foc_ros.ros.messages.plane import Transform, compute_rotation
 
@@ -129,22 +126,6 @@ def test_detections_that_are_not_finite_or_repeated_are_dropped():
 def test_a_wrong_detection_is_refused(each, words):
     with pytest.raises(MessageError, match=re.escape(words)):
         decode_detections(detections(each), 'xy', 0.0)
-
-
-def test_both_inputs_reach_the_pipeline():
-    intake = Intake(Pipeline(CONFIG))
-    intake.take('hand_pose', pose_stamped(OBJECT_TYPES, (0.0, 0.0, 0.2)))
-    ball = (SPHERE, (0.05,), (0.5, 0, 0))
-    assert intake.take('collision_objects', collision_object(ball)) is SampleStatus.ACCEPTED
-    assert intake.take('collision_objects', collision_object(ball, name='cup', stamp_ns=SECOND - 1000)) is SampleStatus.ACCEPTED
-    assert intake.take('detections', detections(detection((1, 0, 0), (1, 1, 1), 'a'))) is SampleStatus.ACCEPTED
-    assert intake.take('detections', detections(frame_id='base')) is SampleStatus.WRONG_FRAME
-    assert intake.take('collision_objects', collision_object(operation=9)) is None
-    assert intake.pipeline.scene.obstacles(SECOND).ids == ('table/0', 'cup/0', 'a')
-    assert intake.counts == {'obstacles_wrong_frame': 1, 'collision_objects_invalid': 1}
-    intake.remove_source('collision_objects')
-    intake.take('collision_objects', collision_object(ball, name='lamp'))
-    assert intake.pipeline.scene.obstacles(SECOND).ids == ('a', 'lamp/0')
 
 
 @pytest.mark.parametrize('topic', ['/collision_objects', '/other'])

@@ -16,11 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.shapes import Box, make_box_polygon
+from foc_ros.core.obstacles.shapes import Box
 from foc_ros.ros.messages import decode_objects
 from foc_ros.ros.messages.decode_objects import MarkerTable
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
-from foc_ros.ros.messages.encode_inputs import encode_obstacles
 from foc_ros.ros.messages.plane import project
 
 BAGS = message_types('rosbags')
@@ -148,17 +147,6 @@ def test_a_scene_with_a_number_out_of_bounds_is_refused(layout, changes, words):
     for column, value in changes.items():
         table[column][1] = value
     check_refusal(words, table)
-
-
-@pytest.mark.parametrize('size', [(), (0.0, 0.0, 0.0), (0.25, 0.5, 0.75)])
-def test_encoded_obstacles_are_decoded(size):
-    message = encode_obstacles(BAGS, SECOND, 'world', [(1.0, 2.0, 3.0, 0.5, 0.125, 7, *size), (4.0, 5.0, 6.0, 1.0, 0.0, 8)])
-    assert ('size_x' in [field.name for field in message.fields]) == any(size)
-    obstacles = decode_point_cloud(message, 'xy').obstacles
-    assert obstacles.ids == ('7', '8') and obstacles.corners.tolist() == [4 if any(size) else 1, 1]
-    np.testing.assert_array_equal(obstacles.centre, [[1, 2], [4, 5]])
-    polygon = make_box_polygon(size[:2] or (0, 0), size[2] if size else 0)
-    np.testing.assert_allclose(obstacles.vertices[0, : len(polygon)], polygon)
 
 
 @pytest.mark.parametrize('missing', ['x', 'y', 'z', 'radius'])

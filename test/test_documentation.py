@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from tiers import LONG, PROCESS, SLOW, is_listed, list_test_functions
+from tiers import LONG, PROCESS, is_listed, list_test_functions
 
 from foc_ros.cli.main import list_commands
 from foc_ros.core.config import list_parameters
@@ -139,5 +139,5 @@ def test_the_documentation_is_short():
 
 def test_every_pattern_matches_a_test():
     functions = [name.split('::') for name in TESTS]
-    patterns = LONG + PROCESS + SLOW
+    patterns = LONG + PROCESS
     assert [pattern for pattern in patterns if not any(is_listed(*each, (pattern,)) for each in functions)] == []

@@ -269,14 +269,6 @@ def compute_least_effort(length, speed, acceleration):
     return float(missing @ np.linalg.solve(compute_gramian(1.0)[np.ix_(held, held)], missing))
 
 
-def test_a_hand_that_keeps_its_speed_passes_without_effort():
-    (found,) = predict(PASSING, moving_hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), FREE, np.array([[0.3, 0.1]]), NO_TRACKS)[
-        0
-    ].solved_candidates
-    assert found.solution.effort == pytest.approx(0.0, abs=1e-12)
-    assert_allclose(found.solution.mean[-1], [0.3, 0.1, 0.3, 0.1, 0.0, 0.0], atol=1e-9)
-
-
 def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration():
     start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
     config = replace_values(PASSING, {'foc.steps': 150})

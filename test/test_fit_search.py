@@ -13,7 +13,7 @@ from fit_recordings import write_tables
 
 from foc_ros.analysis.evaluation.truth import TIMES_S
 from foc_ros.analysis.fitting import race
-from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage, find_worse_positions, make_verdict
+from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage
 from foc_ros.analysis.fitting.one_replay import fit_widening
 from foc_ros.analysis.fitting.race import Replays, make_eta_settings
 from foc_ros.analysis.recordings import find_recordings
@@ -89,19 +89,6 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
 def test_eta_is_lowered_only_if_that_is_allowed():
     assert {each.foc.eta for each in make_eta_settings(CONFIG, may_be_lower=False)} == {0.9, 0.95}
     assert {each.foc.eta for each in make_eta_settings(CONFIG, may_be_lower=True)} == {0.9, 0.95, 0.7, 0.5}
-
-
-def test_worse_positions_are_named_with_both_errors():
-    comparison = {
-        'class_gain': {'before': 0.5, 'after': 0.1},
-        'error_m 0.25': {'before': 0.010, 'after': 0.011},
-        'error_m 0.5': {'before': 0.063, 'after': 0.096},
-        'error_m 1': {'before': None, 'after': 0.2},
-    }
-    words = 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm'
-    assert find_worse_positions(comparison) == [words]
-    (sentence,) = make_verdict({'comparison': {name: comparison[name] for name in ('error_m 0.5', 'error_m 1')}})
-    assert sentence == 'Worse with the fitted parameters: error of positions 0.5 s ahead [mm] 63.0 to 96.0.'
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes at the edge of what can be predicted: each has a decided answer, finite and never a guess (doc/troubleshoot.md)."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.predict import predict
-from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 
@@ -37,13 +35,6 @@ def predicted(obstacles, goals=GOAL, config=CONFIG):
     return prediction
 
 
-def test_an_empty_scene_is_the_straight_way():
-    prediction = predicted(make_obstacles())
-    (only,) = prediction.solved_candidates
-    assert only.likelihood == pytest.approx(1.0 - prediction.other)
-    assert abs(only.solution.path[:, 1]).max() < 1e-9
-
-
 def test_a_hand_inside_an_obstacle_leaves_it_or_says_why_not():
     prediction = predicted(make_obstacles([[0.01, 0.0]], [0.03], 0.001))
     assert prediction.notes['hand_inside'] == 1
@@ -52,16 +43,6 @@ def test_a_hand_inside_an_obstacle_leaves_it_or_says_why_not():
         assert 'inside the margin of 0 now' in outcome.solution.message
         assert np.hypot(*(outcome.solution.path[-1] - [0.01, 0.0])) > 0.03
     assert not [outcome for outcome in prediction.solved_candidates if outcome.solution.eta < CONFIG.foc.eta]
-
-
-def test_an_obstacle_that_holds_a_goal_does_not_hide_it_and_another_goal_keeps_its_candidates():
-    obstacle = make_obstacles([[0.3, 0.01]], [0.03], 0.001)
-    prediction = predicted(obstacle)
-    assert [outcome.label for outcome in prediction.candidates] == ['goal0:']
-    assert prediction.notes['goal_inside'] == 1
-    prediction = predicted(obstacle, np.array([[0.3, 0.0], [0.0, 0.3]]))
-    assert {outcome.candidate.goal for outcome in prediction.candidates} == {0, 1}
-    assert 1 in {outcome.candidate.goal for outcome in prediction.solved_candidates}
 
 
 def test_of_ten_thousand_obstacles_those_near_the_way_decide():
@@ -77,18 +58,6 @@ def test_of_ten_thousand_obstacles_those_near_the_way_decide():
     for one, other in zip(many.solved_candidates, few.solved_candidates, strict=True):
         assert one.likelihood == pytest.approx(other.likelihood, rel=1e-6)
         assert np.abs(one.solution.path - other.solution.path).max() < 1e-6
-
-
-def test_an_eta_out_of_reach_is_said_with_the_one_that_is_reached():
-    config = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
-    obstacle = make_obstacles([[0.15, 0.0]], [0.03], 0.003)
-    soft = predicted(obstacle, config=config)
-    assert soft.solved_candidates == ()
-    assert {outcome.status for outcome in soft.candidates_with_likelihood} == {Status.COMPROMISED}
-    prediction = predicted(obstacle, config=replace_values(config, {'likelihood.shortfall': math.inf}))
-    assert prediction.candidates_with_likelihood == ()
-    assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}
-    assert all('eta 0.999 is out of reach: the largest' in outcome.solution.message for outcome in prediction.candidates)
 
 
 WIDE = foc_ros.Config().with_values({'scene.hand_radius': 0.01})

@@ -15,7 +15,7 @@ import ros_required  # noqa: F401
 import numpy as np
 import pytest
 from bag_helpers import write_bag, write_parameters
-from message_helpers import SECOND, marker, marker_array, pose_array, pose_stamped
+from message_helpers import SECOND, pose_array, pose_stamped
 from node_helpers import CROWD, GOALS, OK, ROWS, TYPES, WARN, Bench, begin, figures, hand_path, list_labels, stamps
 from rosgraph_msgs.msg import Clock
 
@@ -80,22 +80,6 @@ def test_the_outputs_and_the_level_of_an_extreme_scene(ros, name):
     assert len([value for value in told if value.startswith(TAKING_PART)]) == count
     solved = [value for value in told if value.startswith('solved')]
     assert (rows[:, 3] >= bench.node.pipeline.config.foc.eta - 1e-5).sum() >= len(solved)
-
-
-def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros):
-    """Three messages of many markers for each pose: every pose is received, and predictions continue."""
-    kept = enumerate(CROWD[:400])
-    flood = marker_array(TYPES, *[marker(TYPES, row[:3], (0.008,) * 3, id=i, stamp_ns=10 * SECOND) for i, row in kept])
-    bench, poses = begin(ros), hand_path(10)
-    for pose in poses:
-        for _ in range(3):
-            bench.publishers['obstacle_markers'].publish(flood)
-        bench.deliver('hand_pose', pose)
-    assert len(bench.wait_for('prediction', 5)) == 5
-    status = bench.health()
-    values = figures(status)
-    assert (status.level, values['hand_pose refused']) == (OK, '0 of 10')
-    assert int(values['note culled']) > 300
 
 
 def test_goals_and_frames_that_change_with_every_pose(ros):

@@ -7,11 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bag_helpers import CONFIG as BAG_CONFIG
-from bag_helpers import messages, write_bag
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 
-from foc_ros.analysis.replay import Replay
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER
@@ -22,7 +19,6 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import ObstacleSource, Scene
 from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import NANOSECONDS, HandSample
-from foc_ros.io.bags import BagReader
 from foc_ros.ros.health import Freshness
 from foc_ros.ros.intake import Intake
 
@@ -192,17 +188,6 @@ def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):
     assert seen(intake) == ('a/2',)
 
 
-def test_markers_in_another_frame_are_discarded(intake):
-    """They are received before the hand pose that fixes another working frame."""
-    show(intake, marker(TYPES, id=1, frame_id='camera'))
-    move(intake, 1.0)
-    assert intake.counts == {'obstacles_wrong_frame': 1}
-    assert show(intake, marker(TYPES, id=2)) is SampleStatus.ACCEPTED
-    assert seen(intake) == ('a/2',)
-    assert show(intake, marker(TYPES, id=3, frame_id='camera')) is None
-    assert seen(intake) == ('a/2',) and "expected 'world'" in intake.last_refusal
-
-
 POSE_MS = SECOND // 1000
 A, S, R = SampleStatus.ACCEPTED, SampleStatus.SKIPPED, SampleStatus.RESTARTED_BACKWARD
 
@@ -249,33 +234,6 @@ def test_a_publisher_in_a_wrong_frame_does_not_keep_the_right_one_away():
     intake = Intake(Pipeline(replace_values(Config(), {'frame_id': 'world'})))
     found = [intake.take('hand_pose', pose(2 * i, 0.0, 'camera' if i % 2 else 'world')) for i in range(100)]
     assert found.count(A) == 50
-
-
-def predict(bag, config):
-    replayed = Replay(config)
-    with BagReader(bag) as reader:
-        return [each.prediction for each in replayed.steps(reader) if each.prediction is not None], replayed.intake.counts
-
-
-def are_equal(one, other):
-    """Whether predictions are the same to the last bit."""
-    return len(one) == len(other) and all(
-        a.stamp_ns == b.stamp_ns
-        and [c.likelihood for c in a.candidates] == [c.likelihood for c in b.candidates]
-        and all(np.array_equal(c.mean, d.mean) for c, d in zip(a.candidates, b.candidates, strict=True))
-        for a, b in zip(one, other, strict=True)
-    )
-
-
-def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_path):
-    items = messages(0.2, rate_hz=1000.0)
-    hands = [item for item in items if item[0] == '/hand_pose']
-    dropped = {id(item) for i, item in enumerate(hands) if i % 4}
-    whole, counts = predict(write_bag(tmp_path / 'whole', items), BAG_CONFIG)
-    thinned, none = predict(write_bag(tmp_path / 'thinned', [item for item in items if id(item) not in dropped]), BAG_CONFIG)
-    assert (counts.get('hand_skipped'), none.get('hand_skipped')) == (len(dropped), None)
-    assert whole and are_equal(whole, thinned)
-    assert not are_equal(whole, predict(tmp_path / 'whole', replace_values(BAG_CONFIG, {'estimator.min_interval_s': 0.0}))[0])
 
 
 def test_the_union_of_the_sources_holds_the_latest_row_of_an_id():

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from report_samples import START_NS, prediction, samples, scene
 
-from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.reporting.views import HandTrajectory, Slots, build_hand_trajectory, build_snapshot, is_late, read_snapshot
@@ -17,7 +16,6 @@ from foc_ros.ros.messages.ranking import compute_cost_ratios
 from foc_ros.ros.messages.types import RosbagsTypes
 
 TYPES = RosbagsTypes(TYPESTORE)
-NOWHERE = np.zeros(2)
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none():
@@ -53,20 +51,6 @@ def test_the_messages_hold_everything_that_a_report_shows(plane):
             assert getattr(got, name) == getattr(expected, name)
         for name in ('times', 'mean', 'covariance', 'motor_covariance'):
             np.testing.assert_allclose(getattr(got, name), getattr(expected, name), rtol=1e-6, atol=1e-8)
-
-
-def test_messages_of_unknown_obstacles_and_of_nothing():
-    made = prediction(START_NS, NOWHERE)
-    cloud, likelihoods = encode_prediction_cloud(made, 'xy', TYPES), encode_likelihoods(made, TYPES)
-    read = read_snapshot(cloud, likelihoods, 'xy', made.obstacles.take([1]), made.goal_positions)
-    assert [each.description for each in read] == [each.description for each in made.candidates_with_likelihood]
-    above = replace(made.obstacles, heights=np.array([[-np.inf, np.inf], [0.2, 0.3]]))
-    assert read_snapshot(cloud, likelihoods, 'xy', above, made.goal_positions).cleared == (False, True), (
-        'the hand is at a height of 0.1 m'
-    )
-    nothing = Prediction(START_NS, 'world', 0.1, (), None)
-    read = read_snapshot(encode_prediction_cloud(nothing, 'xy', TYPES), encode_likelihoods(nothing, TYPES), 'xy', *scene())
-    assert (read.candidates, read.most_likely) == ((), None)
 
 
 def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_absence():

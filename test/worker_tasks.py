@@ -30,13 +30,6 @@ def faulty(number: int) -> int:
     return number
 
 
-class Unloadable:
-    """An argument that can be pickled but not loaded."""
-
-    def __reduce__(self) -> tuple:
-        return (int, ('no number',))
-
-
 def sleepy(seconds: float) -> float:
     time.sleep(seconds)
     return seconds
