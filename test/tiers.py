@@ -33,7 +33,6 @@ LONG = (
     'test_documentation_site.py::*',
     # a node under load, and a process that is stopped or killed
     'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
-    'test_node_scenes.py::test_*a_flood_of_obstacles*',
     'test_node_scenes.py::test_the_node_keeps_its_promises_in_a_hostile_scene',
     'test_node_process.py::test_a_node_that_is_killed_and_started_again',
     'test_node_process.py::test_a_*work*without_an_error',
@@ -90,7 +89,6 @@ PROCESS = (
     'test_one_driver.py::*',
     'test_replay.py::*',
     'test_solve.py::*',
-    'test_pipeline.py::test_a_replay_*',
     'test_unusual_recordings.py::*',
     'test_bags.py::test_no_mutant_*',
     'test_fuzz*.py::*',
