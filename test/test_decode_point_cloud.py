@@ -40,11 +40,11 @@ def with_cells(layout, **cells):
     return table
 
 
-def with_field(name, **values):
+def with_field(field, **values):
     """Return the fields of a table, of which one has other values."""
     found = cloud(BAGS, np.zeros(2, dtype=FULL)).fields
     for attribute, value in values.items():
-        setattr(next(each for each in found if each.name == name), attribute, value)
+        setattr(next(each for each in found if each.name == field), attribute, value)
     return {'fields': found}
 
 

@@ -216,20 +216,19 @@ def test_foxglove_shows_topics_of_the_node_in_its_panels():
 PERMISSIONS = ROOT / 'config' / 'sros2_policy.xml'
 
 
-def sparse(file, size):
-    with file.open('wb') as opened:
-        opened.truncate(size)
-    return file
-
-
-def test_a_document_larger_than_any_scene_is_refused(tmp_path):
-    with pytest.raises(RecordingError, match='expected at most 5,000,000 bytes'):
-        read_document(sparse(tmp_path / 'large.yaml', documents.MAX_BYTES + 1))
-
-
-def test_a_table_larger_than_any_recording_is_refused(tmp_path):
-    with pytest.raises(RecordingError, match='expected at most 1,000,000,000 bytes, got 1,000,000,001'):
-        next(tables.read_rows(sparse(tmp_path / 'large.csv', tables.MAX_BYTES + 1), ('t_s',)))
+@pytest.mark.parametrize(
+    ('read', 'size', 'words'),
+    [
+        (read_document, documents.MAX_BYTES, '5,000,000 bytes'),
+        (lambda file: next(tables.read_rows(file, ('t_s',))), tables.MAX_BYTES, '1,000,000,000 bytes, got 1,000,000,001'),
+    ],
+    ids=['document', 'table'],
+)
+def test_a_file_larger_than_any_scene_or_table_is_refused(tmp_path, read, size, words):
+    with (tmp_path / 'large').open('wb') as opened:
+        opened.truncate(size + 1)
+    with pytest.raises(RecordingError, match=f'expected at most {words}'):
+        read(tmp_path / 'large')
 
 
 def allowed(kind, action):
