@@ -100,35 +100,19 @@ def test_failures_are_tested_as_they_say():
         assert names and not set(names) - TESTS, f'{row}: no such test: {set(names) - TESTS}'
 
 
-def test_failures_quote_texts_that_exist():
-    """What the table quotes is in the sources, perhaps with values between."""
-    sources = [ROOT / 'Makefile', *(ROOT / 'foc_ros').rglob('*.py')]
-    text = '\n'.join(file.read_text('utf-8') for file in sources)
-    quoted = [each for found in read_failures().values() for cells in found for each in re.findall(r'"([^"]+)"', cells[-1])]
-    assert len(quoted) > 40
-    for each in quoted:
-        for part in each.split(' ... '):
-            assert part in text, f'no source has the text {part}'
+def test_failures_quote_and_count_what_the_sources_say_and_name_the_level():
+    """What the table quotes is in the sources, perhaps with values between; a count as a whole, or what follows its input."""
+    text = '\n'.join(file.read_text('utf-8') for file in [ROOT / 'Makefile', *(ROOT / 'foc_ros').rglob('*.py')])
+    rows = [cells for found in read_failures().values() for cells in found]
+    assert all(len(cells) == 3 and re.match(r'(OK|WARN|ERROR|unchanged|none|exit \d+)\b|$', cells[1]) for cells in rows), rows
+    quoted = [part for cells in rows for each in re.findall(r'"([^"]+)"', cells[-1]) for part in each.split(' ... ')]
+    assert len(quoted) > 40 and [each for each in quoted if each not in text] == []
+    counts = {m.groups() for cells in rows for m in re.finditer(rf'`({INPUTS}_(?:dropped_)?([a-z_]+))`', cells[-1])}
+    assert len(counts) > 20
+    assert [count for count, reason in counts if count not in text and not re.search(rf"['_]{reason}\b", text)] == []
 
 
 INPUTS = '(?:hand_pose|hand|obstacle_markers|obstacles|collision_objects|detections|goals|predict|scene)'
-
-
-def test_failures_count_what_they_say():
-    """A count that the table names is in the sources, as a whole or as what follows the name of the input."""
-    text = '\n'.join(file.read_text('utf-8') for file in (ROOT / 'foc_ros').rglob('*.py'))
-    rows = [cells[-1] for found in read_failures().values() for cells in found]
-    counts = {match.groups() for row in rows for match in re.finditer(rf'`({INPUTS}_(?:dropped_)?([a-z_]+))`', row)}
-    assert len(counts) > 20
-    for count, reason in counts:
-        assert count in text or re.search(rf"['_]{reason}\b", text), f'no source counts {count}'
-
-
-def test_failures_name_the_level_of_the_diagnostics_or_the_exit_code():
-    for found in read_failures().values():
-        for cells in found:
-            assert len(cells) == 3, cells
-            assert re.match(r'(OK|WARN|ERROR|unchanged|none|exit \d+)\b|$', cells[1]), cells
 
 
 def test_the_documentation_is_short():

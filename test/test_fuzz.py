@@ -6,11 +6,13 @@ FOC_ROS_FUZZ: the number of messages, 1,000 by default. A live node among faulty
 """
 
 import os
+from dataclasses import fields, is_dataclass
 
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from message_helpers import SECOND, STORE, RosbagsTypes, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped
+from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
+from message_helpers import read_columns as columns
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.pipeline import Pipeline
@@ -20,7 +22,7 @@ from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 COUNT = int(os.environ.get('FOC_ROS_FUZZ', '1000'))
 LENGTH = 20
-TYPES = RosbagsTypes(STORE)
+TYPES = message_types('rosbags')
 CONFIG = replace_values(Config(), {'foc.steps': 10, 'homotopy.max_candidates': 2, 'rate_hz': 1000.0})
 THOROUGH = settings(
     max_examples=max(COUNT // LENGTH, 1), suppress_health_check=list(HealthCheck), deadline=None, derandomize=True, database=None
@@ -39,21 +41,16 @@ def intake_of(known):
 def numbers(message):
     """Yield every number of an output message; of a cloud, those of its rows."""
     if hasattr(message, 'point_step'):
-        kinds = {7: '<f4', 6: '<u4'}
-        rows = np.frombuffer(bytes(message.data), dtype=[(field.name, kinds[field.datatype]) for field in message.fields])
-        for name in rows.dtype.names or ():
-            yield from rows[name].astype(float).tolist()
-        return
-    if isinstance(message, (int, float)):
+        for column in columns(message).values():
+            yield from column.astype(float).tolist()
+    elif isinstance(message, (int, float)):
         yield float(message)
-    elif isinstance(message, (list, tuple, np.ndarray)) or hasattr(message, 'typecode'):
+    elif isinstance(message, (list, tuple, np.ndarray)):
         for each in message:
             yield from numbers(each)
-    elif hasattr(message, '__slots__') or hasattr(message, '__dataclass_fields__'):
-        names = getattr(message, '__dataclass_fields__', None) or message.get_fields_and_field_types()
-        for name in names:
-            if not name.startswith('__'):
-                yield from numbers(getattr(message, name))
+    elif is_dataclass(message):
+        for each in fields(message):
+            yield from numbers(getattr(message, each.name))
 
 
 def is_finite(name, message):

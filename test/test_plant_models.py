@@ -13,7 +13,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
-from foc_ros.core.plant.plants import Plant, condense, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.plant.plants import Plant, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.registry import PLANTS
 from foc_ros.core.tracks import NO_TRACKS
@@ -108,22 +108,6 @@ def test_damped_mass_is_the_exact_discretisation(damping):
     plant = discretise_damped_mass(dt, mass, damping)
     np.testing.assert_allclose(plant.A, A, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(plant.B, B, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    'plant', [discretise_triple_integrator(0.02), discretise_damped_mass(0.05, 2.0, 3.0)], ids=['jerk', 'force']
-)
-def test_horizon_is_what_the_plant_does_step_by_step(plant):
-    generator = np.random.default_rng(1)
-    steps, n = 12, len(plant.A)
-    control, state = generator.standard_normal((steps, 2)), generator.standard_normal(n)
-    stacked = condense(plant, steps)
-    predicted = stacked.powers @ state
-    predicted[1:] += stacked.response @ control.T.ravel()
-    for t in range(steps):
-        np.testing.assert_allclose(predicted[t], state, atol=1e-12)
-        state = plant.A @ state + plant.B @ control[t]
-    np.testing.assert_allclose(predicted[-1], state, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -198,20 +198,6 @@ def test_what_is_impossible_is_refused(page):
     assert page.last('settings')['recording'] is False
 
 
-def test_a_page_that_is_loaded_again_finds_everything_as_it_was(page, monkeypatch):
-    record_trials(page, 1)
-    fitted = fit_with_errors(page, monkeypatch, 0.063, 0.060)
-    asyncio.run(work(page, 'report'))
-    score, before = page.last('score'), page.last('settings')
-    again = Page(page.session)
-    assert (again.last('score'), again.last('settings')) == (score, before)
-    assert before['report'] and before['session'] and before['parameters'] == 'mine'
-    assert again.last('job')['name'] == 'report'
-    assert again.last('result') == {'type': 'result', 'columns': fitted['columns'], 'rows': fitted['rows']}
-    report = page.session.report.read_text(encoding='utf-8')
-    assert '<h2>Score</h2>' in report and f'<td>{score["rows"][0][2]}</td>' in report, 'the score is in the report'
-
-
 def test_a_fit_shows_its_progress_and_can_be_cancelled(page, tmp_path, monkeypatch):
     record_trials(page, 1)
     program, ended = tmp_path / 'program', tmp_path / 'ended'
