@@ -56,7 +56,6 @@ class Play:
         self.process = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
 
     def wait(self) -> None:
-        """Wait until the page is served."""
         until(lambda: STARTED.search(self.output) or self.process.poll() is not None, 'the address of the page', 100.0)
         assert STARTED.search(self.output), self.output
 
@@ -109,7 +108,6 @@ def visit(browser: Any, started: Play, width: int = 1280, height: int = 1000, da
 
 
 def wait_for(browser: Any, expression: str, what: str, seconds: float = 60.0) -> Any:
-    """Wait until an expression of the page is true."""
     return until(lambda: browser.execute_script(f'return {expression}'), what, seconds)
 
 
@@ -121,7 +119,6 @@ def steer(browser: Any, *targets: tuple[float, float], speed: float = 0.3) -> li
 
 
 def wait_for_answer(browser: Any) -> None:
-    """Wait for a prediction from the present position of the hand."""
     distance = 'Math.hypot(...play.view.hand.position.map((value, axis) => value - play.view.candidates[0].path[0][axis]))'
     wait_for(browser, f'play.view.candidates.length && {distance} < 0.005', 'predictions')
 
@@ -147,7 +144,6 @@ def await_layout(browser: Any) -> None:
 
 
 def tab_to(browser: Any, name: str) -> None:
-    """Press Tab until a control of the page has the focus."""
     for _ in range(60):
         if browser.execute_script('return document.activeElement.id') == name:
             return

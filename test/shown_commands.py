@@ -49,7 +49,6 @@ def find_commands(page: Path) -> Iterator[str]:
 
 
 def is_listed(command: str, patterns: Iterable[str]) -> bool:
-    """Return whether one of the patterns matches a command line."""
     return any(fnmatchcase(command, pattern) for pattern in patterns)
 
 

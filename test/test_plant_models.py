@@ -30,8 +30,6 @@ CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
 
 @pytest.fixture
 def register(monkeypatch):
-    """Register plants for one test."""
-
     def add(name, factory):
         foc_ros.register_plant(name, factory)
         return Config().with_values({'foc.plant': name})

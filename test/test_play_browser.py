@@ -34,7 +34,6 @@ def parameters(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def library(tmp_path_factory, parameters):
-    """Start a server without ROS."""
     with play(tmp_path_factory.mktemp('library'), '--params', parameters) as started:
         yield started
 
@@ -57,7 +56,6 @@ def text_of(browser, name):
 
 
 def has_numbers(browser):
-    """Move the hand a little, and tell whether frames and delay have been measured."""
     steer(browser, (0.29, 0.085), ON[-1])
     measured = 'play.measured.mostMs >= play.measured.delayMs && play.measured.delayMs > 0 && play.measured.delays.length > 5'
     return bool(browser.execute_script(f'return {measured}'))
@@ -113,7 +111,6 @@ def test_the_status_line_is_not_green_while_predictions_come_late(page):
 
 
 def test_an_obstacle_that_is_dragged_changes_the_prediction(page):
-    """The circle is dragged away from the straight line to goal 1."""
     steer(page, (0.0, 0.0))
     click(page, 'arrange')
     page.execute_script("""
@@ -277,7 +274,6 @@ PHONE = 360, 640
 
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
 def test_the_page_fits_on_a_phone(browser, library, dark):
-    """It has the width of the phone, whatever it shows, and the colours of the system until the button changes them."""
     visit(browser, library, *PHONE, dark)
     place = """return ['scene', 'buttons'].map((name) => document.getElementById(name).getBoundingClientRect())
         .map(({ top, bottom }) => [top, bottom])"""

@@ -138,7 +138,6 @@ def find_loss(solution):
 
 
 def read_table(scene):
-    """Return the obstacles of a scene, whose vertices are given in the world."""
     vertices = [np.array(each['vertices']) for each in scene['obstacles']]
     centres = [each.mean(axis=0) for each in vertices]
     radii, deviations, names, velocities = (
@@ -196,7 +195,6 @@ def make_scene(seed):
 
 
 def sweep(path, point):
-    """The angle that a path (n, 2) sweeps about a point [rad]."""
     angles = np.unwrap(np.arctan2(*(path - point).T[::-1]))
     return angles[-1] - angles[0]
 

@@ -37,7 +37,6 @@ def bag(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def answer(bag):
-    """Return what `replay --json` prints of the bag."""
     return replay_json(bag)
 
 

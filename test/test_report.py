@@ -28,8 +28,6 @@ from foc_ros.ros.messages.ranking import find_drawn_curve
 
 
 class Page(HTMLParser):
-    """Parser of a page: its tags with attributes, and its text."""
-
     def __init__(self, file):
         super().__init__()
         self.tags: list[tuple[str, dict[str, str | None]]] = []

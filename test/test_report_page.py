@@ -71,7 +71,6 @@ return { disc: arguments[0].map((point) => isAt(point, disc)), ring: arguments[0
 
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
 def test_the_page_fits_on_a_phone(browser, report, tmp_path, dark):
-    """The page fits into a width of 360 px; it follows the dark or light mode of the system, and a button changes it."""
     assert show(browser, report / 'index.html', 360, 640, dark) == []
     assert browser.execute_script('return document.documentElement.scrollWidth') == 360
     browser.execute_script("""

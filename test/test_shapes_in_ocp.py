@@ -83,7 +83,6 @@ def test_noisy_movements_stay_clear_of_the_true_shape_as_often_as_promised(name,
 
 
 def same(first, second, moved=lambda path: path, tolerance=1e-6):
-    """The second solution is the first one moved."""
     assert first.status is second.status is Status.SOLVED, (first.message, second.message)
     assert second.effort == pytest.approx(first.effort, rel=tolerance)
     assert np.abs(second.path - moved(first.path)).max() < tolerance
@@ -147,7 +146,6 @@ def draw_shapes(generator):
 
 
 def make_random_scene(kind, seed):
-    """Return obstacles, a goal and a guess."""
     generator = np.random.default_rng(seed)
     if kind == 'circles':
         obstacles, goal, amplitude = random_scene(generator)
@@ -184,7 +182,6 @@ def find_well_posed(kind, strategy):
 
 
 def same_but_for_samples(kind, first, second, moved=lambda path: path, unit=1.0):
-    """The second solution is the first one moved, with an effort in another unit."""
     effort, path = TOLERANCES[kind]
     assert second.status is Status.SOLVED
     assert second.effort == pytest.approx(first.effort * unit, rel=effort)

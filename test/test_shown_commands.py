@@ -52,7 +52,6 @@ def test_commands_work_as_shown(page, tmp_path):
 
 
 def make_clone(clone):
-    """Return a clone that also contains the files that a user would bring."""
     clone.mkdir()
     for name in ('doc', 'config', 'scripts', 'foc_ros', 'Makefile', 'setup.py', 'test', 'pyproject.toml'):
         (clone / name).symlink_to(ROOT / name)

@@ -138,7 +138,6 @@ def test_wrong_input_is_exit_2_with_one_line(tmp_path, capsys, scene, options, l
 
 
 def test_json_describes_the_whole_solution(tmp_path, capsys):
-    """The JSON holds every cost term, the whole state with its covariance, the place of the smallest eta, and the contacts."""
     for each in candidates(tmp_path, capsys, {**SCENE, 'strategy': 'lv', 'start_stddev': 0.001}):
         assert each['costs']['effort'] == pytest.approx(each['effort']) and each['costs']['lambda_variance'] > 0
         covariance = np.array(each['covariance'])

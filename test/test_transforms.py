@@ -56,7 +56,6 @@ def camera(x, stamp_ns=0):
 
 @pytest.fixture
 def tf2(monkeypatch):
-    """Install a substitute for tf2."""
     module = SimpleNamespace(Buffer=Buffer, TransformListener=lambda buffer, node: None, TransformException=TransformException)
     monkeypatch.setitem(sys.modules, 'tf2_ros', module)
 

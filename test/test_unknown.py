@@ -30,7 +30,6 @@ def ask(config=CONFIG, goals=GOALS, obstacles=ROW):
 
 
 def let_fail(monkeypatch, number, status):
-    """Let the solver fail in the candidate of a number."""
     solve = candidates.solve_problems
 
     def fail(*given):
@@ -70,7 +69,6 @@ def test_what_is_seen_and_not_followed_is_unknown(horizon_s):
 
 
 def test_goals_that_are_not_followed_are_unknown():
-    """There are more goals than candidates that a prediction may have."""
     angles = np.linspace(-0.7, 0.7, 80)
     found = ask(
         replace_values(CONFIG, {'foc.steps': 5}), 0.3 * np.column_stack([np.cos(angles), np.sin(angles)]), make_obstacles()

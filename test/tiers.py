@@ -110,7 +110,6 @@ PROCESS = (
 
 
 def is_listed(file: str, function: str, patterns: tuple[str, ...]) -> bool:
-    """Return whether one of the patterns matches a test function."""
     return any(fnmatchcase(f'{file}::{function}', pattern) for pattern in patterns)
 
 

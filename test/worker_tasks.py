@@ -36,6 +36,5 @@ def sleepy(seconds: float) -> float:
 
 
 def wait_here(folder: str) -> None:
-    """Leave the process id in a folder, and wait."""
     Path(folder, str(os.getpid())).touch()
     time.sleep(120.0)
