@@ -69,12 +69,6 @@ def test_sides_of_the_table_of_trials_are_compared_with_the_path(folder):
     assert find_label_mismatches(folder, observed) == {'a': 'no label'}
 
 
-def test_evaluate_and_its_report_take_the_folder(folder, tmp_path, capsys):
-    assert main(['evaluate', str(folder), '--params', str(folder / 'parameters.yaml'), '--workers', '1', '--json']) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert (answer['recordings'], answer['failed'], answer['labels_not_taken']) == (2, {}, {})
-
-
 @pytest.mark.parametrize(
     ('text', 'words'),
     [

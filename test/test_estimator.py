@@ -178,23 +178,25 @@ def test_fitts_law_at_whole_bits():
         assert compute_movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
 
 
-def test_during_a_movement_the_time_to_go_is_the_duration_less_the_time_since_onset():
-    assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), DURATION_GOAL, FITTS) == pytest.approx(1.2 - 0.4)
-    assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), DURATION_GOAL, FIXED) == pytest.approx(1.5 - 0.4)
-
-
-def test_lower_and_upper_limit():
-    assert time_to_go(hand(0.29, onset=0.0, since_s=5.0), DURATION_GOAL, FITTS) == 0.3
-    assert time_to_go(hand(0.3), DURATION_GOAL, replace(FITTS, fitts_a_s=0.0)) == 0.3
-    assert time_to_go(hand(0.0), DURATION_GOAL, replace(FIXED, fixed_s=30.0)) == 10.0
-    assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.0), DURATION_GOAL, FIXED) == 10.0
-
-
-def test_a_slow_hand_needs_the_time_of_the_distance_at_its_speed():
-    assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.05), DURATION_GOAL, FIXED) == pytest.approx(0.2 / 0.05)
-    assert time_to_go(hand(0.1, onset=0.0, since_s=3.0, speed=0.05), DURATION_GOAL, FIXED) == pytest.approx(0.2 / 0.05)
-    # too early for the speed to count
-    assert time_to_go(hand(0.01, onset=0.0, since_s=0.29 * 1.5, speed=0.05), DURATION_GOAL, FIXED) == pytest.approx(0.71 * 1.5)
+@pytest.mark.parametrize(
+    ('state', 'config', 'expected'),
+    [
+        # during a movement, the duration less the time since its onset
+        (hand(0.1, onset=0.0, since_s=0.4), FITTS, 1.2 - 0.4),
+        (hand(0.1, onset=0.0, since_s=0.4), FIXED, 1.5 - 0.4),
+        # the lower and the upper limit
+        (hand(0.29, onset=0.0, since_s=5.0), FITTS, 0.3),
+        (hand(0.3), replace(FITTS, fitts_a_s=0.0), 0.3),
+        (hand(0.0), replace(FIXED, fixed_s=30.0), 10.0),
+        (hand(0.1, onset=0.0, since_s=1.0, speed=0.0), FIXED, 10.0),
+        # a slow hand needs the time of the distance at its speed, unless it is too early for the speed to count
+        (hand(0.1, onset=0.0, since_s=1.0, speed=0.05), FIXED, 0.2 / 0.05),
+        (hand(0.1, onset=0.0, since_s=3.0, speed=0.05), FIXED, 0.2 / 0.05),
+        (hand(0.01, onset=0.0, since_s=0.29 * 1.5, speed=0.05), FIXED, 0.71 * 1.5),
+    ],
+)
+def test_the_time_to_go(state, config, expected):
+    assert time_to_go(state, DURATION_GOAL, config) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 10))
@@ -234,15 +236,17 @@ def first(time_s, onset_ns=0):
 
 
 @pytest.mark.parametrize(
-    ('time_s', 'expected'), [(0.0, MEAN), (0.1, [0.0, 0.0, 0.16, 0.2, 0.0, 0.0]), (0.5, [0.0, 0.0, 0.0, 0.6, 0.0, 0.0])]
+    ('time_s', 'onset_ns', 'expected'),
+    [
+        (0.0, 0, MEAN),
+        (0.1, 0, [0.0, 0.0, 0.16, 0.2, 0.0, 0.0]),
+        (0.5, 0, [0.0, 0.0, 0.0, 0.6, 0.0, 0.0]),
+        (0.0, None, np.zeros(6)),
+        (0.5, None, np.zeros(6)),
+    ],
 )
-def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to(time_s, expected):
-    np.testing.assert_allclose(first(time_s), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize('time_s', [0.0, 0.5])
-def test_a_hand_that_has_not_begun_to_move_is_at_rest(time_s):
-    np.testing.assert_allclose(first(time_s, None), np.zeros(6), atol=1e-12)
+def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to_and_a_hand_at_rest_rests(time_s, onset_ns, expected):
+    np.testing.assert_allclose(first(time_s, onset_ns), expected, atol=1e-12)
 
 
 PASSING = replace_values(

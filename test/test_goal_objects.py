@@ -51,13 +51,6 @@ def test_an_obstacle_is_the_goal_that_the_grown_obstacle_holds():
     assert not [each for each in predict_in(CUPS, beside, **{'scene.hand_radius': 0.01}).candidates if each.candidate.sides]
 
 
-def test_an_obstacle_that_is_named_as_object_need_not_hold_the_goal():
-    behind = np.array([[0.25, 0.0]])
-    assert all(each.candidate.sides for each in predict_in(CUPS, behind).candidates)
-    named = predict_in(CUPS, behind, knowledge=Knowledge(objects=('front',)))
-    assert [each.label for each in named.candidates] == ['goal0:'] and measure(named.candidates[0], CUPS.take([0])) < 0.0
-
-
 def test_obstacles_decide_on_the_way_and_not_on_the_goal():
     shares = []
     for obstacles in (CUPS, make_obstacles(), make_obstacles([[0.1, 0.0], [0.1, 0.07]], 0.03)):

@@ -109,16 +109,6 @@ def test_ros2_run_starts_the_command(script, monkeypatch, capsys):
     assert f'Usage: foc_ros {script.name.replace("foc_node", "node")}' in capsys.readouterr().out
 
 
-def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path):
-    """Run one of the scripts as `ros2 run` does: in a process of its own, from any directory."""
-    paths = os.pathsep.join([str(Path(foc_ros.__file__).parents[1]), *filter(None, [os.environ.get('PYTHONPATH')])])
-    command = [sys.executable, ROOT / 'scripts' / 'ros2_run' / 'solve', '--help']
-    environment = os.environ | {'PYTHONPATH': paths}
-    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=100, check=False)
-    assert result.returncode == 0, result.stderr
-    assert ' solve ' in result.stdout
-
-
 def test_an_executable_runs_in_the_python_of_its_environment(tmp_path):
     """`lib/foc_ros` of a virtual environment that is not activated; without a Python in the environment, that of the PATH."""
     script, interpreter = tmp_path / 'lib' / 'foc_ros' / 'foc_node', tmp_path / 'bin' / 'python3'

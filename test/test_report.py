@@ -202,11 +202,13 @@ def test_no_hand_and_a_folder_that_is_a_file_are_refused(tmp_path):
 SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "noise": [0.05, 0.05], "eta": 0.9, "obstacles": []}'
 
 
-@pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
-def test_a_picture_is_replaced_by_the_next_one(tmp_path, suffix):
-    file = tmp_path / f'scene.{suffix}'
-    write_picture(file, prediction(START_NS, np.zeros(2)))
-    check_replaceable('--plot', file)
+def test_pictures_and_reports_are_replaced_by_the_next_ones(tmp_path):
+    for suffix in ('png', 'pdf', 'svg'):
+        write_picture(tmp_path / f'scene.{suffix}', prediction(START_NS, np.zeros(2)))
+        check_replaceable('--plot', tmp_path / f'scene.{suffix}')
+    report(tmp_path)
+    report(tmp_path)
+    write_page(tmp_path, 'index.html', 'x', (), (), None)
 
 
 def test_a_picture_that_something_else_has_made_is_left_alone(tmp_path, capsys):
@@ -219,13 +221,6 @@ def test_a_picture_that_something_else_has_made_is_left_alone(tmp_path, capsys):
     assert (out, err.count('\n')) == ('', 1)
     assert '--plot: expected a new file, or one that foc_ros has made' in err
     assert picture.read_bytes() == before
-
-
-def test_a_report_is_replaced_by_the_next_one(tmp_path):
-    made = samples()
-    for _ in range(2):
-        write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], {})
-    write_page(tmp_path, 'index.html', 'x', (), (), None)
 
 
 @pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png'])

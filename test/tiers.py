@@ -51,7 +51,7 @@ PROCESS = (
     'test_command_line.py::test_wrong_inputs_*',
     'test_command_line.py::test_a_[fnp]*',
     'test_demo.py::*',
-    'test_demo_parts.py::test_the_[fn]*',
+    'test_demo_parts.py::test_the_n*',
     'test_demo_parts.py::test_a_domain_*',
     'test_examples.py::test_the_code_*',
     'test_optional_packages.py::test_[apt]*',
