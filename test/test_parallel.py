@@ -34,6 +34,8 @@ def test_results_come_in_order_and_an_exception_is_the_failure_of_its_item_whate
     with nullcontext() if count is None else open_workers(count):
         assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
         found = dict(run(worker_tasks.faulty, ITEMS[:4]))
+        ((_, number),) = run(worker_tasks.process_id, [('alone', None)])
+    assert (number == os.getpid()) == (count in (None, 1)), 'a single worker is this process'
     assert found['r0'] == 0 and found['r3'] == 3
     assert found['r1'] == Failure('number: expected another than 1, got 1')
     assert found['r2'].reason.startswith("KeyError: 'two' (worker_tasks.py:")

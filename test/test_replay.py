@@ -256,13 +256,6 @@ def test_a_table_is_printed_and_a_report_is_written(tmp_path, bag, capsys):
     assert 'reach' in page and 'hand poses' in page
 
 
-@pytest.mark.parametrize('remap', ['hand_pose', 'hand_pose:=', 'hand:=/hand_pose'])
-def test_a_wrong_remap_is_said(bag, capsys, remap):
-    assert run(bag, '--remap', remap) == 2
-    err = capsys.readouterr().err
-    assert remap.split(':=')[0] in err and err.count('\n') == 1
-
-
 def camera_at(y, seconds, late_s=0.02):
     """Return a transform for a time that is logged later: a camera at (0, y) that looks along the y axis of the world."""
     stamped = TYPES.make(

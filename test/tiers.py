@@ -19,7 +19,7 @@ LONG = (
     # studies of the solver over many scenes
     'test_tracks.py::test_*symmetric_obstacle*',
     'test_guarantee.py::*',
-    'test_plan_recovery.py::test_recovered_*',
+    'test_plan_recovery.py::test_[rw]*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # a fit and its comparison or without obstacles, the paper's studies and long reports
     'test_play_session.py::test_a_fit_and_its_comparison',
@@ -101,7 +101,6 @@ PROCESS = (
     'test_box_scenes.py::*',
     'test_evaluation_scores.py::test_the_region_*',
     'test_fit_*.py::test_the_*',
-    'test_plan_recovery.py::*',
     'test_draw.py::test_a_plot_survives_*',
     'test_study_pages.py::test_a_recording_*',
     'test_play_session.py::test_t*',

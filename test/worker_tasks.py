@@ -15,6 +15,10 @@ def squared(number: int) -> int:
     return number**2
 
 
+def process_id(_: None) -> int:
+    return os.getpid()
+
+
 def deadly(number: int) -> int:
     """Kill the worker at 3 and 5, as the kernel does where memory runs out."""
     if number in (3, 5):
