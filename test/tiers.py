@@ -19,14 +19,13 @@ LONG = (
     # studies of the solver over many scenes
     'test_tracks.py::test_*symmetric_obstacle*',
     'test_guarantee.py::*',
-    'test_plan_recovery.py::test_[rw]*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # a fit and its comparison or without obstacles, the paper's studies and long reports
     'test_play_session.py::test_a_fit_and_its_comparison',
     'test_fit.py::test_without_obstacles_goals_*',
     'test_report.py::test_a_long_recording_is_thinned_out*',
-    'test_paper.py::test_*trend*',
-    'test_paper.py::test_files_hold_the_computed_numbers',
+    'test_examples.py::test_*trend*',
+    'test_examples.py::test_[frw]*',
     'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
     # the commands of the documentation, and its web site
     'test_shown_commands.py::test_commands_work_as_shown',
@@ -53,7 +52,6 @@ PROCESS = (
     'test_demo.py::*',
     'test_demo_parts.py::test_the_n*',
     'test_demo_parts.py::test_a_domain_*',
-    'test_examples.py::test_the_code_*',
     'test_optional_packages.py::test_[apt]*',
     'test_packaging.py::test_[anrsw]*',
     'test_packaging.py::*_the_wheel',
@@ -63,7 +61,8 @@ PROCESS = (
     'test_repository.py::test_every_source_*',
     'test_shown_commands.py::test_a_line_*',
     'test_simulation.py::test_the_command_*',
-    'test_paper.py::*',
+    'test_examples.py::test_output_*',
+    'test_examples.py::test_the_[ec]*',
     'test_notebook.py::*',
     # the strategies that seek a point of a curve, and many scenes
     'test_reference_cases.py::test_continuous_*',
@@ -81,17 +80,17 @@ PROCESS = (
     'test_guidance_safety.py::test_hostile_hands',
     'test_demonstrations.py::test_*path*',
     'test_pace.py::test_a_repeated_way_*',
-    'test_height_messages.py::test_every_plane_*',
+    'test_height.py::test_every_plane_*',
     # recordings and commands
     'test_evaluate.py::*',
     'test_fit.py::*',
-    'test_fit_search.py::test_a_setting_that_predicts_nothing_*',
+    'test_fit_estimates.py::test_a_setting_that_predicts_nothing_*',
     'test_one_driver.py::*',
     'test_replay.py::*',
     'test_solve.py::*',
     'test_unusual_recordings.py::*',
     'test_bags.py::test_no_mutant_*',
-    'test_fuzz*.py::*',
+    'test_fuzz.py::*',
     'test_decode_objects.py::test_a_bag_*',
     'test_parameters.py::test_every_configuration_*',
     'test_parameters.py::test_sections_apply_*',
@@ -100,11 +99,10 @@ PROCESS = (
     # studies, pictures and pages
     'test_box_scenes.py::*',
     'test_evaluation_scores.py::test_the_region_*',
-    'test_fit_*.py::test_the_*',
+    'test_fit_estimates.py::test_the_*',
     'test_draw.py::test_a_plot_survives_*',
     'test_study_pages.py::test_a_recording_*',
     'test_play_session.py::test_t*',
-    'test_examples.py::test_the_example_runs_*',
 )
 
 
