@@ -28,7 +28,7 @@ LONG = (
     'test_examples.py::test_[frw]*',
     'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
     # the commands of the documentation, and its web site
-    'test_shown_commands.py::test_commands_work_as_shown',
+    'test_documentation.py::test_commands_work_as_shown',
     'test_documentation_site.py::*',
     # a node under load, and a process that is stopped or killed
     'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
@@ -59,7 +59,7 @@ PROCESS = (
     'test_play_server.py::test_the_command_*',
     'test_play_server.py::test_without_*',
     'test_repository.py::test_every_source_*',
-    'test_shown_commands.py::test_a_line_*',
+    'test_documentation.py::test_a_line_*',
     'test_simulation.py::test_the_command_*',
     'test_examples.py::test_output_*',
     'test_examples.py::test_the_[ec]*',
@@ -97,7 +97,7 @@ PROCESS = (
     'test_command_line.py::test_the_output_*',
     'test_benchmarks.py::*',
     # studies, pictures and pages
-    'test_box_scenes.py::*',
+    'test_evaluate.py::*',
     'test_evaluation_scores.py::test_the_region_*',
     'test_fit_estimates.py::test_the_*',
     'test_draw.py::test_a_plot_survives_*',
