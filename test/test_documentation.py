@@ -8,14 +8,13 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable, Iterator
+from fnmatch import fnmatchcase
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 import yaml
-from shown_commands import ENDLESS, NOT_RUN, find_commands, find_unknown_blocks
-from shown_commands import PAGES as SHOWN_PAGES
-from shown_commands import is_listed as is_among
 from tiers import LONG, PROCESS, is_listed, list_test_functions
 
 from foc_ros.cli.main import list_commands
@@ -23,6 +22,53 @@ from foc_ros.core.config import list_parameters
 from foc_ros.ros.isolated_node import reserve_domain
 
 ROOT = Path(__file__).parents[1]
+SHOWN_PAGES = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'doc').glob('*.md')])
+"""Every line of a block marked `console` runs as it stands, page by page and in order, unless a pattern of NOT_RUN matches."""
+
+NOT_RUN = {
+    'make *': '.ci/run runs those that decide over a change; bench, people, stress and demo take minutes',
+    '.ci/run': 'it runs this test',
+    'scripts/tf2_check': 'clones and compiles tf2; run it before a release',
+    '.venv/bin/python *': 'takes minutes; test_benchmarks.py measures a part',
+    'echo "yaml *| sudo tee *': 'needs root',
+    'rosdep *': 'needs root or the network',
+    'colcon build *': 'scripts/colcon_check runs this line',
+    'source install/setup.bash': 'scripts/colcon_check runs this line',
+    'python3 -m venv *': 'needs the network',
+    'pip install *': 'needs the network',
+    'export *': 'the environment of the test has it, or it is for the commands of a ROS installation',
+    '. .venv/bin/activate': 'the program is on the path of the test already',
+    'ros2 *': 'needs a ROS installation; test_launch.py, test_node_process.py and scripts/colcon_check do the same',
+    'foc_ros evaluate *': 'takes minutes; test_evaluate.py runs it with few predictions',
+    'foc_ros fit *': 'takes minutes; test_fit.py runs it with few predictions, and the node with the parameters that it writes',
+    'foc_ros node --ros-args --params-file operator.yaml': 'needs the output of a fit',
+    'foc_ros play': 'runs until it is stopped, on a fixed port; test_play_browser.py starts it on a free one',
+    'foc_ros simulate *': 'takes minutes; test_simulation.py runs a part',
+}
+ENDLESS = 'foc_ros node *[!&]', 'python doc/examples/teleoperation_loop.py'
+"""Lines that run until they are interrupted."""
+KNOWN_BLOCKS = ('console', 'python', 'yaml', 'text', '{toctree}', '{eval-rst}')
+
+
+def find_commands(page: Path) -> Iterator[str]:
+    """Yield the command lines of a page; continued lines are joined, comments are removed."""
+    for block in re.findall(r'^```console\n(.*?)^```', page.read_text('utf-8'), re.MULTILINE | re.DOTALL):
+        for line in re.sub(r'\s*\\\n\s*', ' ', block).splitlines():
+            command = re.sub(r'(^|\s+)#.*$', '', line).strip()
+            if command:
+                yield command
+
+
+def is_among(command: str, patterns: Iterable[str]) -> bool:
+    return any(fnmatchcase(command, pattern) for pattern in patterns)
+
+
+def find_unknown_blocks(page: Path) -> list[str]:
+    """Return the kinds of blocks of a page that are unknown, and might contain commands that are not run."""
+    kinds = re.findall(r'^```([^\n`]*)\n(?:.*?)^```', page.read_text('utf-8'), re.MULTILINE | re.DOTALL)
+    return [kind for kind in kinds if kind not in KNOWN_BLOCKS]
+
+
 PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'doc').glob('**/*.md')])
 TESTS = list_test_functions()
 

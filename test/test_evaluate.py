@@ -15,7 +15,8 @@ from homotopy_scenes import AVOIDING
 from foc_ros.analysis.evaluation import Forecast, register_baseline
 from foc_ros.analysis.evaluation.baselines import BASELINES
 from foc_ros.analysis.evaluation.observations import observe
-from foc_ros.analysis.evaluation.questions import BOX_GOAL, GAP, PATH_CLASS, ask, ask_all, find_relevant_obstacles
+from foc_ros.analysis.evaluation.questions import GAP, PATH_CLASS, ask, ask_all, find_relevant_obstacles
+from foc_ros.analysis.evaluation.questions import GOAL as GOAL_QUESTION
 from foc_ros.analysis.evaluation.report import find_gaps, find_label_mismatches
 from foc_ros.analysis.evaluation.scores import leave_goals_out
 from foc_ros.analysis.recordings import find_recordings
@@ -263,7 +264,7 @@ def test_objects_that_are_picked_up_are_goals_and_obstacles(picks):
     assert first.ids == ('Target/0', 'ObstacleLong/0', 'LeftBoundary/0') and first.goals.tolist() == [[0.3, 0.0], [0.15, 0.0]]
     assert {*first.candidates.goal.tolist()} == {0, 1} and first.candidates.has_likelihood.all()
     assert find_label_mismatches(picks, [observed]) == {}
-    ((_, question), *_) = ask_all(observed, BOX_GOAL)
+    ((_, question), *_) = ask_all(observed, GOAL_QUESTION)
     assert (question.possible, question.truth) == (2, 0)
 
 
@@ -290,7 +291,7 @@ def test_the_classes_taken_are_as_labelled(name, tmp_path):
     assert ask(PATH_CLASS, first, relevant).possible == 24
     assert ask(GAP, first, relevant).possible == 2
     # a goal stands behind each gap of the last row
-    assert ask(BOX_GOAL, first, relevant).truth == find_gaps(first)[2]
+    assert ask(GOAL_QUESTION, first, relevant).truth == find_gaps(first)[2]
     label = next(line for line in (AVOIDING / 'labels.csv').read_text().splitlines() if line.startswith(f'{name},'))
     (tmp_path / 'labels.csv').write_text(f'recording,gap_row1,gap_row2,gap_row3\n{label}\n')
     assert find_label_mismatches(tmp_path, [recording]) == {}
