@@ -62,7 +62,7 @@ def register_plant(name: str, factory: Callable[..., Any]) -> None:
     >>> foc_ros.register_plant('double_integrator', lambda settings: foc_ros.PlantModel(discretise))
     >>> config = foc_ros.Config().with_values({'foc.plant': 'double_integrator'})
     >>> foc_ros.solve((0, 0), (0.3, 0), config=config).mean.shape
-    (51, 4)
+    (31, 4)
     """
     _register(PLANTS, name, factory)
 

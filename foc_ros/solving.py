@@ -111,7 +111,7 @@ def solve(
     >>> solution.status, solution.label
     (<Status.SOLVED: 'solved'>, 'goal0:-0')
     >>> solution.path.shape
-    (51, 2)
+    (31, 2)
     """
     table, config = _collect_goals(goal), _fix_parameters(config, eta, strategy, duration_s)
     if len(table.positions) > 1:

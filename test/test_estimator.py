@@ -310,7 +310,7 @@ def _plan(duration_s, passing, mean):
 
 def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods():
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
-    announced = replace_values(Config(), {'likelihood.other_goal': 0.0})
+    announced = replace_values(Config(), {'likelihood.other_goal': 0.0, 'foc.steps': STEPS})
     exact = replace_values(announced, {'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0})
     sure = predict(exact, HAND, *scene, NO_TRACKS)[0]
     wide = replace_values(announced, {'foc.endpoint_stddev': 0.006, 'duration.spread': 0.3})

@@ -86,7 +86,7 @@ def test_a_plant_is_solved_by_every_strategy(strategy):
     config = foc_ros.Config().with_values({'foc.plant': 'double', 'foc.noise_x': 0.05, 'foc.noise_y': 0.05})
     for each in foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy=strategy, config=config):
         assert each.status is Status.SOLVED
-        assert each.mean.shape == (51, 4)
+        assert each.mean.shape == (31, 4)
         assert foc_ros.monte_carlo(each.solution, 1000).step[2] >= 0.9
 
 
@@ -164,7 +164,7 @@ def test_a_damped_mass_avoids_obstacles_as_surely_as_wanted(strategy):
 
 def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(register):
     config = register('outside', lambda settings: PlantModel(discretise_triple_integrator))
-    values = {'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2, 'duration.wait_s': 0.1}
+    values = {'foc.steps': STEPS, 'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2, 'duration.wait_s': 0.1}
     scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
     ours, theirs = (predict(each.with_values(values), MOVING, *scene, NO_TRACKS)[0] for each in (Config(), config))
     assert [each.label for each in ours.candidates] == [each.label for each in theirs.candidates]

@@ -78,6 +78,17 @@ def test_the_predictor_takes_the_object_of_a_goal():
         assert label in [each.label for each in predictor.update(0.0 if given is None else 10.0, (0.0, 0.0)).candidates]
 
 
+def test_likelihoods_do_not_depend_on_the_side_on_which_a_path_ends_in_its_goal():
+    goals = np.array([[0.2, 0.1], [0.25, -0.15]])
+    cups = make_obstacles(goals, 1e-3, polygons=[BOX, BOX])
+    found = []
+    for y in (-1e-5, -1e-6, 0.0, 1e-6, 1e-5):
+        hand = HandState(0, np.array([0.0, y, 0.0, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6))
+        prediction = predict(Config(), hand, cups, goals, NO_TRACKS)[0]
+        found.append(sum(each.likelihood for each in prediction.candidates if each.candidate.goal == 1))
+    np.testing.assert_allclose(found, found[0], atol=1e-3)
+
+
 TYPES = RosbagsTypes(TYPESTORE)
 LEFT_GOAL, RIGHT_GOAL, MIDDLE = (0.3, 0.25), (0.3, -0.25), (0.32, 0.0)
 PRIOR = Config().likelihood.other_goal

@@ -35,7 +35,7 @@ from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
 from foc_ros.ros.messages.plane import Transform, compute_rotation, lift
 
-CONFIG = replace_values(Config(), {'budget_s': 0.0, 'foc.noise_x': 0.1, 'foc.noise_y': 0.1})
+CONFIG = replace_values(Config(), {'foc.steps': 50, 'budget_s': 0.0, 'foc.noise_x': 0.1, 'foc.noise_y': 0.1})
 STEPS, DT = CONFIG.foc.steps, 0.02
 PRECISE = {'foc.endpoint_stddev': 0.0, 'duration.spread': 0.0}
 """Parameters without which the band of heights would be wider than most of these scenes."""

@@ -62,7 +62,7 @@ class Group:
 class FocConfig(Group):
     """The forward optimal control."""
 
-    steps: int = _p(50, 'number of control steps N of the horizon', '', 5, 400)
+    steps: int = _p(30, 'number of control steps N of the horizon', '', 5, 400)
     eta: float = _p(0.9, 'wanted probability of avoidance, of what `foc.risk` names', '', 0.0, 0.999)
     bound: str = _p(
         'cantelli',

@@ -1,26 +1,13 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Initial guesses: the positions of a hand that moves along a path in time, smooth and with room to the obstacles."""
+"""Initial guesses: the positions of a hand that moves along a path in time."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.types import Array
-
-from .graph import Rows
-from .names import Names
-from .sides import sweep
-
-SLOPE = 0.5
-"""A hand in a margin leaves it by this much for each metre of its path, and enters the margin of its goal likewise."""
-ROOM = 0.002
-"""Distance from the grown obstacles that a guess keeps where there is room [m]."""
 
 
 def compute_path_lengths(path: Array) -> Array:
@@ -82,57 +69,3 @@ def guess_path(start: Array, goal: Array, steps: int, amplitude: float = 0.0, vi
         raise SceneError('guess', 'a goal away from the start', f'both at {start.tolist()}')
     aside = amplitude / distance * np.array([-direction[1], direction[0]])
     return path + np.outer(np.sin(np.pi * np.arange(steps + 1) / steps), aside)
-
-
-def make_guesses(taut: Sequence[Array], goals: Sequence[int], obstacles: Obstacles, names: Names) -> list[Array]:
-    """Smooth the timed positions (N + 1, 2) [m] on taut paths to goals (rows), and move them away from the obstacles.
-
-    If hand or goal lies in the margin of an obstacle, the guess leaves or enters the margin gradually. A guess that smoothing
-    brought to the other side of an obstacle stays taut. names: how the obstacles count.
-    """
-    if not taut:
-        return []
-    before, guesses = np.array(taut), np.array(taut)
-    step = np.hypot(*np.diff(before, axis=1).transpose(2, 0, 1)).max(initial=0.0)
-    apart = np.hypot(*(before.reshape(-1, 1, 2) - obstacles.centre).transpose(2, 0, 1)) - obstacles.extent
-    near = np.flatnonzero((apart < names.radius - obstacles.radius + ROOM + step).any(axis=0))
-    shapes = obstacles.take(near)
-    wanted = _measure_wanted(before, list(goals), shapes, names, near)
-    for room in (ROOM, ROOM, 0.0):  # the last smoothing uses up the room
-        guesses[:, 1:-1] += (guesses[:, :-2] + guesses[:, 2:] - 2.0 * guesses[:, 1:-1]) / 4.0
-        guesses = _push(guesses, wanted + room, shapes)
-    guesses = _push(guesses, wanted, shapes)
-    _, distance = measure_offsets(guesses.reshape(-1, 2), shapes)
-    is_clear = (distance.reshape(wanted.shape) >= wanted - 1e-12).all(axis=2, keepdims=True)
-    guesses = np.where(is_clear, guesses, before)
-    angles = [sweep(each[:, :, None] - shapes.centre) for each in (guesses, before)]
-    apart = np.abs(angles[0] - angles[1]).max(axis=1, initial=0.0)
-    return list(np.where(apart[:, None, None] < np.pi, guesses, before))
-
-
-def _measure_wanted(paths: Array, goals: list[int], shapes: Obstacles, names: Names, rows: Rows) -> Array:
-    """Return the distance (k, N + 1, r) [m] that positions (k, N + 1, 2) want from the polygons of some obstacles (r,)."""
-    steps = np.hypot(*np.diff(paths, axis=1, prepend=paths[:, :1]).transpose(2, 0, 1))
-    along, goal = np.cumsum(steps, axis=1)[..., None], np.array(goals)[:, None]
-    _, ends = measure_offsets(paths[:, [0, -1]].reshape(-1, 2), shapes)
-    at_hand, at_goal = ends.reshape(len(paths), 2, 1, len(rows)).transpose(1, 0, 2, 3)
-    leaving = np.where(names.holds_hand[rows], at_hand + SLOPE * along, np.inf)
-    entering = np.where(names.holds_goal[goal, rows][:, None], at_goal + SLOPE * (along[:, -1:] - along), np.inf)
-    held = np.minimum(names.radius[rows], np.minimum(leaving, entering))
-    wanted: Array = np.where(names.blocks[goal, rows][:, None], held, -np.inf)
-    return wanted
-
-
-def _push(paths: Array, wanted: Array, shapes: Obstacles) -> Array:
-    """Move positions (k, N + 1, 2) to the wanted distance (k, N + 1, r) from that obstacle to which each is too near by most."""
-    if not len(shapes):
-        return paths
-    points, wanted = paths.reshape(-1, 2), wanted.reshape(-1, len(shapes))
-    offset, distance = measure_offsets(points, shapes)
-    rows, worst = np.arange(len(points)), (wanted - distance).argmax(axis=1)
-    away, apart = offset[rows, worst], distance[rows, worst]
-    missing = np.maximum(wanted[rows, worst] - apart, 0.0)
-    moved: Array = points + away * (missing / np.where(apart == 0.0, np.inf, apart))[:, None]
-    moved = moved.reshape(paths.shape)
-    moved[:, [0, -1]] = paths[:, [0, -1]]
-    return moved

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.obstacles.geometry import find_offset, tabulate_edges
 from foc_ros.core.solution import LEFT, RIGHT, Solution
 from foc_ros.core.types import Array, HandState
 
@@ -90,20 +91,24 @@ class Decisions(NamedTuple):
 
 
 def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArray[np.int8]:
-    """Return LEFT or RIGHT, (k, n): the side on which the mean path of each solution passes each obstacle."""
+    """Return LEFT or RIGHT, (k, n): the side on which the mean path of each solution passes each obstacle; 0 if it ends in it."""
     if not solutions:
         return np.zeros((0, len(obstacles)), dtype=np.int8)
-    angles = sweep(find_offsets(solutions, obstacles)[1])
-    return np.where(angles < 0.0, LEFT, RIGHT).astype(np.int8)
+    offset, edges = find_offsets(solutions, obstacles)[1], tabulate_edges(obstacles.vertices, obstacles.corners)
+    is_end = find_offset(offset[:, -1, :, 0], offset[:, -1, :, 1], edges).distance < obstacles.radius
+    return np.where(is_end, 0, np.where(sweep(offset) < 0.0, LEFT, RIGHT)).astype(np.int8)
 
 
 def find_decisions(
     sides: NDArray[np.int8], goal: NDArray[np.intp], obstacles: Obstacles, hand: HandState, goals: Array
 ) -> Decisions:
-    """Find the decisions of classes that pass obstacles on sides (k, n) and lead to goals (k,), rows of goals (g, 2) [m]."""
+    """Find the decisions of classes that pass obstacles on sides (k, n) and lead to goals (k,), rows of goals (g, 2) [m].
+
+    The side 0, of an obstacle in which a path ends, decides nothing.
+    """
     here, start = hand.mean[:2], hand.mean[:2] if hand.onset_position is None else hand.onset_position
     direction = find_direction(start, goals)
-    is_open = (sides != sides[:1]).any(axis=0)
+    is_open = (sides == LEFT).any(axis=0) & (sides == RIGHT).any(axis=0)
     open_obstacles, is_left = np.flatnonzero(is_open), sides[:, is_open] == LEFT
     obstacles = obstacles.take(open_obstacles)
     row, along = find_rows(obstacles, direction, start, goals), obstacles.centre @ direction

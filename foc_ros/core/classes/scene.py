@@ -19,7 +19,7 @@ from foc_ros.core.solution import LEFT, RIGHT, Candidate
 from foc_ros.core.types import Array, as_readonly
 
 from .graph import Graph, Lines, Rows, build_graph
-from .guess import compute_path_lengths, make_guesses, timed
+from .guess import compute_path_lengths, timed
 from .names import find_names, name_course, take_near
 from .outlines import outline_obstacles
 from .paths import PathQuery, find_shortest_paths
@@ -112,21 +112,14 @@ class SearchScene:
                 classes.append(PathClass(round(key, 9), f'goal{goal}:{name_course(sides)}', goal, sides, points))
             yield from [each for each in sorted(classes) if not self._is_left_out(each.points)]
 
-    def make_candidates(
-        self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int, is_smooth: bool = True
-    ) -> tuple[Candidate, ...]:
-        """Return the candidates of classes, with guesses for the time to go to each goal [s], smooth ones or taut ones."""
-        found = [each for each in classes if each.known is None]
-        guesses = [timed(each.points, self._velocity, duration_s[each.goal], steps) for each in found]
-        if is_smooth:
-            guesses = make_guesses(guesses, [each.goal for each in found], self._near, self.names)
-        made = {
-            each.label: Candidate(
-                each.label, each.goal, each.sides, as_readonly(guess), float(compute_path_lengths(each.points)[-1])
-            )
-            for each, guess in zip(found, guesses, strict=True)
-        }
-        return tuple([each.known or made[each.label] for each in classes])
+    def make_candidates(self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int) -> tuple[Candidate, ...]:
+        """Return the candidates of classes, with their shortest paths as guesses for the time to go to each goal [s]."""
+        made = []
+        for each in classes:
+            guess = as_readonly(timed(each.points, self._velocity, duration_s[each.goal], steps))
+            length = float(compute_path_lengths(each.points)[-1])
+            made.append(each.known or Candidate(each.label, each.goal, each.sides, guess, length))
+        return tuple(made)
 
     def _connect_hand(self, rows: Rows) -> tuple[Graph, Lines]:
         """Return the graph of the obstacles that block the paths to a goal, and the lines from the hand to its nodes."""

@@ -130,7 +130,7 @@ def search(
     candidates = scene.make_candidates(chosen, duration_s, steps)
     courses, reached = {each.course for each in chosen}, {each.goal for each in chosen}
     seen = {each.label: each for each in ranking.seen if each.course not in courses or each.goal not in reached}
-    unfollowed = scene.make_candidates(tuple(seen.values()), duration_s, steps, is_smooth=False)
+    unfollowed = scene.make_candidates(tuple(seen.values()), duration_s, steps)
     return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal, unfollowed)
 
 

@@ -146,14 +146,15 @@ def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obst
 
     Two paths from one hand pass an obstacle on different sides if the angles that they sweep about it differ by more than half a
     turn. They separate at the first such obstacle, when the first of the two is nearest to it. A parabola through three
-    steps gives this time, so that it does not jump.
+    steps gives this time, so that it does not jump. A path passes an obstacle in which it ends on neither side.
     """
     if not outcomes:
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
     dt, offset = find_offsets([each.solution for each in outcomes], obstacles)
     swept, edges = sweep(offset), tabulate_edges(obstacles.vertices, obstacles.corners)
-    passing_s = dt[:, None] * _find_minima(find_offset(offset[..., 0], offset[..., 1], edges).distance)
-    is_opposite = np.abs(swept[:, None] - swept) > np.pi
+    distance = find_offset(offset[..., 0], offset[..., 1], edges).distance
+    passing_s, passes = dt[:, None] * _find_minima(distance), distance[:, -1] >= obstacles.radius
+    is_opposite = (np.abs(swept[:, None] - swept) > np.pi) & passes[:, None] & passes
     after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)
     return BranchTimes(after_s, np.isinf(after_s).argmax(axis=1))
 

@@ -128,7 +128,9 @@ def _stack_starts(
             controls.append(start.control * problem.horizon.gain)
             continue
         for tightness in (1.0, 1e2, 1e4):
-            control = follow(problem, start.path, tightness)
+            # a path that is followed too tightly has an effort, and so a variance, that makes its margins meaningless
+            weight = problem.horizon.position_response.smoothing / tightness
+            control = follow(problem, 1.0 + np.arange(margins.steps), start.path[1:], weight)
             one = rows[[row]]
             swept = margins.sweep(one, margins.find_path(margins.move(one, control[None])))
             if (np.abs(swept - angles[row]) < np.pi).all():

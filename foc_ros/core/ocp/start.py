@@ -9,11 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foc_ros.core.interpolation import interpolate_position
 from foc_ros.core.solution import Solution
 from foc_ros.core.types import Array
 
 from .margin import Indices
 from .problem import Problem
+
+HELD = 3e-3
+"""Distance from the places where an earlier solution passed its contacts that costs as much as a change of the control by its
+whole length, relative to the scene."""
+JITTER = 1e-13
+"""Softness of the goal: its rows, of unit length, may depend on each other."""
 
 
 class Forces(NamedTuple):
@@ -50,9 +57,10 @@ def cold_start(guess: Array) -> Start:
 def warm_start(previous: Solution, problem: Problem) -> Start:
     """Start at an earlier solution, resampled at the new steps so that both end at the same time.
 
-    Before the earlier solution begins, the hand is where it began; after it ends, the hand rests at its goal.
+    Before the earlier solution begins, the hand is where it began; after it ends, the hand rests at its goal. The control is
+    changed as little as it has to be so that the hand, from where it is now, passes the contacts as the earlier solution did.
     """
-    steps, dt = problem.horizon.steps, problem.horizon.dt
+    steps, dt, gain = problem.horizon.steps, problem.horizon.dt, problem.horizon.gain
     elapsed_s = previous.dt * len(previous.control) - dt * steps
     path, control = resample(previous, elapsed_s, dt, steps)
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
@@ -64,6 +72,10 @@ def warm_start(previous: Solution, problem: Problem) -> Start:
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     forces = Forces(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
+    if kept:
+        places = interpolate_position(previous.mean, previous.dt, forces.time * dt + elapsed_s)
+        weight = (HELD * problem.extent) ** 2 / cost
+        control = follow(problem, forces.time, places, weight / gain**2, control * gain) / gain
     return Start(path, control, forces, previous.safety_factor, previous.lam)
 
 
@@ -80,20 +92,36 @@ def resample(previous: Solution, elapsed_s: float, dt: float, steps: int) -> tup
     return path, (np.diff(control, axis=0) * (previous.dt / dt)).T.ravel()
 
 
-def follow(problem: Problem, path: Array, tightness: float = 1.0) -> Array:
-    """Return the control (2N,), in units of `Horizon.gain`, that follows a path (N + 1, 2) smoothly and meets the goal.
+def follow(problem: Problem, times: Array, places: Array, weight: float, control: Array | None = None) -> Array:
+    """Return the control nearest to a given one with which the mean meets the goal and is near some places at their times.
 
-    It minimises squared distances at the steps plus a weight of the effort: a path that is followed too tightly has an effort,
-    and so a variance, that makes its margins meaningless. tightness: by how much the distances weigh more than usually.
+    It minimises the squared distances from the places plus a weight of the squared change of the control. Its dual has one
+    unknown for each coordinate of a place and for each state that the goal fixes.
+
+    Parameters
+    ----------
+    problem
+        The problem, of N steps.
+    times, places
+        Times (q,) in steps, after 0, and positions (q, 2) [m].
+    weight
+        Of the squared change of the control in units of `Horizon.gain` [m^2].
+    control
+        The given control (2N,), in units of `Horizon.gain`; zero where there is none.
+
+    Returns
+    -------
+    Array
+        The control (2N,), in units of `Horizon.gain`.
     """
-    response, gain = problem.horizon.position_response, problem.horizon.gain
+    horizon = problem.horizon
+    control = np.zeros(2 * horizon.steps) if control is None else control
     rows, targets, softness = problem.goal_rows
-    rows, targets = rows[softness == 0.0] / gain, targets[softness == 0.0]
+    rows, targets = rows[softness == 0.0] / horizon.gain, targets[softness == 0.0]
     length = np.sqrt((rows**2).sum(axis=1))
-    rows, targets = rows / length[:, None], targets / length
-    to_steps = response.at_steps.reshape(-1, rows.shape[1])
-    square = to_steps.T @ to_steps + response.smoothing / tightness * np.eye(rows.shape[1])
-    near = np.linalg.solve(square, np.column_stack((to_steps.T @ (path[1:] - problem.free[1:, :2]).ravel(), rows.T)))
-    free, held = near[:, 0], near[:, 1:]
-    control: Array = free + held @ np.linalg.lstsq(rows @ held, targets - rows @ free, rcond=None)[0]
-    return control
+    free = interpolate_position(problem.free, horizon.dt, times * horizon.dt)
+    rows = np.concatenate((rows / length[:, None], horizon.position_response.at(times).reshape(-1, len(control))))
+    missing = np.concatenate((targets / length, (places - free).ravel())) - rows @ control
+    softness = np.concatenate((np.full(len(length), JITTER), np.full(2 * len(times), weight)))
+    followed: Array = control + rows.T @ np.linalg.solve(rows @ rows.T + np.diag(softness), missing)
+    return followed
