@@ -282,27 +282,23 @@ POSE, CLOUD, MARKERS, POSES = (
     'geometry_msgs/msg/PoseArray',
 )
 PLAIN = {'/hand_pose': POSE, '/obstacles': CLOUD, '/goals': POSES}
+PSM = {'/PSM1/measured_cp': POSE, '/PSM1/setpoint_cp': POSE, '/a/obstacle_markers': MARKERS, '/goal_pose': POSE}
+OTHERS = {'/tool': POSE, '/scene': CLOUD, '/targets': POSES, '/camera': 'sensor_msgs/msg/Image'}
+OUTPUTS = {'/hand_pose': POSE, '/shapes': MARKERS, '/goals': POSES, '/foc/prediction': CLOUD, '/foc/markers': MARKERS}
+TWO_ARMS = {'/r/measured_cp': POSE, '/l/measured_cp': POSE, '/obstacles': CLOUD, '/goals': POSES}
+CHOOSE = 'several topics could be'
 
 
 @pytest.mark.parametrize(
     ('topics', 'expected'),
     [
         (PLAIN, {'hand_pose': '/hand_pose', 'obstacles': '/obstacles', 'goals': '/goals'}),
-        (
-            {'/PSM1/measured_cp': POSE, '/PSM1/setpoint_cp': POSE, '/a/obstacle_markers': MARKERS, '/goal_pose': POSE},
-            {'hand_pose': '/PSM1/measured_cp', 'obstacle_markers': '/a/obstacle_markers', 'goal_pose': '/goal_pose'},
-        ),
-        (
-            {'/tool': POSE, '/scene': CLOUD, '/targets': POSES, '/camera': 'sensor_msgs/msg/Image'},
-            {'hand_pose': '/tool', 'obstacles': '/scene', 'goals': '/targets'},
-        ),
+        (PSM, {'hand_pose': '/PSM1/measured_cp', 'obstacle_markers': '/a/obstacle_markers', 'goal_pose': '/goal_pose'}),
+        (OTHERS, {'hand_pose': '/tool', 'obstacles': '/scene', 'goals': '/targets'}),
         ({**PLAIN, '/left/measured_cp': POSE, '/right/measured_cp': POSE}, {'hand_pose': '/hand_pose'}),
         ({**PLAIN, '/obstacle_markers': MARKERS}, {'obstacles': '/obstacles', 'obstacle_markers': '/obstacle_markers'}),
         ({'/hand_pose': POSE, '/obstacles': MARKERS, '/goals': POSES}, {'obstacle_markers': '/obstacles'}),
-        (
-            {'/hand_pose': POSE, '/shapes': MARKERS, '/goals': POSES, '/foc/prediction': CLOUD, '/foc/markers': MARKERS},
-            {'obstacle_markers': '/shapes'},
-        ),
+        (OUTPUTS, {'obstacle_markers': '/shapes'}),
     ],
 )
 def test_topics_are_found(topics, expected):
@@ -314,20 +310,12 @@ def test_topics_are_found(topics, expected):
 @pytest.mark.parametrize(
     ('topics', 'chosen', 'message'),
     [
-        (
-            {'/obstacles': CLOUD, '/goals': POSES},
-            None,
-            'no topic for hand_pose (geometry_msgs/msg/PoseStamped); the recording has /goals',
-        ),
-        ({'/hand_pose': POSE, '/goals': POSES}, None, 'no topic for obstacles (sensor_msgs/msg/PointCloud2) or obstacle_markers'),
-        ({'/hand_pose': POSE, '/obstacles': CLOUD}, None, 'no topic for goals (geometry_msgs/msg/PoseArray) or goal_pose'),
+        ({'/obstacles': CLOUD, '/goals': POSES}, None, f'no topic for hand_pose ({POSE}); the recording has /goals'),
+        ({'/hand_pose': POSE, '/goals': POSES}, None, f'no topic for obstacles ({CLOUD}) or obstacle_markers'),
+        ({'/hand_pose': POSE, '/obstacles': CLOUD}, None, f'no topic for goals ({POSES}) or goal_pose'),
         ({}, None, 'the recording has no topics'),
-        (
-            {'/r/measured_cp': POSE, '/l/measured_cp': POSE, '/obstacles': CLOUD, '/goals': POSES},
-            None,
-            'several topics could be hand_pose: /l/measured_cp, /r/measured_cp; choose with --remap hand_pose:=TOPIC',
-        ),
-        ({'/hand_pose': POSE, '/a': CLOUD, '/b': MARKERS, '/goals': POSES}, None, 'several topics could be obstacles: /a, /b'),
+        (TWO_ARMS, None, f'{CHOOSE} hand_pose: /l/measured_cp, /r/measured_cp; choose with --remap hand_pose:=TOPIC'),
+        ({'/hand_pose': POSE, '/a': CLOUD, '/b': MARKERS, '/goals': POSES}, None, f'{CHOOSE} obstacles: /a, /b'),
         (PLAIN, {'hand': '/hand_pose'}, "no input is named 'hand': expected one of hand_pose, obstacles"),
         (PLAIN, {'hand_pose': '/other'}, 'topic /other chosen for hand_pose is not in the recording, which has'),
         (PLAIN, {'goals': '/obstacles'}, f'topic /obstacles chosen for goals: expected type {POSES}, got {CLOUD}'),

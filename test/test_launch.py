@@ -48,25 +48,24 @@ class Recorded:
         self.given, self.named = given, named
 
 
-NAMES = {
-    'launch': ['LaunchContext', 'LaunchDescription'],
-    'launch.actions': ['DeclareLaunchArgument', 'IncludeLaunchDescription', 'OpaqueFunction'],
-    'launch.launch_description_sources': ['PythonLaunchDescriptionSource'],
-    'launch.substitutions': ['LaunchConfiguration'],
-    'launch_ros': [],
-    'launch_ros.actions': ['Node'],
-    'launch_ros.parameter_descriptions': ['ParameterValue'],
-}
+class Substitute(ModuleType):
+    """In place of a module of launch: every class of it is recorded."""
+
+    def __getattr__(self, name):
+        if name.startswith('__'):
+            raise AttributeError(name)
+        return type(name, (Recorded,), {})
+
+
+MODULES = [f'launch{part}' for part in ('', '.actions', '.launch_description_sources', '.substitutions')]
+MODULES += [f'launch_ros{part}' for part in ('', '.actions', '.parameter_descriptions')]
 
 
 @pytest.fixture
 def described(monkeypatch):
     """Return a function that runs a launch file with substitutes for launch, and returns its names and its description."""
-    for name, classes in NAMES.items():
-        module = ModuleType(name)
-        for each in classes:
-            setattr(module, each, type(each, (Recorded,), {}))
-        monkeypatch.setitem(sys.modules, name, module)
+    for name in MODULES:
+        monkeypatch.setitem(sys.modules, name, Substitute(name))
 
     def run(name):
         names = runpy.run_path(str(ROOT / 'launch' / f'{name}.launch.py'))
@@ -173,13 +172,7 @@ def test_two_arms_share_the_obstacles(ros, prefix):
 
 CONFIG = ROOT / 'config'
 TOPICS = {f'/{name}': kind for name, kind in TYPES.items()} | {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()}
-SHOWN = {
-    'MarkerArray': 'MarkerArray',
-    'PointCloud2': 'PointCloud2',
-    'Path': 'Path',
-    'Pose': 'PoseStamped',
-    'PoseArray': 'PoseArray',
-}
+SHOWN = {name: name for name in ('MarkerArray', 'PointCloud2', 'Path', 'PoseArray')} | {'Pose': 'PoseStamped'}
 
 
 def test_rviz_shows_every_output_it_can_display():
