@@ -27,25 +27,18 @@ MS = NANOSECONDS // 1000
 CONFIG = replace_values(Config(), {'rate_hz': 50.0, 'scene.timeout_s': 2.0, 'foc.steps': 20})
 
 
-class Recorder:
-    """Replaces the predictor and records its arguments."""
-
-    def __init__(self):
-        self.calls: list[Any] = []
-
-    def __call__(self, config, hand, obstacles, goals, memory, knowledge, deadline, goal_heights):
-        assert not knowledge.library.demonstrations and goal_heights is None
-        assert deadline is NEVER
-        self.calls.append((config, hand, obstacles, goals, memory))
-        label = f'call{len(self.calls)}'
-        return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), label), Tracks(stamp_ns=len(self.calls))
-
-
 @pytest.fixture
-def recorder(monkeypatch):
-    stand_in = Recorder()
-    monkeypatch.setattr(module, 'predict', stand_in)
-    return stand_in
+def calls(monkeypatch):
+    """Put a stand-in in place of the predictor; return the hands that it is asked about."""
+    found: list[Any] = []
+
+    def predict(config, hand, obstacles, goals, memory, knowledge, deadline, goal_heights):
+        assert not knowledge.library.demonstrations and goal_heights is None and deadline is NEVER
+        found.append(hand)
+        return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), f'call{len(found)}'), Tracks(stamp_ns=len(found))
+
+    monkeypatch.setattr(module, 'predict', predict)
+    return found
 
 
 def hand(ms, x=0.0, frame='world'):
@@ -61,7 +54,7 @@ def ready(config=CONFIG):
 
 
 @pytest.mark.parametrize(('period_ms', 'expected'), [(1.0, 50), (14.0, 48), (19.9, 50), (30.0, 34)])
-def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder, period_ms, expected):
+def test_the_rate_is_reached_whatever_the_period_of_the_samples(calls, period_ms, expected):
     pipeline, stamps = ready(), []
     for ms in np.arange(0.0, 1000.0, period_ms):
         pipeline.add_hand_sample(hand(ms))
@@ -74,7 +67,7 @@ def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder, period
     assert np.diff(stamps).min() >= 10 * MS
 
 
-def test_every_reason_for_no_prediction_is_explained(recorder):
+def test_every_reason_for_no_prediction_is_explained(calls):
     pipeline = Pipeline(CONFIG)
     assert pipeline.not_ready_reason() == 'no hand pose yet'
     pipeline.add_hand_sample(hand(0.0))
@@ -93,7 +86,7 @@ def test_every_reason_for_no_prediction_is_explained(recorder):
     assert pipeline.not_ready_reason() == 'disengaged'
     assert pipeline.predict() is None
     assert pipeline.counts == {'predict_no_obstacles': 1, 'predict_stale': 1, 'predict_disengaged': 1}
-    assert recorder.calls == []
+    assert calls == []
 
 
 def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch):
