@@ -9,10 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from bag_helpers import messages, write_bag
 
 from foc_ros.cli import main as command_line
-from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
 from foc_ros.io import terminal
 from foc_ros.io.terminal import COLUMNS, show_table
@@ -237,35 +235,8 @@ def test_a_full_standard_output_gives_2_and_one_line_and_a_closed_one_changes_no
     assert printed_to(A_LINE, preexec_fn=lambda: os.close(1)) == (0, '')
 
 
-POSTS = [
-    '{x: 0.15, y: 0.01, radius: 0.02, id: front_left_post}',
-    '{x: 0.2, y: 0.05, radius: 0.02, id: front_right_post_of_the_shelf}',
-    '{x: 0.25, y: -0.02, radius: 0.02, id: a_name_that_is_longer_than_a_column_40}',
-]
-POST_SCENE = f'start: [0, 0]\ngoals: [[0.3, 0.0], [0.3, 0.1]]\nobstacles: [{", ".join(POSTS)}]\n'
-
-
 def find_widest(printed):
     return max(map(len, printed.splitlines()))
-
-
-@pytest.mark.parametrize(
-    'arguments',
-    [
-        ['solve', 'scene.yaml', '--monte-carlo', '100'],
-        ['replay', 'bag', '--params', 'slow.yaml'],
-        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1', '--params', 'quick.yaml'],
-    ],
-    ids=lambda arguments: arguments[0],
-)
-def test_the_output_of_a_command_fits(tmp_path, monkeypatch, capsys, arguments):
-    monkeypatch.chdir(tmp_path)
-    Path('scene.yaml').write_text(POST_SCENE)
-    Path('slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}')
-    Path('quick.yaml').write_text('/**: {ros__parameters: {rate_hz: 5.0, foc.steps: 10}}')
-    write_bag(Path('bag'), messages(0.1))
-    assert main(arguments) == 0
-    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
 
 
 def test_a_wide_table_is_divided_and_loses_nothing(capsys):

@@ -94,7 +94,6 @@ PROCESS = (
     'test_decode_objects.py::test_a_bag_*',
     'test_parameters.py::test_every_configuration_*',
     'test_parameters.py::test_sections_apply_*',
-    'test_command_line.py::test_the_output_*',
     'test_benchmarks.py::*',
     # studies, pictures and pages
     'test_evaluate.py::*',
