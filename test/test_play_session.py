@@ -66,6 +66,9 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page):
     assert replay.describe_losses() == ''
     with BagReader(folder / recording.SESSION) as reader:
         assert sum(item.role == 'hand_pose' for item in reader) > len(stamps)
+    asyncio.run(work(page, 'report'))
+    report = page.session.report.read_text(encoding='utf-8')
+    assert '<h2>Score</h2>' in report and f'<td>{page.last("score")["rows"][0][2]}</td>' in report
 
 
 def test_a_blinded_page_learns_nothing_from_what_it_receives(page):
