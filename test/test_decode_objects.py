@@ -99,11 +99,8 @@ def test_a_wrong_object_is_refused(message, words):
 
 
 def test_detections_are_boxes_by_id():
-    found = decode_detections(
-        detections(detection((1, 2, 3), (0.4, 0.2, 0.1), 'cup;1'), detection((4, 5, 6), (0.4, 0.2, 0.1), turned=QUARTER)),
-        'xy',
-        0.01,
-    )
+    boxes = detection((1, 2, 3), (0.4, 0.2, 0.1), 'cup;1'), detection((4, 5, 6), (0.4, 0.2, 0.1), turned=QUARTER)
+    found = decode_detections(detections(*boxes), 'xy', 0.01)
     assert (found.stamp_ns, found.frame_id, found.dropped) == (SECOND, 'world', {})
     assert found.obstacles.ids == ('cup%3B1', '1') and found.obstacles.radius_stddev.tolist() == [0.01, 0.01]
     check_polygon(found.obstacles, 0, (1.0, 2.0), (0.4, 0.2), 0.0)

@@ -48,13 +48,13 @@ def test_end_to_end(tmp_path, capsys):
     assert perform(tmp_path / 'out', last_s=LAST_S) == 0
     assert dict(os.environ) == before
     printed = capsys.readouterr().out
-    told = [
+    told = (
         'The node starts ...',
         ' of 2.0 s   hand samples ',
         'The report is written ...',
         'predictions were made',
         'report/index.html',
-    ]
+    )
     places = [printed.find(words) for words in told]
     assert places == sorted(places) and places[0] == 0
     found = counted(tmp_path / 'out' / 'bag')

@@ -36,12 +36,8 @@ def test_the_cloud_contains_every_solved_candidate(types, plane):
     cloud = made('prediction', ways, types, plane)
     table = read_columns(cloud)
     assert list(table) == NAMES
-    assert (cloud.height, cloud.width, cloud.row_step, len(cloud.data)) == (
-        1,
-        2 * (STEPS + 1),
-        2 * (STEPS + 1) * 100,
-        2 * (STEPS + 1) * 100,
-    )
+    rows = 2 * (STEPS + 1)
+    assert (cloud.height, cloud.width, cloud.row_step, len(cloud.data)) == (1, rows, 100 * rows, 100 * rows)
     assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec, cloud.header.frame_id) == (5, 0, 'world')
     for index, each in enumerate(ways.solved_candidates):
         rows = table['candidate'] == index

@@ -62,11 +62,8 @@ def make_branch_times(after_s):
 @pytest.mark.parametrize('after_s', [0.0, 0.3, 2.0])
 def test_the_exponent_of_a_choice_fades_with_the_time_until_the_choice(after_s):
     fading = LikelihoodConfig(beta=2.0 * np.exp(-after_s / 0.7))
-    np.testing.assert_allclose(
-        compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(after_s)),
-        compute_likelihoods(THREE_COSTS, fading),
-        rtol=1e-12,
-    )
+    found = compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(after_s))
+    np.testing.assert_allclose(found, compute_likelihoods(THREE_COSTS, fading), rtol=1e-12)
 
 
 @pytest.mark.parametrize(('horizon_s', 'share'), [(1000.0, 0.0), (4.0, norm.cdf(-math.log(2.0) / 0.5)), (2.0, 0.5), (0.0, 1.0)])

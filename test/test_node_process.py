@@ -160,12 +160,8 @@ def test_the_state_is_changed_and_every_topic_is_received(client):
         assert client.ask(ChangeState, 'change_state', ChangeState.Request(transition=Transition(label=label))).success
         return str(client.ask(GetState, 'get_state', GetState.Request()).current_state.label)
 
-    assert [change(each) for each in ('deactivate', 'cleanup', 'configure', 'activate')] == [
-        'inactive',
-        'unconfigured',
-        'inactive',
-        'active',
-    ]
+    states = {'deactivate': 'inactive', 'cleanup': 'unconfigured', 'configure': 'inactive', 'activate': 'active'}
+    assert {each: change(each) for each in states} == states
     Player(client.graph).play_until(lambda: all(received.values()), f'a message on each of {", ".join(kinds)}')
 
 

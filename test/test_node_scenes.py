@@ -149,23 +149,26 @@ def test_several_nodes_of_one_process_are_independent(ros):
 
 def test_a_disk_that_is_full_ends_the_output_bag_in_one_line(tmp_path):
     bag = write_bag(tmp_path / 'reach')
-    command = [sys.executable, '-m', 'foc_ros', 'replay', str(bag), '--output', str(tmp_path / 'out')]
-    result = subprocess.run(
-        [*command, '--params', write_parameters(tmp_path)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-        # writes beyond this limit fail like those to a full disk
-        preexec_fn=lambda: (
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN),
-            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
-        ),
-    )
-    assert result.returncode == 2
-    assert len(result.stderr.strip().splitlines()) == 1
-    assert 'cannot be written' in result.stderr
+
+    def limit_files():
+        """Let writes beyond a limit fail like those to a full disk."""
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    command = [
+        sys.executable,
+        '-m',
+        'foc_ros',
+        'replay',
+        bag,
+        '--output',
+        tmp_path / 'out',
+        '--params',
+        write_parameters(tmp_path),
+    ]
+    pipes = {'capture_output': True, 'text': True, 'timeout': 100, 'check': False}
+    result = subprocess.run(command, cwd=ROOT, preexec_fn=limit_files, **pipes)
+    assert result.returncode == 2 and result.stderr.strip().count('\n') == 0 and 'cannot be written' in result.stderr
     assert not (tmp_path / 'out').exists()
 
 

@@ -95,11 +95,7 @@ def test_the_likelihood_of_the_path_taken_rises_and_frames_and_delay_are_measure
     steer(page, *ON)
     wait_for(page, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
     until(lambda: has_numbers(page), 'numbers', 20)
-    until(
-        lambda: READ.search(page.execute_script("return document.getElementById('numbers').textContent")),
-        'the latency in words',
-        20,
-    )
+    until(lambda: READ.search(text_of(page, 'numbers')), 'the latency in words', 20)
 
 
 def test_the_status_line_is_not_green_while_predictions_come_late(page):

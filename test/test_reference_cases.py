@@ -152,25 +152,17 @@ def test_classes_are_as_good_as_those_of_an_independent_solver():
     """At most one of all classes has a loss more than 0.05 above its reference; every path passes on the sides of its class."""
     worse, compared = {}, 0
     for scene in json.loads(REFERENCE.read_text('utf-8')):
-        problem = reach(
-            read_table(scene),
-            goal=scene['goal'],
-            steps=scene['steps'],
-            duration=scene['duration_s'],
-            noise=scene['noise_per_step'],
-            eta=scene['eta'],
-            preference=PREFERENCE,
-        )
+        given = {name: scene[name] for name in ('goal', 'steps', 'eta')}
+        given |= {'duration': scene['duration_s'], 'noise': scene['noise_per_step'], 'preference': PREFERENCE}
+        problem = reach(read_table(scene), **given)
         problem = replace(problem, initial_mean=np.array(scene['start']))
         references = {each['label']: each['reference'] for each in scene['classes']}
         candidates = [each for each in find_classes(problem) if each.label in references]
         assert len(candidates) == len(references)
         for candidate, solution in zip(candidates, solve_together(problem, candidates, 'optimal'), strict=True):
             compared += 1
-            sides, reference = (
-                find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories),
-                references[candidate.label],
-            )
+            sides = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
+            reference = references[candidate.label]
             assert all(sides.get(name, side) == side for name, side in candidate.sides)
             losses = [
                 PREFERENCE.compute_loss(effort, min(k + 1e-5, problem.wanted_k), problem.wanted_k)
