@@ -122,9 +122,8 @@ def test_an_outlier_is_refused_and_the_movement_goes_on():
 
 def test_lists_states_and_tables_are_accepted():
     by_position = foc_ros.solve([0, 0], [0.3, 0], [CUP], config=FAST)
-    by_state = foc_ros.solve(
-        np.zeros(6), np.array([0.3, 0.0]), foc_ros.core.obstacles.shapes.collect_obstacles([CUP]), config=FAST
-    )
+    table = foc_ros.core.obstacles.shapes.collect_obstacles([CUP])
+    by_state = foc_ros.solve(np.zeros(6), np.array([0.3, 0.0]), table, config=FAST)
     np.testing.assert_array_equal(by_position.mean, by_state.mean)
     moving = foc_ros.solve((0, 0, 0.3, 0, 0, 0), (0.3, 0), config=FAST)
     np.testing.assert_allclose(moving.mean[0, 2], 0.3)

@@ -20,9 +20,8 @@ ROOT = Path(__file__).parents[1]
 
 def start(program, *arguments, **options):
     command = [sys.executable, '-c', program, *arguments]
-    return subprocess.run(
-        command, **{'cwd': ROOT, 'capture_output': True, 'text': True, 'timeout': 100, 'check': False, **options}
-    )
+    given = {'cwd': ROOT, 'capture_output': True, 'text': True, 'timeout': 100, 'check': False}
+    return subprocess.run(command, **given | options)
 
 
 def test_the_program_exits_with_the_code_of_its_command():

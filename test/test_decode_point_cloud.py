@@ -54,9 +54,8 @@ def without_column(missing):
 
 @both_kinds
 def test_rows_become_obstacles(types):
-    table = obstacle_table(
-        [(0.5, 0.25, 0.125, 0.0625, 0.5, 1.0, 2.0, 3.0, 7), (1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 4000000000)], FULL
-    )
+    rows = (0.5, 0.25, 0.125, 0.0625, 0.5, 1.0, 2.0, 3.0, 7), (1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 4000000000)
+    table = obstacle_table([*rows], FULL)
     scene = decode_point_cloud(cloud(types, table, 3 * SECOND, 'base'), 'xz')
     assert (scene.stamp_ns, scene.frame_id, scene.dropped) == (3 * SECOND, 'base', {})
     assert scene.obstacles.ids == ('7', '4000000000')

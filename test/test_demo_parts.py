@@ -46,9 +46,8 @@ def send_scene(recorder):
 
 def send_hand(recorder, number, now):
     stamp_ns = START_NS + number * STEP_NS
-    recorder.add_sent(
-        Item('hand_pose', '/hand_pose', stamp_ns, encode_hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1)), b''), now
-    )
+    pose = encode_hand_pose(TYPES, stamp_ns, 'world', (0.0, 0.0, 0.1))
+    recorder.add_sent(Item('hand_pose', '/hand_pose', stamp_ns, pose, b''), now)
 
 
 def make(number):

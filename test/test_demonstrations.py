@@ -45,9 +45,8 @@ def hand(at=(0.0, 0.0), frame_id='world'):
 
 def recall(demonstration, obstacles=OBSTACLES, goals=GOAL, state=None, found=()):
     library = demonstration if isinstance(demonstration, list) else [demonstration]
-    return recall_demonstrations(
-        library, state or hand(), np.asarray(goals), obstacles, HomotopyConfig(), GuessTiming([1.0] * len(goals), 50), found, ()
-    )
+    scene, timing = (state or hand(), np.asarray(goals), obstacles), GuessTiming([1.0] * len(goals), 50)
+    return recall_demonstrations(library, *scene, HomotopyConfig(), timing, found, ())
 
 
 DEMONSTRATION = record_demonstration('world', bow(0.1), OBSTACLES)

@@ -107,9 +107,8 @@ def reach(target, goals, share=0.6, **values):
         if tick % 5 == 0:
             prediction = pipeline.predict()
             assert prediction is not None
-            assert sum(
-                each.likelihood for each in prediction.candidates
-            ) + prediction.unknown + prediction.other == pytest.approx(1)
+            followed = sum(each.likelihood for each in prediction.candidates)
+            assert followed + prediction.unknown + prediction.other == pytest.approx(1)
             found.append(prediction)
     return found
 
@@ -135,9 +134,8 @@ def test_guidance_yields_to_another_goal():
 def test_the_share_is_published_and_read_back():
     prediction = reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL])[-1]
     table, cloud = encode_likelihoods(prediction, TYPES), encode_prediction_cloud(prediction, 'xy', TYPES)
-    assert table.layout.dim[0].label.endswith(';other') and np.asarray(table.data).reshape(-1, 4)[:, 0].sum() == pytest.approx(
-        1.0
-    )
+    assert table.layout.dim[0].label.endswith(';other')
+    assert np.asarray(table.data).reshape(-1, 4)[:, 0].sum() == pytest.approx(1.0)
     read = read_snapshot(cloud, table, 'xy', prediction.obstacles, prediction.goal_positions)
     assert read.other == prediction.other == encode_prediction(prediction)['other']
     texts = [each.text for each in encode_markers(prediction, 'xy', TYPES).markers]
@@ -145,9 +143,8 @@ def test_the_share_is_published_and_read_back():
 
 
 def shares_of_goals(prediction):
-    return np.bincount(
-        [each.candidate.goal for each in prediction.candidates], [each.likelihood for each in prediction.candidates]
-    )
+    goals, shares = zip(*((each.candidate.goal, each.likelihood) for each in prediction.candidates), strict=True)
+    return np.bincount(goals, shares)
 
 
 def test_a_fast_hand_that_slows_down_goes_to_the_near_goal():
@@ -191,9 +188,8 @@ class Session:
         self.move(HOME)
 
     def announce(self, goals, names=()):
-        obstacles = (
-            make_obstacles(np.array(goals), 1e-3, ids=names, polygons=[HABIT_BOX] * len(goals)) if names else make_obstacles()
-        )
+        boxes = {'ids': names, 'polygons': [HABIT_BOX] * len(names)}
+        obstacles = make_obstacles(np.array(goals), 1e-3, **boxes) if names else make_obstacles()
         self.pipeline.set_obstacles('cloud', obstacles, None, 'world')
         self.pipeline.set_goals(np.array(goals), 'world')
 

@@ -57,9 +57,7 @@ def test_of_ten_thousand_obstacles_those_near_the_way_decide():
     few, many = predicted(make_obstacles(near, 0.02, 0.001)), predicted(make_obstacles([*near, *far], 0.02, 0.001))
     assert many.notes['culled'] == 10_000 - CONFIG.scene.max_obstacles
     assert 'culled' not in few.notes
-    assert [outcome.candidate.label for outcome in many.solved_candidates] == [
-        outcome.candidate.label for outcome in few.solved_candidates
-    ]
+    assert [each.label for each in many.solved_candidates] == [each.label for each in few.solved_candidates]
     for one, other in zip(many.solved_candidates, few.solved_candidates, strict=True):
         assert one.likelihood == pytest.approx(other.likelihood, rel=1e-6)
         assert np.abs(one.solution.path - other.solution.path).max() < 1e-6
@@ -153,18 +151,15 @@ def test_what_is_seen_and_not_followed_is_unknown(horizon_s):
 
 def test_goals_that_are_not_followed_are_unknown():
     angles = np.linspace(-0.7, 0.7, 80)
-    found = ask(
-        replace_values(SHARE_CONFIG, {'foc.steps': 5}), 0.3 * np.column_stack([np.cos(angles), np.sin(angles)]), make_obstacles()
-    )
+    goals = 0.3 * np.column_stack([np.cos(angles), np.sin(angles)])
+    found = ask(replace_values(SHARE_CONFIG, {'foc.steps': 5}), goals, make_obstacles())
     assert len(found.candidates) == 64
     assert found.unknown == pytest.approx(16.0 / 80.0, abs=0.02) and total(found) == pytest.approx(1.0)
 
 
 def test_where_nothing_is_solved_all_is_unknown():
-    hard = replace_values(
-        SHARE_CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': np.inf}
-    )
-    found = ask(hard)
+    hard = {'foc.eta': 0.999, 'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': np.inf}
+    found = ask(replace_values(SHARE_CONFIG, hard))
     assert found.unknown == 1.0 and found.most_likely is None and total(found) == 1.0
 
 

@@ -208,9 +208,8 @@ def test_markers_say_their_heights(plane):
     place = in_space((0.1, 0.0, 0.5), plane)
     turned = {'x': np.sin(np.pi / 8), 'w': np.cos(np.pi / 8)} if plane == 'xy' else {'w': 1.0}
     kinds = [(CUBE, (0.2, 0.2, 0.2), turned), (CYLINDER, (0.1, 0.1, 0.3), {'w': 1.0}), (SPHERE, (0.1, 0.1, 0.3), {'w': 1.0})]
-    message = marker_array(
-        TYPES, *(marker(TYPES, place, size, type=kind, id=i, turned=by) for i, (kind, size, by) in enumerate(kinds))
-    )
+    markers = (marker(TYPES, place, size, type=kind, id=i, turned=by) for i, (kind, size, by) in enumerate(kinds))
+    message = marker_array(TYPES, *markers)
     flat = marker(TYPES, place, (0.1, 0.1, 0.0), type=CYLINDER, id=3)
     message.markers.append(flat)
     half = 0.1 * np.sqrt(2.0) if plane == 'xy' else 0.1

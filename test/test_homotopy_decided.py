@@ -65,9 +65,8 @@ def test_long_detours_are_seen_and_not_followed_but_of_each_goal_the_shortest_wa
     left_out = {one.label for one in whole.candidates} - set(within)
     assert {one.label for one in few.unfollowed} & left_out
     before = next(one for one in whole.candidates if one.length > 1.1 * shortest[one.goal])
-    near = find(
-        obstacles, goals=[[0.1, 0.0], [0.2, 0.0]], detour=0.97 * before.length / shortest[before.goal], previous=(before,)
-    )
+    detour = 0.97 * before.length / shortest[before.goal]
+    near = find(obstacles, goals=[[0.1, 0.0], [0.2, 0.0]], detour=detour, previous=(before,))
     assert before.label in [one.label for one in near.candidates], 'a class that was followed stays a little longer'
 
 

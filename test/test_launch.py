@@ -87,10 +87,8 @@ def test_every_input_and_only_known_parameters_are_arguments(described):
     (node,) = names['create_node'](context)
     assert (node.named['package'], node.named['executable']) == ('foc_ros', 'foc_node')
     (overrides,) = node.named['parameters']
-    assert {name: (each.given[0], each.named['value_type']) for name, each in overrides.items()} == {
-        'plane': ('xz', str),
-        'autostart': ('false', bool),
-    }
+    found = {name: (each.given[0], each.named['value_type']) for name, each in overrides.items()}
+    assert found == {'plane': ('xz', str), 'autostart': ('false', bool)}
 
 
 @pytest.mark.parametrize('name', ['two_arms', 'foc_rviz'])

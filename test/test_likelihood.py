@@ -68,10 +68,8 @@ def test_the_exponent_of_a_choice_fades_with_the_time_until_the_choice(after_s):
 
 @pytest.mark.parametrize(('horizon_s', 'share'), [(1000.0, 0.0), (4.0, norm.cdf(-math.log(2.0) / 0.5)), (2.0, 0.5), (0.0, 1.0)])
 def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s, share):
-    planned, ahead = (
-        compute_likelihoods(THREE_COSTS, make_config(0.7)),
-        compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(1.0)),
-    )
+    planned = compute_likelihoods(THREE_COSTS, make_config(0.7))
+    ahead = compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(1.0))
     config = replace(make_config(0.7), planning_horizon_s=horizon_s)
     found = compute_likelihoods(THREE_COSTS, config, make_branch_times(1.0), time_s=2.0, planning_spread=0.5)
     np.testing.assert_allclose(found, (1.0 - share) * planned + share * ahead, rtol=1e-12)

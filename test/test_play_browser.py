@@ -162,15 +162,13 @@ def move_by_keys(browser, goal, near=0.008):
     """Hold arrow keys, one after the other, until the hand is near a goal [m]."""
 
     def is_there():
-        left = [
-            wanted - is_at for wanted, is_at in zip(goal, browser.execute_script('return play.view.hand.position'), strict=True)
-        ]
+        position = browser.execute_script('return play.view.hand.position')
+        left = [wanted - is_at for wanted, is_at in zip(goal, position, strict=True)]
         axis = int(abs(left[1]) > abs(left[0]))
         if math.hypot(*left) > near:
             # STICK_SPEED of hand.js is 0.35 m/s; a little less, because the hand goes on for a moment
-            press_keys(
-                browser, ((LEFT, RIGHT), (DOWN, UP))[axis][left[axis] > 0.0], hold_s=max(0.02, 0.8 * abs(left[axis]) / 0.35)
-            )
+            key = ((LEFT, RIGHT), (DOWN, UP))[axis][left[axis] > 0.0]
+            press_keys(browser, key, hold_s=max(0.02, 0.8 * abs(left[axis]) / 0.35))
         return math.hypot(*left) <= near
 
     until(is_there, f'the hand at {goal}')

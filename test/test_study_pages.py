@@ -151,10 +151,8 @@ def test_the_messages_hold_everything_that_a_report_shows(plane):
     """Also when another class is the most likely one by hysteresis, and after serialisation."""
     made = replace(prediction(START_NS, np.array([0.01, -0.02])), most_likely='goal1:+1-post')
     statuses = Status.DEADLINE, Status.COMPROMISED, Status.ESTIMATED
-    ended = [
-        replace(each, solution=replace(each.solution, status=status))
-        for each, status in zip(made.candidates, statuses, strict=False)
-    ]
+    pairs = zip(made.candidates, statuses, strict=False)
+    ended = [replace(each, solution=replace(each.solution, status=status)) for each, status in pairs]
     made = replace(made, candidates=(*ended, *made.candidates[len(ended) :]))
     messages = encode_prediction_cloud(made, plane, TYPES), encode_likelihoods(made, TYPES)
     carried = [TYPESTORE.deserialize_cdr(TYPESTORE.serialize_cdr(each, each.__msgtype__), each.__msgtype__) for each in messages]
