@@ -179,7 +179,18 @@ def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(re
     assert_allclose(noise, exact, atol=0.02 * exact.max())
 
 
-def test_what_is_no_plant_model_is_refused(register):
+@pytest.mark.parametrize(
+    ('A', 'B', 'dt'),
+    [
+        (np.eye(3), np.ones((3, 2)), 0.1),
+        (np.eye(4), np.ones((4, 1)), 0.1),
+        (np.eye(4), np.full((4, 2), np.nan), 0.1),
+        (np.eye(4), np.ones((4, 2)), 0.0),
+    ],
+)
+def test_what_is_no_plant_or_plant_model_is_refused(register, A, B, dt):
+    with pytest.raises(InputError, match='plant'):
+        Plant(A, B, dt)
     config = register('wrong', lambda settings: discretise_triple_integrator(0.02))
     with pytest.raises(foc_ros.InputError, match='plant wrong: expected a factory that returns a PlantModel'):
         build_problem(config, MOVING, make_obstacles(), GOAL[0], 1.0)
@@ -212,17 +223,3 @@ def test_damped_mass_is_the_exact_discretisation(damping):
     plant = discretise_damped_mass(dt, mass, damping)
     np.testing.assert_allclose(plant.A, A, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(plant.B, B, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ('A', 'B', 'dt'),
-    [
-        (np.eye(3), np.ones((3, 2)), 0.1),
-        (np.eye(4), np.ones((4, 1)), 0.1),
-        (np.eye(4), np.full((4, 2), np.nan), 0.1),
-        (np.eye(4), np.ones((4, 2)), 0.0),
-    ],
-)
-def test_a_plant_of_wrong_shape_is_refused(A, B, dt):
-    with pytest.raises(InputError, match='plant'):
-        Plant(A, B, dt)
