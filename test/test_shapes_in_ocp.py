@@ -8,6 +8,7 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+from homotopy_scenes import measure_distance
 from reach_helpers import bowed, random_scene, reach, solved
 
 from foc_ros.core.obstacle_table import make_obstacles
@@ -40,17 +41,6 @@ SHAPES: dict[str, Shape] = {
 
 def make_reach(*shapes, **options):
     return reach(collect_obstacles(shapes), goal=GOAL, **{'noise': (0.1, 0.1), 'eta': 0.9, **options})
-
-
-def measure_distance(points, polygon):
-    """Return the distance of points (..., 2) from a convex polygon (v, 2) with its inside, which is at distance 0."""
-    nearest, is_inside = np.full(points.shape[:-1], np.inf), np.full(points.shape[:-1], len(polygon) > 2)
-    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        along, apart = b - a, points - a
-        share = np.clip((apart @ along) / max(along @ along, 1e-300), 0.0, 1.0)
-        nearest = np.minimum(nearest, np.linalg.norm(apart - share[..., None] * along, axis=-1))
-        is_inside &= along[0] * apart[..., 1] - along[1] * apart[..., 0] > 0.0
-    return np.where(is_inside, 0.0, nearest)
 
 
 def count_clear(problem, solution, shape):
