@@ -158,6 +158,8 @@ def test_the_messages_hold_everything_that_a_report_shows(plane):
     carried = [TYPESTORE.deserialize_cdr(TYPESTORE.serialize_cdr(each, each.__msgtype__), each.__msgtype__) for each in messages]
     read, known = read_snapshot(*carried, plane, *scene()), build_snapshot(made)
     assert (read.stamp_ns, read.most_likely) == (known.stamp_ns, known.most_likely)
+    above = replace(made.obstacles, heights=np.array([[-np.inf, np.inf], [0.2, 0.3]]))  # the hand is at a height of 0.1 m
+    assert read_snapshot(*carried, plane, above, made.goal_positions).cleared == (False, True)
     assert [each.label for each in read] == [each.label for each in known.candidates_with_likelihood]
     assert read.candidates[0].label == 'goal1:+1-post'
     assert is_late(read) and {each.status for each in read.candidates} == set(statuses)
