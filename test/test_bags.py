@@ -61,6 +61,14 @@ def test_channels_that_are_not_needed_may_be_anything(tmp_path):
     assert_same(read(tmp_path / 'mixed.mcap'), messages())
 
 
+def test_an_existing_path_is_not_overwritten(tmp_path):
+    bag = write_bag(tmp_path / 'one')
+    before = mcap(bag).read_bytes()
+    with pytest.raises(RecordingError, match='exists already and is not overwritten'):
+        write_bag(bag)
+    assert mcap(bag).read_bytes() == before
+
+
 def test_an_unfinished_bag_is_removed(tmp_path):
     def interrupted():
         yield from messages()

@@ -202,6 +202,21 @@ def test_a_choice_that_is_better_by_chance_only_is_undetermined(scores):
     assert found.undetermined['duration.arrival'].startswith('no other value tried is better by more than chance')
 
 
+def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings(monkeypatch):
+    monkeypatch.setattr(race, 'PLAINLY_WORSE', 1e6)
+    settings = [replace_values(SEARCH_CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(20)]
+    quality = -np.abs(np.arange(20.0) - 13.0)[:, None] + 0.1 * np.random.default_rng(3).standard_normal((20, 40))
+    replays = KnownReplays(quality)
+    config, found = replays.search(settings)
+    assert replays.rounds == [(20, 6), (11, 12), (7, 24), (5, 40)], 'half of them, and the given one'
+    assert config == settings[13]
+    each = found.estimates['foc.eta']
+    assert each.low <= each.value == settings[13].foc.eta <= each.high
+    many = KnownReplays(np.zeros((2, 500)))
+    many.search(ARRIVALS)
+    assert many.rounds[-1] == (2, race.MAX_RECORDINGS)
+
+
 def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(tmp_path, monkeypatch):
     recordings = find_recordings(write_tables(tmp_path / 'data', count=2, hz=30.0))
     names = list(recordings)

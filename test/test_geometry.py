@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.geometry import (
+from foc_ros.core.obstacles.geometry import , find_limits, trace_obstacle(
     SMALLEST_DISTANCE,
     find_offset,
     measure_offsets,
@@ -124,6 +124,15 @@ def test_shapes_refuse_by_the_name_of_the_field(case):
     make, field = REFUSED[case]
     with pytest.raises(SceneError, match=rf'^obstacle\.{field}'):
         make()
+
+
+@given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=12), st.floats(1e-3, 0.1))
+def test_the_limits_are_those_of_the_outline(points, radius):
+    obstacles = collect_obstacles([Hull(points, radius), Circle((2.0, 2.0), radius=1.0)])
+    low, high = find_limits(obstacles, np.array([0.01, 0.0]))
+    outline = trace_obstacle(obstacles, 0, 0.01, points=2000)
+    np.testing.assert_allclose([low[0], high[0]], [outline.min(axis=0), outline.max(axis=0)], atol=1e-6)
+    np.testing.assert_array_equal([low[1], high[1]], [[1.0, 1.0], [3.0, 3.0]])
 
 
 PLANES = ('xy', 'xz', 'yz')

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
+from object_messages import collision_object
 
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
@@ -179,6 +180,21 @@ def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):
     assert seen(intake) == ('0', 'a/2')
     intake.remove_source('cloud')
     assert seen(intake) == ('a/2',)
+    for name, expected in (('cup', ('cup/0', 'a/2')), ('lamp', ('a/2', 'lamp/0'))):
+        intake.take('collision_objects', collision_object((2, (0.05,), (0.5, 0, 0)), name=name))
+        assert sorted(seen(intake)) == sorted(expected), 'the cup does not come back with the lamp'
+        intake.remove_source('collision_objects')
+
+
+def test_markers_in_another_frame_are_discarded(intake):
+    """They are received before the hand pose that fixes another working frame."""
+    show(intake, marker(TYPES, id=1, frame_id='camera'))
+    move(intake, 1.0)
+    assert intake.counts == {'obstacles_wrong_frame': 1}
+    assert show(intake, marker(TYPES, id=2)) is SampleStatus.ACCEPTED
+    assert seen(intake) == ('a/2',)
+    assert show(intake, marker(TYPES, id=3, frame_id='camera')) is None
+    assert seen(intake) == ('a/2',) and "expected 'world'" in intake.last_refusal
 
 
 POSE_MS = SECOND // 1000
