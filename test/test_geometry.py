@@ -10,11 +10,13 @@ from hypothesis.extra.numpy import arrays
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.geometry import , find_limits, trace_obstacle(
+from foc_ros.core.obstacles.geometry import (
     SMALLEST_DISTANCE,
+    find_limits,
     find_offset,
     measure_offsets,
     tabulate_edges,
+    trace_obstacle,
 )
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, make_box_polygon, make_hull_polygon
 from foc_ros.ros.messages.plane import lift, project
