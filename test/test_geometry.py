@@ -18,7 +18,7 @@ from foc_ros.core.obstacles.geometry import (
     tabulate_edges,
     trace_obstacle,
 )
-from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, make_box_polygon, make_hull_polygon
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles, make_box_polygon, make_hull_polygon
 from foc_ros.ros.messages.plane import lift, project
 
 SEEDS = st.integers(0, 10_000)
