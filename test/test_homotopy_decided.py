@@ -106,6 +106,11 @@ def bowed(amplitude, m=101):
     return np.column_stack([share, amplitude * np.sin(np.pi * share)])
 
 
+def test_obstacles_behind_the_start_and_beyond_the_end_are_not_passed():
+    obstacles = make_obstacles([[-0.1, 0.05], [1.2, 0.0], [0.5, 0.0]], 0.05)
+    assert find_path_sides(bowed(0.3), obstacles) == {'2': LEFT}
+
+
 def test_a_moving_obstacle_counts_where_it_is_at_each_step():
     path = bowed(0.0)
     crossing = np.stack([np.full(101, 0.5), np.linspace(0.4, -0.4, 101) + 0.1], axis=1)[:, None]
