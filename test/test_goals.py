@@ -10,7 +10,6 @@ from foc_ros.core.config import Config
 from foc_ros.core.errors import ParameterError
 from foc_ros.core.goals import find_common_time
 from foc_ros.core.guidance.guide import weigh_candidates
-from foc_ros.core.learning.learnt import Knowledge
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.obstacles.geometry import find_holders
@@ -32,9 +31,7 @@ HAND = HandState(0, np.zeros(6), 1e-6 * np.eye(6))
 
 
 def predict_in(obstacles, goals, **values):
-    knowledge = values.pop('knowledge', Knowledge())
-    assert isinstance(knowledge, Knowledge)
-    return predict(Config().with_values(values), HAND, obstacles, goals, NO_TRACKS, knowledge)[0]
+    return predict(Config().with_values(values), HAND, obstacles, goals, NO_TRACKS)[0]
 
 
 def measure(candidate, obstacle):

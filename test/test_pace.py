@@ -25,7 +25,6 @@ from foc_ros.ros.intake import Intake
 
 CONFIG = replace_values(Config(), {'estimator.position_stddev': 1e-4})
 FAR_GOAL = np.array([[0.4, 0.0]])
-FAR_GOAL = np.array([[0.4, 0.0]])
 STEP_S = 0.01
 STRAIGHT = np.array([[0.0, 0.0], [0.4, 0.0]])
 ABOVE, BELOW = bow(0.03), bow(-0.03)

@@ -189,9 +189,6 @@ def test_without_a_library_the_message_says_what_to_install(tmp_path, name, word
     assert result.stderr == f'foc_ros play: {words}\n'
 
 
-pytest.importorskip('matplotlib', reason='matplotlib is not installed')
-
-
 TYPES, NOW_NS = RosbagsTypes(TYPESTORE), 10**15
 PART_HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': 8.0}
 
