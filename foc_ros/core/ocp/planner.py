@@ -126,7 +126,7 @@ class Planner:
         quadratic = objective.expand(rows, control, now.at.cost[rows])
         numbered, wanted = number_rows(at, len(rows)), self.wanted_k[rows]
         short = gradients.value - gradients.stddev_rate * (wanted - k_now)[at]
-        qp = ReducedQP(quadratic, numbered, gradients, known, short, is_free)
+        qp = ReducedQP(quadratic, numbered, gradients, known)
         value, rate = numbered.spread(gradients.value), numbered.spread(gradients.stddev_rate)
         counts, multipliers = np.bincount(at, minlength=len(rows)).tolist(), np.zeros((len(rows), numbered.width))
         linear = numbered.spread(short) - qp.gram[:, :-1, -1]

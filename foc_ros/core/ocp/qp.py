@@ -17,18 +17,15 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foc_ros.core.types import Array
 
 from .backend import Answer, DenseQP
-from .gradients import FACTORS, GRADIENT, Gradients
+from .gradients import FACTORS, Gradients
 from .margin import Indices
 
 LEAST_CURVATURE = 0.1
 """Least eigenvalue of the Hessian relative to its diagonal part: with less, a step leaves the place where margins are known."""
-LIFT = 4.0
-"""Weight with which contacts are held where they are, relative to the most negative curvature."""
 SOFT = 1e-11
 """Part of its length by which a contact row gives way: at the goal no control may move it."""
 JITTER = 1e-9
@@ -98,9 +95,7 @@ class ReducedQP:
         What is known of the multipliers, (q,): they give the margins their weight in the Hessian.
     """
 
-    def __init__(
-        self, quadratic: Quadratic, rows: Rows, gradients: Gradients, multipliers: Array, short: Array, is_free: NDArray[np.bool_]
-    ) -> None:
+    def __init__(self, quadratic: Quadratic, rows: Rows, gradients: Gradients, multipliers: Array) -> None:
         held = multipliers > 0.0
         diagonal = quadratic.diagonal.copy()
         np.add.at(diagonal, rows.problem[held], multipliers[held, None] * gradients.diagonal)
@@ -115,17 +110,6 @@ class ReducedQP:
         self._scaled, gram = _meet_goal(stack, diagonal, quadratic.goal_rows)
         self._lower = np.linalg.cholesky(gram[:, :bent, :bent] + JITTER * np.eye(bent))
         values, self._vectors = np.linalg.eigh(self._lower.swapaxes(1, 2) @ curvature @ self._lower)
-        lift = LIFT * np.maximum(-1.0 - values.min(axis=1, initial=0.0) + LEAST_CURVATURE, 0.0)
-        if lift.any():
-            at = np.arange(numbered.width) * FACTORS + GRADIENT
-            unit = length[:, at]
-            y, rate, short = (numbered.spread(each[held]) for each in (multipliers, gradients.stddev_rate, short))
-            square, pull = _hold(lift, unit, y, rate, short, is_free)
-            curvature[:, at[:, None], at] += square
-            gram[:, -1] += (pull[:, None] @ gram[:, at])[:, 0]
-            gram[:, :, -1] += (gram[:, :, at] @ pull[..., None])[..., 0]
-            self._scaled[:, -1] += (pull[:, None] @ self._scaled[:, at])[:, 0]
-            values, self._vectors = np.linalg.eigh(self._lower.swapaxes(1, 2) @ curvature @ self._lower)
         self._share = (1.0 - 1.0 / np.maximum(1.0 + values, LEAST_CURVATURE))[..., None]
         self._side = self._vectors.swapaxes(1, 2) @ np.linalg.solve(self._lower, gram[:, :bent, bent:])
         self.gram = gram[:, bent:, bent:] - self._side.swapaxes(1, 2) @ (self._share * self._side)
@@ -136,23 +120,6 @@ class ReducedQP:
         bends = -np.linalg.solve(self._lower.swapaxes(1, 2), self._vectors @ (self._share * (self._side @ pushes)))
         step: Array = (np.concatenate((bends, pushes), axis=1).swapaxes(1, 2) @ self._scaled)[:, 0]
         return step
-
-
-def _hold(lift: Array, unit: Array, y: Array, rate: Array, short: Array, is_free: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return the squares (r, h, h) and the pulls (r, h) that hold contacts where they are, along gradients of unit length.
-
-    Contacts that hold the mean off are met as equations A p + g = r dk by the solution of the QP, so that a square of what is
-    missing in them changes the Hessian only where the solution does not go: with it, a Hessian that is positive along the
-    contacts is positive everywhere. Where k is free, dk is the mean of (A p + g) / r with the weights y r.
-    """
-    force = y * unit
-    weight = np.sqrt(lift[:, None] * force / np.maximum(force.max(axis=1, keepdims=True, initial=0.0), np.finfo(float).tiny))
-    whole = np.maximum((y * rate).sum(axis=1), np.finfo(float).tiny)
-    inverse = np.divide(1.0, unit, out=np.zeros_like(unit), where=unit > 0.0)
-    mean = (is_free / whole)[:, None, None] * (rate * inverse)[:, :, None] * force[:, None, :]
-    held = weight[:, :, None] * (np.eye(unit.shape[1]) - mean)
-    square = held.swapaxes(1, 2) @ held
-    return square, (square @ (short * inverse)[..., None])[..., 0]
 
 
 def _stack_bends(quadratic: Quadratic, held: Rows, gradients: Gradients, multipliers: Array) -> tuple[Array, Array]:
