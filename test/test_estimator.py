@@ -227,14 +227,6 @@ def test_the_goal_that_the_speed_fits_best_gives_the_factor_for_all_goals():
 MEAN = np.array([0.0, 0.0, 0.2, 0.1, -0.4, 1.0])
 
 
-def first(time_s, onset_ns=0):
-    """The state of the predicted movement at its first step."""
-    config = replace_values(Config(), {'estimator.acceleration_time_s': time_s})
-    hand = HandState(200_000_000, MEAN, 1e-6 * np.eye(6), onset_ns=onset_ns, onset_position=np.zeros(2))
-    prediction, _ = predict(config, hand, make_obstacles(), np.array([[0.3, 0.1]]), NO_TRACKS)
-    return prediction.candidates[0].solution.mean[0]
-
-
 @pytest.mark.parametrize(
     ('time_s', 'onset_ns', 'expected'),
     [
@@ -246,24 +238,10 @@ def first(time_s, onset_ns=0):
     ],
 )
 def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to_and_a_hand_at_rest_rests(time_s, onset_ns, expected):
-    np.testing.assert_allclose(first(time_s, onset_ns), expected, atol=1e-12)
-
-
-PASSING = replace_values(
-    Config(),
-    {
-        'duration.arrival': 'passing',
-        'duration.model': 'fixed',
-        'duration.fixed_s': 1.0,
-        'foc.process_noise': 0.5,
-        'estimator.acceleration_time_s': 0.0,
-    },
-)
-FREE = make_obstacles()
-
-
-def moving_hand(*mean):
-    return HandState(0, np.array(mean), 1e-8 * np.eye(6), onset_ns=0, onset_position=np.array(mean[:2]))
+    config = replace_values(Config(), {'estimator.acceleration_time_s': time_s})
+    state = HandState(200_000_000, MEAN, 1e-6 * np.eye(6), onset_ns=onset_ns, onset_position=np.zeros(2))
+    prediction, _ = predict(config, state, make_obstacles(), np.array([[0.3, 0.1]]), NO_TRACKS)
+    np.testing.assert_allclose(prediction.candidates[0].solution.mean[0], expected, atol=1e-12)
 
 
 def compute_least_effort(length, speed, acceleration):
@@ -275,8 +253,10 @@ def compute_least_effort(length, speed, acceleration):
 
 def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration():
     start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
-    config = replace_values(PASSING, {'foc.steps': 150})
-    (found,) = predict(config, moving_hand(*start), FREE, np.array([[0.3, 0.1]]), NO_TRACKS)[0].solved_candidates
+    values = {'duration.arrival': 'passing', 'duration.model': 'fixed', 'duration.fixed_s': 1.0, 'foc.steps': 150}
+    config = replace_values(Config(), values | {'estimator.acceleration_time_s': 0.0})
+    state = HandState(0, start, 1e-8 * np.eye(6), onset_ns=0, onset_position=start[:2])
+    (found,) = predict(config, state, make_obstacles(), np.array([[0.3, 0.1]]), NO_TRACKS)[0].solved_candidates
     along = [compute_least_effort(way, *start[2 + axis :: 2]) for axis, way in enumerate((0.3, 0.1))]
     assert found.solution.effort * found.solution.dt == pytest.approx(sum(along), rel=3e-3)
     assert_allclose(found.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-9)
