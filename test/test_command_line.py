@@ -234,16 +234,12 @@ def test_a_full_standard_output_gives_2_and_one_line_and_a_closed_one_changes_no
     assert printed_to(A_LINE, preexec_fn=lambda: os.close(1)) == (0, '')
 
 
-def find_widest(printed):
-    return max(map(len, printed.splitlines()))
-
-
 def test_a_wide_table_is_divided_and_loses_nothing(capsys):
     columns = ['rule', *(f'column {number} of a wide table' for number in range(7)), 'last']
     rows = [[f'rule {row}', *(f'{row}.{number} (1 to 2)' for number in range(7)), f'end {row}'] for row in range(3)]
     show_table(columns, rows, 'title')
     printed = capsys.readouterr().out
-    assert find_widest(printed) <= COLUMNS
+    assert max(map(len, printed.splitlines())) <= COLUMNS
     assert all(printed.count(text) == 1 for text in ('title', *columns[1:], *(cell for row in rows for cell in row[1:])))
     assert printed.count('rule 2') == 4
 

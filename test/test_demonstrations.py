@@ -95,11 +95,6 @@ def test_a_library_file_is_read_as_it_was_written(tmp_path):
     assert load_library('') == ()
 
 
-def make_document(tmp_path):
-    save_library(tmp_path / 'good.json', [DEMONSTRATION])
-    return json.loads((tmp_path / 'good.json').read_text())
-
-
 @pytest.mark.parametrize(
     ('break_it', 'words'),
     [
@@ -117,7 +112,8 @@ def make_document(tmp_path):
     ],
 )
 def test_errors_in_a_library_file_name_the_field(tmp_path, break_it, words):
-    document = make_document(tmp_path)
+    save_library(tmp_path / 'good.json', [DEMONSTRATION])
+    document = json.loads((tmp_path / 'good.json').read_text())
     break_it(document['ways'][0])
     file = tmp_path / 'bad.json'
     file.write_text(json.dumps(document))

@@ -54,14 +54,10 @@ def legends_of(axes):
     return [each for each in below.get_children() if isinstance(each, Legend)]
 
 
-def entries_of(axes):
-    """Return the lines of the legend."""
-    return [text.get_text() for each in legends_of(axes) for text in each.get_texts()]
-
-
 def legend_of(axes):
     """Return the text of the legend without its line breaks."""
-    return ' '.join(' '.join(each.split()) for each in entries_of(axes))
+    texts = [text.get_text() for each in legends_of(axes) for text in each.get_texts()]
+    return ' '.join(' '.join(each.split()) for each in texts)
 
 
 def test_a_scene_holds_every_obstacle_goal_and_candidate():

@@ -281,13 +281,6 @@ GOAL = np.array([0.3, 0.1])
 HAND = HandState(0, np.array([0.05, 0.0, 0.3, -0.1, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 
 
-def _plan(duration_s, passing, mean):
-    """Plan a movement without obstacles."""
-    stacked = build_triple_integrator_horizon(duration_s / STEPS, STEPS)
-    problem = rest_to_goal(stacked, mean, GOAL, make_obstacles([], []), np.array([0.05, 0.05]), 0.9, passing=passing)
-    return solve_problem(problem, cold_start(np.linspace(mean[:2], GOAL, STEPS + 1)), Config().foc)
-
-
 def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods():
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
     announced = replace_values(Config(), {'likelihood.other_goal': 0.0, 'foc.steps': STEPS})
@@ -310,7 +303,9 @@ def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoo
 
 
 def test_the_onset_delay_covariance_agrees_with_samples():
-    plan, wait_s = _plan(0.8, False, np.zeros(6)), 0.15
+    horizon, wait_s = build_triple_integrator_horizon(0.8 / STEPS, STEPS), 0.15
+    problem = rest_to_goal(horizon, np.zeros(6), GOAL, make_obstacles(), np.array([0.05, 0.05]), 0.9)
+    plan = solve_problem(problem, cold_start(np.linspace(np.zeros(2), GOAL, STEPS + 1)), Config().foc)
     delays = np.random.default_rng(4).exponential(wait_s, 20_000)
     found = compute_onset_delay_covariance(plan, wait_s)
     for step in (5, 20, 40, STEPS):

@@ -43,10 +43,6 @@ def discretise_double_integrator(dt):
     return Plant(A, np.vstack([dt**2 / 2 * np.eye(2), dt * np.eye(2)]), dt)
 
 
-def solve_by_quadprog(qp):
-    return QP_BACKENDS.get('quadprog')(qp)
-
-
 @pytest.fixture(autouse=True)
 def parts(monkeypatch):
     for registry in (STRATEGIES, PLANTS, LIKELIHOOD_RULES, QP_BACKENDS):
@@ -55,7 +51,7 @@ def parts(monkeypatch):
     foc_ros.register_strategy('margin', strategy)
     foc_ros.register_plant('double', lambda settings: PlantModel(discretise_double_integrator))
     foc_ros.register_likelihood_rule('linear', lambda costs, config: -config.beta * costs)
-    foc_ros.register_qp_backend('outside', solve_by_quadprog)
+    foc_ros.register_qp_backend('outside', lambda qp: QP_BACKENDS.get('quadprog')(qp))
 
 
 def test_a_strategy_is_solved_by_its_name():

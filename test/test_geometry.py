@@ -96,11 +96,6 @@ def test_a_hull_is_convex_and_holds_its_points(seed):
     assert distance.max() < 1e-9
 
 
-def make_circle_of_points(corners):
-    turns = 2 * np.pi * np.arange(corners) / corners
-    return 0.1 * np.stack((np.cos(turns), np.sin(turns)), axis=1)
-
-
 REFUSED = {
     'a negative length': (lambda: Box((0, 0), size=(-0.1, 0.2)), 'size'),
     'one length only': (lambda: Box((0, 0), size=(0.2,)), 'size'),
@@ -112,7 +107,7 @@ REFUSED = {
     'a negative deviation': (lambda: Hull([(0, 0), (0.1, 0)], radius_stddev=-0.01), 'radius_stddev'),
     'a negative deviation of the centre': (lambda: Box((0, 0), size=(0.1, 0), centre_stddev=-1.0), 'centre_stddev'),
     'a hull of no points': (lambda: Hull(np.zeros((0, 2))), 'points'),
-    'a hull of 17 corners': (lambda: Hull(make_circle_of_points(17)), 'points'),
+    'a hull of 17 corners': (lambda: Hull([(np.cos(turn), np.sin(turn)) for turn in 2 * np.pi * np.arange(17) / 17]), 'points'),
     'an end in space': (lambda: Capsule((0, 0, 0), (0.1, 0), radius=0.1), 'start'),
     'a height that is not a number': (lambda: Circle((0, 0), 0.1, heights=(0.0, np.nan)), 'heights: expected numbers'),
     'one height only': (lambda: Hull([(0, 0), (0.1, 0)], 0.1, heights=(0.1,)), 'heights: expected finite numbers of shape'),

@@ -78,10 +78,6 @@ def share_above(browser):
     return shares(browser)[0]
 
 
-def share_below(browser):
-    return shares(browser)[1]
-
-
 def test_the_likelihood_of_the_path_taken_rises_and_frames_and_delay_are_measured(page):
     wait_for(page, 'globalThis.play && play.view.candidates.length > 0', 'predictions', 20)
     assert [each for each in page.get_log('browser') if each['level'] == 'SEVERE'] == []
@@ -91,7 +87,7 @@ def test_the_likelihood_of_the_path_taken_rises_and_frames_and_delay_are_measure
     steer(page, ABOVE[0], speed=0.2)
     until(lambda: 0.4 < share_above(page) < 1.0, 'a larger likelihood of the way above', 20)
     steer(page, ABOVE[1], speed=0.2)
-    until(lambda: share_above(page) > 0.85 and share_below(page) < 0.03, 'no doubt of the way taken', 20)
+    until(lambda: share_above(page) > 0.85 and shares(page)[1] < 0.03, 'no doubt of the way taken', 20)
     steer(page, *ON)
     wait_for(page, 'Math.abs(play.view.hand.position[0] - 0.3) < 0.003', 'the hand at the goal', 20)
     until(lambda: has_numbers(page), 'numbers', 20)

@@ -3,8 +3,10 @@
 """Recordings as recorders, converters and accidents leave them: each is read as a whole, or what is missing is named."""
 
 import os
+import re
 import sqlite3
 import warnings
+from functools import partial
 
 import pytest
 import zstandard
@@ -175,12 +177,12 @@ def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(tm
 SHORT_KINDS = {topic: made.__msgtype__ for topic, _, made in SHORT}
 
 
-def name_by_dds(name):
-    return '::'.join([*name.split('/')[:-1], 'dds_', name.split('/')[-1] + '_'])
+DDS = re.compile(r'(\w+)/msg/(\w+)')
 
 
-@pytest.mark.parametrize('rename', [lambda name: name.replace('/msg/', '/'), lambda name: name.replace('/', '::'), name_by_dds])
-def test_a_type_name_may_be_that_of_older_recorders(tmp_path, rename):
+@pytest.mark.parametrize('form', [r'\1/\2', r'\1::msg::\2', r'\1::msg::dds_::\2_'])
+def test_a_type_name_may_be_that_of_older_recorders(tmp_path, form):
+    rename = partial(DDS.sub, form)
     write_sqlite(tmp_path / 'one.db3', rename=rename).close()
     assert read(tmp_path / 'one.db3') == WHOLE
     renamed = {made.__msgtype__: rename(made.__msgtype__) for _, _, made in SHORT}
