@@ -128,11 +128,12 @@ def find_point(browser: Any, position: tuple[float, float]) -> tuple[float, floa
 
 
 def await_layout(browser: Any) -> None:
-    """Wait until the scene stays where it is: controls that appear move it."""
-    place = None
-    while (found := find_point(browser, (0.0, 0.0))) != place:
-        place = found
-        time.sleep(0.2)
+    """Wait until the scene has stayed where it is for a while: controls that appear move it."""
+    place, since = None, time.monotonic()
+    while time.monotonic() - since < 0.6:
+        if (found := find_point(browser, (0.0, 0.0))) != place:
+            place, since = found, time.monotonic()
+        time.sleep(0.05)
 
 
 def tab_to(browser: Any, name: str) -> None:
