@@ -92,12 +92,6 @@ def test_a_topic_can_be_chosen(tmp_path, answer, capsys):
     assert replay_json(arms, '--remap', 'hand_pose:=/right/measured_cp')['predictions'] == answer['predictions']
 
 
-def test_the_rate_bounds_the_predictions(tmp_path):
-    fast = write_bag(tmp_path / 'fast', messages(seconds=FEW, rate_hz=200.0))
-    stamps = [prediction.stamp_ns for prediction in replay(fast, CONFIG)]
-    assert len(stamps) == 6 and min(np.diff(stamps)) >= 20_000_000
-
-
 def test_what_cannot_be_used_is_counted_and_the_rest_goes_on(tmp_path):
     obstacles = [(0.15, 0.0, 0.0, 0.03, 0.002, 7), (float('inf'), 0, 0, 0.1, 0, 8)]
     bad = [

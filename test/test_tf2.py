@@ -22,18 +22,12 @@ from rosgraph_msgs.msg import Clock  # noqa: E402
 from foc_ros.ros.transforms import TransformTree, TransformUnavailableError  # noqa: E402
 
 
-def is_followed(ros, bench):
-    """Return a broadcaster whose transforms the node receives."""
-    broadcaster = tf2_ros.TransformBroadcaster(bench.player)
-    ros.spin_until(lambda: broadcaster.pub_tf.get_subscription_count() > 0, 'the listener')
-    return broadcaster
-
-
 def test_a_simulation_that_starts_again_forgets_its_transforms(ros):
     """In the second round the camera is elsewhere: the transforms of the first, newer by their stamps, are not used."""
     bench = Bench(ros, outputs=[], frame_id='world', frames__tolerance_s=10.0, use_sim_time=True)
-    broadcaster, clock = is_followed(ros, bench), bench.player.create_publisher(Clock, '/clock', 10)
-    ros.spin_until(lambda: clock.get_subscription_count() > 0, 'the clock')
+    broadcaster, clock = tf2_ros.TransformBroadcaster(bench.player), bench.player.create_publisher(Clock, '/clock', 10)
+    for publisher in (broadcaster.pub_tf, clock):
+        ros.spin_until(lambda publisher=publisher: publisher.get_subscription_count() > 0, 'the listener')
     rows, node_clock = obstacle_table([(0.2, 0.0, 0.0, 0.03)]), bench.node.get_clock()
     for turn in range(2):
         for i in range(20):
