@@ -13,7 +13,6 @@ import foc_ros
 from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.predict import predict
 from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
@@ -66,19 +65,6 @@ def test_of_ten_thousand_obstacles_those_near_the_way_decide():
 
 WIDE = foc_ros.Config().with_values({'scene.hand_radius': 0.01})
 CUPS = foc_ros.Circle((0.15, 0.01), radius=0.02, radius_stddev=0.002), foc_ros.Circle((0.2, -0.05), radius=0.015)
-ONE_GOAL = np.array([[0.3, 0.0]])
-
-
-def test_a_prediction_is_that_for_larger_obstacles_and_holds_the_given_ones():
-    hand, given = HandState(0, np.zeros(6), np.zeros((6, 6))), collect_obstacles(CUPS)
-    wide, _ = predict(WIDE, hand, given, ONE_GOAL, NO_TRACKS)
-    grown, _ = predict(foc_ros.Config(), hand, replace(given, radius=given.radius + 0.01), ONE_GOAL, NO_TRACKS)
-    narrow, _ = predict(foc_ros.Config(), hand, given, ONE_GOAL, NO_TRACKS)
-    assert wide.obstacles is given
-    assert [each.label for each in wide.candidates] == [each.label for each in grown.candidates]
-    for each, other in zip(wide.candidates, grown.candidates, strict=True):
-        np.testing.assert_array_equal(each.mean, other.mean)
-    assert wide.candidates[0].effort > narrow.candidates[0].effort
 
 
 def test_a_solution_keeps_the_hand_away_and_shows_the_given_obstacles():
