@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
@@ -132,10 +131,6 @@ def test_the_limits_are_those_of_the_outline(points, radius):
     np.testing.assert_array_equal([low[1], high[1]], [[1.0, 1.0], [3.0, 3.0]])
 
 
-PLANES = ('xy', 'xz', 'yz')
-points = arrays(np.float64, st.tuples(st.integers(0, 5), st.just(3)), elements=st.floats(-1e4, 1e4))
-
-
 @pytest.mark.parametrize(
     ('plane', 'position', 'height'), [('xy', (1.0, 2.0), 3.0), ('xz', (1.0, 3.0), 2.0), ('yz', (2.0, 3.0), 1.0)]
 )
@@ -144,10 +139,3 @@ def test_axes_of_each_plane(plane, position, height):
     assert tuple(projected) == position
     assert above == height
     assert tuple(lift(projected, above, plane)) == (1.0, 2.0, 3.0)
-
-
-@given(points, st.sampled_from(PLANES))
-def test_lift_is_the_inverse_of_project(table, plane):
-    positions, heights = project(table, plane)
-    assert positions.shape == (len(table), 2)
-    np.testing.assert_array_equal(lift(positions, heights, plane), table)
