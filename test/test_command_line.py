@@ -113,6 +113,7 @@ SCHEDULER = '--scheduler: expected the address of a Dask scheduler, as in tcp://
 WRONG = [
     (['solve', 'scene.yaml'], WRONG_SCENE),
     (['solve', 'scene.yaml', '--plot', 'a.gif'], ['--plot: expected a name that ends in .png, .pdf, .svg, got a.gif']),
+    (['solve', 'scene.yaml', '--plot', 'no/a.png'], ['--plot: expected a file in a directory that exists, got no/a.png']),
     (['simulate', '--operators', 'noisi,x'], [f'{NAMES} (did you mean noisy?), got noisi', f'{NAMES}, got x']),
     (['simulate', '--report', 'scene.yaml'], ['--report: expected a folder, got scene.yaml, which is a file']),
     (['replay', 'bag.mcap', '--remap', 'hand_pos:=/a'], [f'{INPUTS} (did you mean hand_pose?), got hand_pos']),

@@ -14,7 +14,6 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Circle, Ellipse
 from report_samples import START_NS, prediction, widen
 
-from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import Status
 from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, GHOST_COLOUR, get_candidate_style
@@ -157,12 +156,3 @@ def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_s
     axes = make_scene_figure(replace(made, candidates=tuple(begun))).axes[0]
     assert any(np.array_equal(line.get_xydata(), [[-0.1, 0.02]]) for line in axes.lines)
     assert axes.get_xlim()[0] < -0.1
-
-
-@pytest.mark.parametrize(
-    ('name', 'expected'), [('scene.xyz', r'\.png'), ('scene', r'\.png'), ('no/such/scene.png', 'can be written')]
-)
-def test_a_file_that_cannot_be_written(tmp_path, name, expected):
-    with pytest.raises(InputError, match=expected):
-        write_picture(tmp_path / name, prediction(START_NS, NOWHERE))
-    assert list(tmp_path.iterdir()) == []

@@ -189,16 +189,6 @@ def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path):
     assert 'NaN' not in text and json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
 
 
-def test_no_hand_and_a_folder_that_is_a_file_are_refused(tmp_path):
-    with pytest.raises(InputError, match='hand pose'):
-        write_report(tmp_path / 'report', 'x', build_hand_trajectory([]), [], {})
-    assert not (tmp_path / 'report').exists()
-    (tmp_path / 'report').write_text('mine')
-    with pytest.raises(InputError, match='--report: expected a folder'):
-        report(tmp_path / 'report')
-    assert (tmp_path / 'report').read_text() == 'mine'
-
-
 SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "noise": [0.05, 0.05], "eta": 0.9, "obstacles": []}'
 
 
