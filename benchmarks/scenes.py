@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from foc_ros.core.config import Config
 from foc_ros.core.hand.kalman import FilterState, update
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
-from foc_ros.core.obstacles.shapes import make_box_polygon
+from foc_ros.core.obstacles.polygons import make_box_polygon
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
 from foc_ros.core.plant.covariance import scale_noise
 from foc_ros.core.plant.plants import build_triple_integrator_horizon
@@ -81,7 +81,7 @@ class Reach:
 
 def build_reach(obstacles: Obstacles, values: dict[str, object], goals: Array = GOAL[None], ticks: int = 30) -> Reach:
     """Return ticks at 100 Hz of a hand that drifts too slowly for a movement to have begun, so that T does not change."""
-    fixed = {'duration.model': 'fixed', 'duration.fixed_s': DURATION_S, 'rate_hz': RATE_HZ}
+    fixed = {'duration.model': 'fixed', 'duration.fixed_s': DURATION_S, 'rate_hz': RATE_HZ, 'foc.steps': STEPS}
     config = Config().with_values(fixed | values)
     generator = np.random.default_rng(3)
     state: FilterState | None = None

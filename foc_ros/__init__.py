@@ -40,10 +40,12 @@ if TYPE_CHECKING:
     from foc_ros.core.solution import Status as Status
     from foc_ros.core.types import HandState as HandState
     from foc_ros.extending import *  # noqa: F403
+    from foc_ros.prediction import Prediction as Prediction
     from foc_ros.solving import *  # noqa: F403
 
 _MODULES = {
-    'api': 'Guidance Prediction Predictor load_config replay',
+    'api': 'Guidance Predictor load_config replay',
+    'prediction': 'Prediction',
     'extending': ('compute_eta get_strategy register_likelihood_rule register_plant register_qp_backend register_strategy'),
     'solving': 'Solution monte_carlo plot_candidates solve solve_classes',
     'analysis.evaluation': 'register_baseline',

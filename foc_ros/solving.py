@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from foc_ros.api import Prediction
 from foc_ros.core import solution as core_solution
 from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config
@@ -20,12 +19,12 @@ from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.problem import Problem
-from foc_ros.core.predict import build_scene_problems, solve_scene
 from foc_ros.core.prediction import PredictedCandidate
-from foc_ros.core.scene import ReachingScene
+from foc_ros.core.reach import ReachingScene, build_scene_problems, solve_scene
 from foc_ros.core.solution import Candidate, Goal
 from foc_ros.core.support import GoalTable, check_array, check_config, check_number, check_vector, collect_goals, find_shape
 from foc_ros.core.types import HandState
+from foc_ros.prediction import Prediction
 
 
 @dataclass(frozen=True, eq=False, repr=False)

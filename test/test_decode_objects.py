@@ -20,7 +20,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from foc_ros.analysis.replay import replay
 from foc_ros.core.errors import LostHandError, MessageError, RecordingError
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.shapes import make_box_polygon
+from foc_ros.core.obstacles.polygons import make_box_polygon
 from foc_ros.io.topics import OPTIONAL, TYPES, assign_topics
 from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
 from foc_ros.ros.messages.decode_poses import MAX_GOALS, decode_goal, decode_goals, decode_hand_sample

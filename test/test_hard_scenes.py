@@ -50,6 +50,15 @@ def test_a_hand_inside_an_obstacle_leaves_it_or_says_why_not():
     assert not [outcome for outcome in prediction.solved_candidates if outcome.solution.eta < CONFIG.foc.eta]
 
 
+def test_a_class_whose_search_goes_astray_for_a_moment_is_not_unlikely():
+    predictor = foc_ros.Predictor(Config().with_values({'budget_s': 0.0, 'scene.hand_radius': 0.005}))
+    predictor.set_obstacles([foc_ros.Circle((0.0214, 0.0277), 0.03), foc_ros.Box((0.15, -0.0185), (0.04, 0.06))])
+    predictor.set_goals([(0.35, 0.0)])
+    first = {each.label: each for each in predictor.update(0.0, (0.0, 0.0)).candidates}
+    assert first['goal0:+0+1'].status is Status.SOLVED
+    assert first['goal0:+0+1'].likelihood > 0.05
+
+
 def test_of_ten_thousand_obstacles_those_near_the_way_decide():
     near = [[0.1, 0.02], [0.2, -0.02]]
     angles = np.random.default_rng(7).uniform(0.0, 2.0 * np.pi, 9_998)

@@ -12,8 +12,9 @@ from homotopy_scenes import measure_distance
 from reach_helpers import bowed, random_scene, reach, solved
 
 from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.obstacles.polygons import make_box_polygon
 from foc_ros.core.obstacles.risk import k_of_eta
-from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles, make_box_polygon
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp.monte_carlo import wilson
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.plant.plants import build_triple_integrator_horizon

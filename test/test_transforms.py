@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.shapes import make_box_polygon
+from foc_ros.core.obstacles.polygons import make_box_polygon
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.plane import Transform
 from foc_ros.ros.transforms import TransformTree, TransformUnavailableError

@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cache
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
-from .errors import ParameterError, join_errors, suggest
-from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES, Registry
-from .removed import REMOVED
+from .errors import ParameterError, join_errors
+from .parameter import Group, Parameter, check_fields, check_value, param
+from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
+from .removed import find_parameter
 
 PLANES = ('xy', 'xz', 'yz')
 ARRIVALS = ('rest', 'passing')
@@ -32,99 +32,72 @@ WHOLE_WAY_S = 1000.0
 
 
 @dataclass(frozen=True)
-class Bound:
-    """What values a parameter may have: closed range or choices; its unit and meaning for descriptors and documents."""
-
-    low: float | None = None
-    high: float | None = None
-    unit: str = ''
-    meaning: str = ''
-    choices: tuple[str, ...] | Registry = ()
-    read_only: bool = False
-
-
-def _p(default: Any, meaning: str, unit: str = '', low: float | None = None, high: float | None = None, **rest: Any) -> Any:
-    """Declare a parameter."""
-    return field(default=default, metadata={'bound': Bound(low, high, unit, meaning, **rest)})
-
-
-@dataclass(frozen=True)
-class Group:
-    """Base of the groups of parameters: each value is checked, and has the type of its default, once a group is created."""
-
-    def __post_init__(self) -> None:
-        """Raise ParameterError, which names all wrong values with their bounds."""
-        name = type(self).__name__.removesuffix('Config').lower()
-        vars(self).update(_check_fields(self, f'{name}.'))
-
-
-@dataclass(frozen=True)
 class FocConfig(Group):
     """The forward optimal control."""
 
-    steps: int = _p(30, 'number of control steps N of the horizon', '', 5, 400)
-    eta: float = _p(0.9, 'wanted probability of avoidance, of what `foc.risk` names', '', 0.0, 0.999)
-    bound: str = _p(
+    steps: int = param(30, 'number of control steps N of the horizon', '', 5, 400)
+    eta: float = param(0.9, 'wanted probability of avoidance, of what `foc.risk` names', '', 0.0, 0.999)
+    bound: str = param(
         'cantelli',
         'what turns eta into standard deviations: it holds for any distribution, or for a Gaussian one',
         choices=('cantelli', 'gaussian'),
     )
-    risk: str = _p(
+    risk: str = param(
         'step', 'what eta is about: each obstacle at each step, or all obstacles along the whole path', choices=('step', 'path')
     )
-    strategy: str = _p('optimal', 'how the solver trades clearance against precision', choices=STRATEGIES)
-    plant: str = _p('triple_integrator', 'dynamic model of the hand that the control moves', choices=PLANTS)
-    plant_mass: float = _p(1.0, 'mass of the plant damped_mass', 'kg', 1e-3, 1e3)
-    plant_damping: float = _p(2.0, 'viscous damping of the plant damped_mass', 'N s/m', 0.0, 1e4)
-    noise_x: float = _p(0.05, 'motor noise per unit of control along the first axis, at a step of 0.02 s', '', 0.0, 2.0)
-    noise_y: float = _p(0.05, 'motor noise per unit of control along the second axis, at a step of 0.02 s', '', 0.0, 2.0)
-    process_noise: float = _p(
+    strategy: str = param('optimal', 'how the solver trades clearance against precision', choices=STRATEGIES)
+    plant: str = param('triple_integrator', 'dynamic model of the hand that the control moves', choices=PLANTS)
+    plant_mass: float = param(1.0, 'mass of the plant damped_mass', 'kg', 1e-3, 1e3)
+    plant_damping: float = param(2.0, 'viscous damping of the plant damped_mass', 'N s/m', 0.0, 1e4)
+    noise_x: float = param(0.05, 'motor noise per unit of control along the first axis, at a step of 0.02 s', '', 0.0, 2.0)
+    noise_y: float = param(0.05, 'motor noise per unit of control along the second axis, at a step of 0.02 s', '', 0.0, 2.0)
+    process_noise: float = param(
         0.0, f'root of the spectral density of unplanned control, which {WIDENS}; N s^0.5 for damped_mass', 'm/s^2.5', 0.0, 1e3
     )
-    endpoint_stddev: float = _p(0.03, f'standard deviation of end points about their goal, per axis; it {WIDENS}', 'm', 0.0, 1.0)
-    lv_delta: float = _p(5e-5, 'tau per unit of s for strategy lv, and per step of algorithm1 (delta)', 'm^2', 0.0, 1.0)
-    hc_delta: float = _p(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
-    growth: float = _p(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
-    tau: float = _p(0.0, 'clearance term tau of strategy fixed', 'm^2', 0.0, 100.0)
-    lam: float = _p(1.0, 'variance weight lambda of strategy fixed, and the first lambda of lv and hc', '', 0.0, 1e15)
-    algorithm1_growth: float = _p(10.0, 'factor on lambda per step of strategy algorithm1 (Delta)', '', 1.0, 1e6)
-    goal_weight: float = _p(0.0, 'weight of the position variance at the goal, in effort per m^2', '1/s^6', 0.0, 1e15)
-    recovery_s: float = _p(0.2, 'time within which a hand inside the margin of an obstacle has to leave it', 's', 0.0, 10.0)
-    qp_backend: str = _p('piqp', 'QP solver: piqp, a solver of qpsolvers by its name, or a registered one', choices=QP_BACKENDS)
+    endpoint_stddev: float = param(
+        0.03, f'standard deviation of end points about their goal, per axis; it {WIDENS}', 'm', 0.0, 1.0
+    )
+    lv_delta: float = param(5e-5, 'tau per unit of s for strategy lv, and per step of algorithm1 (delta)', 'm^2', 0.0, 1.0)
+    hc_delta: float = param(1e-4, 'tau per unit of s for strategy hc', 'm^2', 0.0, 1.0)
+    growth: float = param(2.0, 'factor on lambda per unit of s (Delta)', '', 1.0001, 1e6)
+    tau: float = param(0.0, 'clearance term tau of strategy fixed', 'm^2', 0.0, 100.0)
+    lam: float = param(1.0, 'variance weight lambda of strategy fixed, and the first lambda of lv and hc', '', 0.0, 1e15)
+    algorithm1_growth: float = param(10.0, 'factor on lambda per step of strategy algorithm1 (Delta)', '', 1.0, 1e6)
+    goal_weight: float = param(0.0, 'weight of the position variance at the goal, in effort per m^2', '1/s^6', 0.0, 1e15)
+    recovery_s: float = param(0.2, 'time within which a hand inside the margin of an obstacle has to leave it', 's', 0.0, 10.0)
+    qp_backend: str = param(
+        'piqp', 'QP solver: piqp, a solver of qpsolvers by its name, or a registered one', choices=QP_BACKENDS
+    )
 
 
 @dataclass(frozen=True)
 class DurationConfig(Group):
     """Duration of the movement, and how it ends."""
 
-    model: str = _p('fitts', 'duration of a movement: fixed, or by Fitts law', choices=('fixed', 'fitts'))
-    fixed_s: float = _p(1.0, 'duration of model fixed', 's', 0.05, 60.0)
-    fitts_a_s: float = _p(0.2, 'intercept of Fitts law', 's', 0.0, 60.0)
-    fitts_b_s: float = _p(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
-    target_width: float = _p(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
-    adaptation: str = _p(
+    model: str = param('fitts', 'duration of a movement: fixed, or by Fitts law', choices=('fixed', 'fitts'))
+    fixed_s: float = param(1.0, 'duration of model fixed', 's', 0.05, 60.0)
+    fitts_a_s: float = param(0.2, 'intercept of Fitts law', 's', 0.0, 60.0)
+    fitts_b_s: float = param(0.25, 'slope of Fitts law, per bit', 's', 0.0, 60.0)
+    target_width: float = param(0.02, 'target width of Fitts law', 'm', 1e-4, 10.0)
+    adaptation: str = param(
         'online', "whether expected durations and `arrival` follow the operator's movements", choices=ADAPTATIONS
     )
-    spread: float = _p(0.4, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
-    wait_s: float = _p(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
-    arrival: str = _p('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
+    spread: float = param(0.4, f'standard deviation of the time to go, as a fraction of it; it {WIDENS}', '', 0.0, 2.0)
+    wait_s: float = param(0.0, f'mean time until a hand at rest starts to move; it {WIDENS}', 's', 0.0, 60.0)
+    arrival: str = param('rest', 'how the hand arrives at its goal: it comes to rest, or passes at any speed', choices=ARRIVALS)
 
 
 @dataclass(frozen=True)
 class CovarianceConfig(Group):
     """Factors on the predicted standard deviations."""
 
-    near: float = _p(
+    near: float = param(
         1.0, 'factor on the standard deviations of predicted states, for those at once; at rest its power 2/3', '', 0.01, 100.0
     )
-    far: float = _p(
-        1.0,
-        'the same at the end of each candidate; in between the logarithm of the factor changes evenly with the time',
-        '',
-        0.01,
-        100.0,
+    far: float = param(
+        1.0, 'the same at the end of each candidate; in between its logarithm changes evenly with the time', '', 0.01, 100.0
     )
-    adaptation: str = _p(
+    adaptation: str = param(
         'online', 'whether both factors are multiplied by factors that are learnt from earlier errors', choices=ADAPTATIONS
     )
 
@@ -133,69 +106,59 @@ class CovarianceConfig(Group):
 class EstimatorConfig(Group):
     """The Kalman filter of the hand."""
 
-    position_stddev: float = _p(0.001, 'standard deviation of a measured position', 'm', 1e-7, 1.0)
-    jerk_density: float = _p(5.0, 'root of the spectral density of the jerk that the filter expects', 'm/s^2.5', 1e-6, 1e6)
-    onset_speed: float = _p(0.05, 'speed above which a movement begins; it ends below half of this speed', 'm/s', 1e-4, 10.0)
-    acceleration_time_s: float = _p(
+    position_stddev: float = param(0.001, 'standard deviation of a measured position', 'm', 1e-7, 1.0)
+    jerk_density: float = param(5.0, 'root of the spectral density of the jerk that the filter expects', 'm/s^2.5', 1e-6, 1e6)
+    onset_speed: float = param(0.05, 'speed above which a movement begins; it ends below half of this speed', 'm/s', 1e-4, 10.0)
+    acceleration_time_s: float = param(
         0.02, 'decay time of an acceleration: predictions start at the speed that it leads to; 0: no decay', 's', 0.0, 10.0
     )
-    min_interval_s: float = _p(
+    min_interval_s: float = param(
         0.0035,
         'time after a pose that was used, by stamps, within which node and replay skip others; 0: they skip none',
         's',
         0.0,
         0.1,
     )
-    gap_s: float = _p(0.5, 'gap between samples after which the filter restarts', 's', 0.001, 60.0)
-    hand_timeout_s: float = _p(0.5, 'timeout after which a missing or stale hand pose stops prediction; 0: never', 's', 0.0, 1e6)
+    gap_s: float = param(0.5, 'gap between samples after which the filter restarts', 's', 0.001, 60.0)
+    hand_timeout_s: float = param(
+        0.5, 'timeout after which a missing or stale hand pose stops prediction; 0: never', 's', 0.0, 1e6
+    )
 
 
 @dataclass(frozen=True)
 class HomotopyConfig(Group):
     """Homotopy classes that are considered."""
 
-    max_candidates: int = _p(
+    max_candidates: int = param(
         24, 'largest number of homotopy classes to solve, over all goals; each goal gets at least one', '', 1, MOST_CANDIDATES
     )
-    max_detour: float = _p(1.5, 'length of the longest class to solve, relative to the shortest one to its goal', '', 1.0, 1e6)
-    clearance: float = _p(0.005, 'distance that the hand needs from every obstacle: narrower gaps are closed', 'm', 0.0, 1.0)
-    library: str = _p('', 'file of paths that learn or replay --learn wrote; empty: none', read_only=True)
+    max_detour: float = param(1.5, 'length of the longest class to solve, relative to the shortest one to its goal', '', 1.0, 1e6)
+    clearance: float = param(0.005, 'distance that the hand needs from every obstacle: narrower gaps are closed', 'm', 0.0, 1.0)
+    library: str = param('', 'file of paths that learn or replay --learn wrote; empty: none', read_only=True)
 
 
 @dataclass(frozen=True)
 class LikelihoodConfig(Group):
     """Conversion of costs to likelihoods."""
 
-    rule: str = _p('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
-    beta: float = _p(2.0, 'exponent of the cost ratio', '', 0.0, 100.0)
-    shortfall: float = _p(
-        6.0,
-        'log-likelihood that a class loses per standard deviation below the wanted eta; .inf: left out',
-        '',
-        0.0,
-        math.inf,
+    rule: str = param('cost_ratio', 'rule that gives the weight of a class from its cost', choices=LIKELIHOOD_RULES)
+    beta: float = param(2.0, 'exponent of the cost ratio', '', 0.0, 100.0)
+    shortfall: float = param(
+        6.0, 'log-likelihood that a class loses per standard deviation below the wanted eta; .inf: left out', '', 0.0, math.inf
     )
-    planning_horizon_s: float = _p(
-        3.0,
-        'time to the goal beyond which an operator looks ahead (lookahead_s); 0: always; 1000: never',
-        's',
-        0.0,
-        WHOLE_WAY_S,
+    planning_horizon_s: float = param(
+        3.0, 'time to the goal beyond which an operator looks ahead (lookahead_s); 0: always; 1000: never', 's', 0.0, WHOLE_WAY_S
     )
-    lookahead_s: float = _p(
+    lookahead_s: float = param(
         0.5, 'mean look-ahead of an operator who looks ahead: beta decays with the time to a choice; 0: no decay', 's', 0.0, 60.0
     )
-    weaving: float = _p(
+    weaving: float = param(
         4.0, 'log-likelihood that a class loses for each row through several gaps of which it leads', '', 0.0, 100.0
     )
-    other_goal: float = _p(
-        0.02,
-        'probability, before the hand has moved, that it will go to a goal that nobody announced',
-        '',
-        0.0,
-        0.99,
+    other_goal: float = param(
+        0.02, 'probability, before the hand has moved, that it will go to a goal that nobody announced', '', 0.0, 0.99
     )
-    past_goals: float = _p(
+    past_goals: float = param(
         1.0, 'by how much each earlier reach counts for or against the goals that were announced; 0: not at all', '', 0.0, 100.0
     )
 
@@ -204,7 +167,7 @@ class LikelihoodConfig(Group):
 class ExperienceConfig(Group):
     """Use of recordings as evidence: those in the class library (`homotopy.library`), and those that are learnt."""
 
-    learning: str = _p(
+    learning: str = param(
         'none',
         'what movements that end at a goal say of later ones in the running program: nothing; paths and goals; also ways',
         choices=('none', 'goals', ONLINE),
@@ -215,21 +178,21 @@ class ExperienceConfig(Group):
 class SceneConfig(Group):
     """Use of the scene topics."""
 
-    timeout_s: float = _p(
+    timeout_s: float = param(
         2.0, 'age of obstacles, by stamp and in the node by arrival, after which prediction stops; 0: never', 's', 0.0, 1e6
     )
-    max_obstacles: int = _p(64, 'number of obstacles to consider: those farthest from the paths are left out', '', 1, 4096)
-    marker_radius_stddev: float = _p(
+    max_obstacles: int = param(64, 'number of obstacles to consider: those farthest from the paths are left out', '', 1, 4096)
+    marker_radius_stddev: float = param(
         0.0, 'standard deviation of the radius of obstacles from markers, collision objects and detections', 'm', 0.0, 1.0
     )
-    hand_radius: float = _p(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
+    hand_radius: float = param(0.0, 'added to the radius of every obstacle: hands and tools are not points', 'm', 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class FramesConfig(Group):
     """Transforms of messages that are in another frame than the working frame."""
 
-    tolerance_s: float = _p(
+    tolerance_s: float = param(
         0.1, 'time to wait for the transform at the stamp of a message, and largest age of another one then', 's', 0.0, 10.0
     )
 
@@ -238,34 +201,34 @@ class FramesConfig(Group):
 class GuidanceConfig(Group):
     """The guiding force: `core/guidance`."""
 
-    enabled: bool = _p(False, 'whether the node publishes guidance; without it the node is a predictor only')
-    rate_hz: float = _p(200.0, 'updates of guidance per second, independent of the predictions', 'Hz', 1.0, 1000.0)
-    realtime_priority: int = _p(
+    enabled: bool = param(False, 'whether the node publishes guidance; without it the node is a predictor only')
+    rate_hz: float = param(200.0, 'updates of guidance per second, independent of the predictions', 'Hz', 1.0, 1000.0)
+    realtime_priority: int = param(
         50, 'priority of the thread of guidance under SCHED_FIFO, while it is enabled and if permitted; 0: ordinary', '', 0, 99
     )
-    mode: str = _p(
+    mode: str = param(
         'path',
         'path: no force along the path, the operator sets the pace; trajectory: also along it',
         choices=('path', 'trajectory'),
     )
-    k_max: float = _p(150.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
-    f_max: float = _p(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)
-    slew: float = _p(300.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
-    lookahead_s: float = _p(
+    k_max: float = param(150.0, 'largest stiffness in any direction', 'N/m', 0.0, 5000.0)
+    f_max: float = param(3.0, 'largest force; it is also at most what `slew` reduces to zero within `ramp_s`', 'N', 0.0, 100.0)
+    slew: float = param(300.0, 'largest rate of change of the force', 'N/s', 0.1, 1e5)
+    lookahead_s: float = param(
         0.3, 'longest time ahead at which a path is compared with where the hand goes by its velocity', 's', 0.0, 2.0
     )
-    clearance: float = _p(
+    clearance: float = param(
         0.012, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
     )
-    margin: float = _p(0.002, 'distance from every obstacle within which no force leads towards it', 'm', 0.0, 1.0)
-    tank: float = _p(0.5, 'capacity and first content of the energy tank: most energy that guidance gives', 'J', 0.0, 1e3)
-    max_speed: float = _p(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
-    hold_s: float = _p(0.25, 'age of the newest pose or prediction after which the force is released', 's', 0.001, 10.0)
-    ramp_s: float = _p(0.1, 'time within which a released force becomes zero', 's', 0.001, 10.0)
-    unstamped: bool = _p(
+    margin: float = param(0.002, 'distance from every obstacle within which no force leads towards it', 'm', 0.0, 1.0)
+    tank: float = param(0.5, 'capacity and first content of the energy tank: most energy that guidance gives', 'J', 0.0, 1e3)
+    max_speed: float = param(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
+    hold_s: float = param(0.25, 'age of the newest pose or prediction after which the force is released', 's', 0.001, 10.0)
+    ramp_s: float = param(0.1, 'time within which a released force becomes zero', 's', 0.001, 10.0)
+    unstamped: bool = param(
         False, 'whether the force is also published without a stamp, on `~/guidance/wrench_unstamped`', read_only=True
     )
-    authority: float = _p(0.5, 'largest share of guidance in `~/guidance/twist`', '', 0.0, 1.0)
+    authority: float = param(0.5, 'largest share of guidance in `~/guidance/twist`', '', 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -290,13 +253,13 @@ class Config:
     <Config rate_hz=20.0, foc.eta=0.95>
     """
 
-    rate_hz: float = _p(50.0, 'predictions per second of message time', 'Hz', 0.1, 1000.0)
-    budget_s: float = _p(
+    rate_hz: float = param(50.0, 'predictions per second of message time', 'Hz', 0.1, 1000.0)
+    budget_s: float = param(
         0.01, 'time limit of a live prediction, whose best answer by then counts; replays have none; 0: none', 's', 0.0, 60.0
     )
-    plane: str = _p('xy', 'task plane of the working frame', choices=PLANES, read_only=True)
-    frame_id: str = _p('', 'working frame; empty: the frame of the first hand pose', read_only=True)
-    predict_height: bool = _p(
+    plane: str = param('xy', 'task plane of the working frame', choices=PLANES, read_only=True)
+    frame_id: str = param('', 'working frame; empty: the frame of the first hand pose', read_only=True)
+    predict_height: bool = param(
         True, "whether the height over the plane moves to that of the goal; without it the hand's height is predicted to stay"
     )
     foc: FocConfig = field(default_factory=FocConfig)
@@ -321,7 +284,7 @@ class Config:
                 raise ParameterError(item.name, expected, repr(given))
             defaults = replace_values(Config(), {f'{item.name}.{name}': value for name, value in given.items()})
             vars(self)[item.name] = getattr(defaults, item.name)
-        vars(self).update(_check_fields(self))
+        vars(self).update(check_fields(self))
 
     def __repr__(self) -> str:
         """Name the parameters that differ from their defaults."""
@@ -347,15 +310,6 @@ class Config:
         return replace_values(self, values)
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One flattened parameter: dotted name, default, bound."""
-
-    name: str
-    default: Any
-    bound: Bound
-
-
 def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Parameter]:
     """Yield every parameter of a config class, depth first, by dotted name."""
     for item in fields(group):
@@ -363,15 +317,6 @@ def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Paramete
             yield Parameter(prefix + item.name, item.default, item.metadata['bound'])
         else:
             yield from list_parameters(cast('type', item.default_factory), f'{prefix}{item.name}.')
-
-
-G = TypeVar('G', bound=Group)
-
-
-def clip_values(group: G, values: Mapping[str, float]) -> G:
-    """Return a group of parameters with other numbers, each of which stays within its bounds."""
-    bounds = {item.name: item.metadata['bound'] for item in fields(group)}
-    return replace(group, **{name: min(max(value, bounds[name].low), bounds[name].high) for name, value in values.items()})
 
 
 def flatten(config: Config) -> dict[str, float | int | str | bool]:
@@ -392,7 +337,7 @@ def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     for name, value in values.items():
         group, _, leaf = name.rpartition('.')
         try:
-            checked = _check_value(_find_parameter(name, value, known), value)
+            checked = check_value(find_parameter(name, value, known), value)
         except ParameterError as error:
             errors.append(error)
             continue
@@ -400,64 +345,3 @@ def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     if errors:
         raise join_errors(errors)
     return config
-
-
-def _check_fields(group: Group | Config, prefix: str = '') -> dict[str, float | int | str | bool]:
-    """Return the values besides the defaults of a group, in the types of these; an error names all that are wrong."""
-    errors: list[ParameterError] = []
-    values = {}
-    kind: Any = type(group)
-    for name, default, bound in _list_fields(kind):
-        value = getattr(group, name)
-        if value is default:
-            continue
-        try:
-            values[name] = _check_value(Parameter(prefix + name, default, bound), value)
-        except ParameterError as error:
-            errors.append(error)
-    if errors:
-        raise join_errors(errors)
-    return values
-
-
-@cache
-def _list_fields(group: type) -> tuple[tuple[str, Any, Bound], ...]:
-    """Return name, default and bound of the parameters of a config class itself."""
-    return tuple((item.name, item.default, item.metadata['bound']) for item in fields(group) if 'bound' in item.metadata)
-
-
-def _find_parameter(name: str, value: object, known: Mapping[str, Parameter]) -> Parameter:
-    """Return the parameter of a name; raise ParameterError for a name that is unknown or that of a group."""
-    if name in known:
-        return known[name]
-    if name in REMOVED:
-        raise ParameterError(name, f'no value, because it was removed: {REMOVED[name]}', repr(value))
-    groups = {each.partition('.')[0] for each in known if '.' in each}
-    expected = 'a group of parameters' if name in groups else f'a known parameter{suggest(name, (*known, *groups))}'
-    raise ParameterError(name, expected, repr(value))
-
-
-def _check_value(parameter: Parameter, value: object) -> float | int | str | bool:
-    """Return a value in the type of its parameter; raise ParameterError for a wrong type or a value out of bounds."""
-    name, bound = parameter.name, parameter.bound
-    if isinstance(parameter.default, bool):
-        if not isinstance(value, bool):
-            raise ParameterError(name, 'true or false', repr(value))
-        return value
-    if isinstance(parameter.default, str):
-        if not isinstance(value, str) or (bound.choices and value not in bound.choices):
-            raise ParameterError(name, f'one of {", ".join(bound.choices)}' if bound.choices else 'a text', repr(value))
-        return value
-    if isinstance(value, int) and value.bit_length() > 64:  # it may be too large for a float
-        raise ParameterError(name, f'a number{_describe_range(bound)}', value)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (math.isfinite(value) or value == bound.high):
-        raise ParameterError(name, f'a finite number{_describe_range(bound)}', repr(value))
-    if isinstance(parameter.default, int) and value != int(value):
-        raise ParameterError(name, f'a whole number{_describe_range(bound)}', repr(value))
-    if (bound.low is not None and value < bound.low) or (bound.high is not None and value > bound.high):
-        raise ParameterError(name, f'a number{_describe_range(bound)}', repr(value))
-    return int(value) if isinstance(parameter.default, int) else float(value)
-
-
-def _describe_range(bound: Bound) -> str:
-    return '' if bound.low is None else f' in [{bound.low:g}, {bound.high:g}] {bound.unit}'.rstrip()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .candidates import estimate_unfollowed, estimate_unsolved, rank_candidates, solve_candidates, split_unknown
-from .classes import Search, Turn, find_path_sides, search
+from .classes import Search, Turn, search
 from .classes.library import GuessTiming, recall_demonstrations
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
 from .deadline import NEVER, Deadline
@@ -31,8 +31,7 @@ from .plant.covariance import SharedCovariances, scale_noise, widen_covariance
 from .plant.models import TripleIntegratorModel, make_plant_model
 from .prediction import PredictedCandidate, Prediction
 from .safety_preference import SafetyPreference
-from .scene import ReachingScene
-from .solution import LEFT, Candidate, Status
+from .solution import Candidate, Status
 from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_rest
 from .types import NANOSECONDS, Array, HandState, Record, Rest
 
@@ -328,44 +327,3 @@ def _widen_covariance(
     solution = candidate.solution
     covariance = widen_covariance(solution, shared[solution.dt], hand.onset_ns is None, config)
     return replace(candidate, solution=solution.with_covariance(covariance))
-
-
-def build_scene_problems(scene: ReachingScene) -> list[Problem]:
-    """Return the problem of every goal. An uncertain start is as uncertain to the operator, so it counts in the constraint."""
-    config = scene.config
-    in_the_way = take_in_the_way(scene.avoided, scene.goals, scene.goal_objects)
-    problems = [
-        build_problem(config, scene.hand, around, goal, scene.duration_s)
-        for around, goal in zip(in_the_way, scene.goals, strict=True)
-    ]
-    if scene.noise is not None:
-        problems = [replace(problem, noise=scene.noise) for problem in problems]
-    if not scene.hand.covariance.any():
-        return problems
-    plant, steps = make_plant_model(config.foc), config.foc.steps
-    error_map = plant.compute_error_map(scene.duration_s / steps, steps, is_passing(config.duration))
-    covariance = plant.project_covariance(scene.hand.covariance)
-    return [replace(problem, initial_covariance=covariance, error_map=error_map) for problem in problems]
-
-
-def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[PredictedCandidate]:
-    """Solve the class of the guess, or the classes that are found; solved ones come first, the most likely first.
-
-    problems: of every goal, from `build_scene_problems`.
-    """
-    config, avoided = scene.config, scene.avoided
-    if scene.guess is not None:
-        in_the_way = take_in_the_way(avoided, scene.goals, scene.goal_objects)[0]
-        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, in_the_way),)
-    else:
-        timing, turn = GuessTiming([scene.duration_s] * len(scene.goals), config.foc.steps), Turn(objects=scene.goal_objects)
-        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, *timing, (), turn).candidates
-    solved = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc)
-    ranked = rank_candidates(solved, config.likelihood, avoided, scene.hand, scene.goals)
-    return [each.with_goal_name(scene.goal_names[each.candidate.goal]) for each in ranked] if scene.goal_names else ranked
-
-
-def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
-    sides = tuple(sorted(find_path_sides(guess, obstacles).items()))
-    label = 'goal0:' + ''.join(('+' if side == LEFT else '-') + identity for identity, side in sides)
-    return Candidate(label, 0, sides, guess, 0.0)

@@ -1,8 +1,13 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of earlier versions, and what took their place: for the message that refuses them."""
+"""Names that are no parameters: those of earlier versions, with what took their place, of groups, and misspelt ones."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .errors import ParameterError, suggest
+from .parameter import Parameter
 
 RECORDINGS = 'how much recordings count is fixed'
 REMOVED = {
@@ -32,3 +37,14 @@ REMOVED = {
     'guidance.yield_acceleration': 'it is 0.6 m/s^2',
 }
 """By dotted name, a sentence that goes on after `it was removed: `."""
+
+
+def find_parameter(name: str, value: object, known: Mapping[str, Parameter]) -> Parameter:
+    """Return the parameter of a name; raise ParameterError for a name that is unknown or that of a group."""
+    if name in known:
+        return known[name]
+    if name in REMOVED:
+        raise ParameterError(name, f'no value, because it was removed: {REMOVED[name]}', repr(value))
+    groups = {each.partition('.')[0] for each in known if '.' in each}
+    expected = 'a group of parameters' if name in groups else f'a known parameter{suggest(name, (*known, *groups))}'
+    raise ParameterError(name, expected, repr(value))

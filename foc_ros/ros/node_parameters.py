@@ -14,8 +14,9 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter as RosParameter
 
-from foc_ros.core.config import Config, Parameter, flatten, replace_values
+from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import FocError, ParameterError, collect, join_errors, suggest
+from foc_ros.core.parameter import Parameter
 
 from .parameters import AUTOSTART, KNOWN, NODE_ONLY
 

@@ -39,13 +39,14 @@ from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedPath
 from foc_ros.analysis.intervals import CENTRAL, resample
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
-from foc_ros.core.config import Config, EstimatorConfig, clip_values, flatten, replace_values
+from foc_ros.core.config import Config, EstimatorConfig, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.hand.duration import estimate_times_to_go
 from foc_ros.core.hand.kalman import Update, compute_gramian, compute_transition, update
 from foc_ros.core.learning.movements import has_covered_distance
 from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.parameter import clip_values
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record, SampleStatus
 
 from . import Estimate, Findings, SettingTable, clip_to_bounds, list_settings

@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import math
 
-from foc_ros.core.config import DurationConfig, clip_values
+from foc_ros.core.config import DurationConfig
+from foc_ros.core.parameter import clip_values
 from foc_ros.core.types import NANOSECONDS, Array, HandState
 
 CONSTANTS = {'fixed': ('fixed_s',), 'fitts': ('fitts_a_s', 'fitts_b_s')}

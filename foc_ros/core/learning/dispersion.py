@@ -31,7 +31,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from foc_ros.core.config import CovarianceConfig, clip_values
+from foc_ros.core.config import CovarianceConfig
+from foc_ros.core.parameter import clip_values
 from foc_ros.core.prediction import PredictedCandidate
 from foc_ros.core.types import NANOSECONDS, Array, HandState, Record, as_readonly
 

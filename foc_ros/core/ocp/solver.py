@@ -37,11 +37,9 @@ ROUGH_GAIN = 1e-3
 """Gain, as a logarithm of cost, at which the search with the gentle worth ends."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
-LAST_GAIN, LAST_EXACT_GAIN = 3e-4, 5e-5
-"""Gain of a whole step after which a problem is solved, because Newton steps converge quadratically: for a class that is followed
-from one prediction to the next, and otherwise."""
-FORETOLD = 0.1
-"""Part of the promised gain that may be left, if the step brought what was foretold."""
+LAST_GAIN = 1e-4
+"""Gain that may be left when a problem counts as solved, by what its last whole step has missed, and gain of a failed step that
+rounding hides."""
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
 UNLIKELY, SMALL_PART = 6.0, 0.05
@@ -49,8 +47,6 @@ UNLIKELY, SMALL_PART = 6.0, 0.05
 if its QP promises less than the second one as a part of that."""
 LARGEST_TOLERANCE = 5e-3
 """Gain of its last whole step up to which a class without the wanted eta counts as settled."""
-STALLED_GAIN = 2e-5
-"""Gain below which a problem is solved that no step improves: rounding hides it."""
 MOST_TRIALS, SHORTER = 5, 0.35
 """Steps that are tried: the whole one, and a part of the last one each."""
 SUFFICIENT = 1e-4
@@ -145,10 +141,11 @@ class Solver:
     def _postpone(self, now: Iterates) -> None:
         """Leave unlikely classes to the next prediction whose QPs promise little of what they lack to the best class.
 
+        A class whose loss has just risen goes on, because what its QP has promised was not there.
         Where the wanted eta is a condition, every class is solved to its end: whether it meets eta decides, not what it costs.
         """
         behind = self.objective.compare(now.at.loss)
-        is_enough = (behind > UNLIKELY) & (self.objective.beta * now.gain < SMALL_PART * behind)
+        is_enough = (behind > UNLIKELY) & (self.objective.beta * now.gain < SMALL_PART * behind) & (now.at.loss < now.bound)
         now.is_waiting |= ~now.is_done & is_enough & ~self._is_condition
         now.is_done |= now.is_waiting
 
@@ -163,7 +160,7 @@ class Solver:
                 break
             place = self._step(now, plan, place, share)
             # what rounding hides is not worth another trial
-            is_stalled = plan.gain[place] < STALLED_GAIN
+            is_stalled = plan.gain[place] < LAST_GAIN
             stalled, place = rows[place[is_stalled]], place[~is_stalled]
             now.is_done[stalled] = now.is_settled[stalled] = True
             share *= SHORTER
@@ -194,8 +191,7 @@ class Solver:
             missed = np.abs(now.at.loss[rows] - at.loss - plan.fall[place])
             is_free = plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
             is_exact = is_free | now.is_exact[rows]
-            left = np.where(is_exact, plan.gain[place], np.maximum(plan.gain[place] * FORETOLD, missed))
-            is_small = left < np.where(now.is_exact[rows], LAST_EXACT_GAIN, LAST_GAIN)
+            is_small = np.where(is_exact, plan.gain[place], missed) < LAST_GAIN
             is_met = is_free | (at.factor >= self.objective.wanted_k[rows])
             is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True

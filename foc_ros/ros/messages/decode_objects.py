@@ -20,7 +20,7 @@ import numpy as np
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacle_table import UNKNOWN_HEIGHTS, Obstacles, make_obstacles
-from foc_ros.core.obstacles.shapes import make_hull_polygon
+from foc_ros.core.obstacles.polygons import make_hull_polygon
 from foc_ros.core.types import NANOSECONDS, Array
 
 from .decode_point_cloud import MAX_ROWS, DecodedCloud

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
-from foc_ros.core.obstacles.shapes import tabulate_boxes
+from foc_ros.core.obstacles.polygons import tabulate_boxes
 from foc_ros.core.types import Array
 
 from .decode_poses import MAX_COORDINATE, Place, decode_stamp, stay

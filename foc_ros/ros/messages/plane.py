@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from foc_ros.core.obstacles.shapes import FLAT, make_hull_polygon
+from foc_ros.core.obstacles.polygons import FLAT, make_hull_polygon
 from foc_ros.core.types import Array
 
 _AXES = {'xy': (slice(0, 2), 2), 'xz': (slice(0, 3, 2), 1), 'yz': (slice(1, 3), 0)}

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""One reach in a scene of known duration, solved once and without memory: what `solve` and scene files ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .candidates import rank_candidates, solve_candidates
+from .classes import Turn, find_path_sides, search
+from .classes.library import GuessTiming
+from .config import Config
+from .errors import SceneError
+from .hand.duration import is_passing
+from .obstacle_table import Obstacles
+from .obstacles.geometry import measure_offsets
+from .ocp.problem import Problem
+from .plant.models import make_plant_model
+from .predict import build_problem, take_in_the_way
+from .prediction import PredictedCandidate
+from .solution import LEFT, Candidate
+from .types import Array, HandState, Record
+
+
+@dataclass(frozen=True, eq=False)
+class ReachingScene(Record):
+    """One reaching problem.
+
+    hand: where it starts; goals (g, 2) [m]; obstacles; noise (2,): c per step, None for the parameters' noise scaled to the step;
+    guess (N + 1, 2) [m]: path in the only class to be solved, None to search the classes; config: parameters, of which
+    `duration.fixed_s` is the duration; goal_names, goal_objects (g,): what answers call the goals, and the id of the
+    obstacle that each is, or none.
+    """
+
+    hand: HandState
+    goals: Array
+    obstacles: Obstacles
+    noise: Array | None
+    guess: Array | None
+    config: Config
+    goal_names: tuple[str, ...] = ()
+    goal_objects: tuple[str | None, ...] = ()
+
+    @property
+    def avoided(self) -> Obstacles:
+        """The obstacles that the centre of the hand has to avoid: those of the scene, larger by the radius of the hand."""
+        return self.obstacles.grow(self.config.scene.hand_radius)
+
+    @property
+    def duration_s(self) -> float:
+        """Duration of the movement [s]."""
+        return self.config.duration.fixed_s
+
+    def check(self) -> None:
+        """Raise SceneError if the start lies inside the mean boundary of an obstacle, or the object of a goal is no obstacle."""
+        start, obstacles = self.hand.mean[:2], self.avoided
+        distances = measure_offsets(start, obstacles)[1][0]
+        for row in np.flatnonzero(distances < obstacles.radius)[:1]:
+            core = 'centre' if obstacles.corners[row] == 1 else 'polygon'
+            found = f'{start.tolist()}, {max(round(distances[row], 9), 0.0):.4g} m from its {core}'
+            words = f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m'
+            raise SceneError('start', words, found)
+        for row, name in enumerate(self.goal_objects):
+            if name is not None and name not in obstacles.ids:
+                raise SceneError(f'goals[{row}].object', 'the id of an obstacle', repr(name))
+
+
+def build_scene_problems(scene: ReachingScene) -> list[Problem]:
+    """Return the problem of every goal. An uncertain start is as uncertain to the operator, so it counts in the constraint."""
+    config = scene.config
+    in_the_way = take_in_the_way(scene.avoided, scene.goals, scene.goal_objects)
+    problems = [
+        build_problem(config, scene.hand, around, goal, scene.duration_s)
+        for around, goal in zip(in_the_way, scene.goals, strict=True)
+    ]
+    if scene.noise is not None:
+        problems = [replace(problem, noise=scene.noise) for problem in problems]
+    if not scene.hand.covariance.any():
+        return problems
+    plant, steps = make_plant_model(config.foc), config.foc.steps
+    error_map = plant.compute_error_map(scene.duration_s / steps, steps, is_passing(config.duration))
+    covariance = plant.project_covariance(scene.hand.covariance)
+    return [replace(problem, initial_covariance=covariance, error_map=error_map) for problem in problems]
+
+
+def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[PredictedCandidate]:
+    """Solve the class of the guess, or the classes that are found; solved ones come first, the most likely first.
+
+    problems: of every goal, from `build_scene_problems`.
+    """
+    config, avoided = scene.config, scene.avoided
+    if scene.guess is not None:
+        in_the_way = take_in_the_way(avoided, scene.goals, scene.goal_objects)[0]
+        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, in_the_way),)
+    else:
+        timing, turn = GuessTiming([scene.duration_s] * len(scene.goals), config.foc.steps), Turn(objects=scene.goal_objects)
+        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, *timing, (), turn).candidates
+    solved = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc)
+    ranked = rank_candidates(solved, config.likelihood, avoided, scene.hand, scene.goals)
+    return [each.with_goal_name(scene.goal_names[each.candidate.goal]) for each in ranked] if scene.goal_names else ranked
+
+
+def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
+    sides = tuple(sorted(find_path_sides(guess, obstacles).items()))
+    label = 'goal0:' + ''.join(('+' if side == LEFT else '-') + identity for identity, side in sides)
+    return Candidate(label, 0, sides, guess, 0.0)
