@@ -42,7 +42,7 @@ LAST_GAIN = 1e-4
 rounding hides."""
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
-UNLIKELY, SMALL_PART = 6.0, 0.05
+UNLIKELY, SMALL_PART = 6.0, 0.02
 """A class can wait for the next prediction if it is less likely than the best by more than the first number, as a logarithm, and
 if its QP promises less than the second one as a part of that."""
 LARGEST_TOLERANCE = 5e-3
