@@ -3,8 +3,8 @@
 # make check       lint, and the quick tests: three quarters of a minute on two cores
 # make test        all tests but the long ones: three minutes on two cores
 # make test-long   the long studies, tests under load and the commands of the documentation
-#                  test/tiers.py lists the long tests (mark `long`) and those that take more than half a second, and finds those
-#                  that start another process, a ROS graph or a browser (mark `process`); make check has neither
+#                  test/tiers.py lists the long tests (mark `long`), and those that start another process, a ROS graph or a
+#                  browser, or take more than half a second (mark `process`); make check has neither
 # make lint        ruff, mypy and the import contracts
 # make demo        the demo: the node and the packaged recording
 # make doc         the documentation as HTML, in build/doc/index.html

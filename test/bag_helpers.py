@@ -107,7 +107,6 @@ def write_mcap(
 
 
 def write_parameters(folder: Path, config: Config = CONFIG) -> str:
-    """Write the parameter file of CONFIG and return its path."""
     file = folder / 'foc.yaml'
     file.write_text(dump_parameter_file(config), 'utf-8')
     return str(file)

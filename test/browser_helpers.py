@@ -52,7 +52,6 @@ def chromium(profile: Path) -> Iterator[Any]:
 
 
 def show(browser: Any, page: Path, width: int = 1280, height: int = 900, dark: bool = False) -> list[str]:
-    """Open a page of a file; see `show_address`."""
     return show_address(browser, page.resolve().as_uri(), width, height, dark)
 
 

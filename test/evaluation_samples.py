@@ -54,7 +54,6 @@ def observation(
     approach=0.0,
     positions=None,
 ) -> Observation:
-    """Return the observation of a hand that moves along x among obstacles."""
     centre = np.array(centre, dtype=float).reshape(-1, 2)
     truth = GroundTruth(
         sides=np.array(true_sides, dtype=np.int8),
@@ -82,7 +81,6 @@ def observation(
 
 
 def recorded(*each: Observation, name: str = 'one') -> ObservedRecording:
-    """Return a recording of a hand that moves along x."""
     stamps_ns = np.arange(0, 2_000_000_001, 50_000_000)
     return ObservedRecording(name, each, RecordedPath(stamps_ns, np.outer(stamps_ns / 1e9, [1.0, 0.0]), np.array([[2.0, 0.0]])))
 

@@ -39,7 +39,6 @@ def write_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float 
 
 
 def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> RecordedHand:
-    """Return a recorded hand from its samples."""
     return RecordedHand(name, np.round(times * 1e9).astype(np.int64), positions, obstacles, goals)
 
 

@@ -81,13 +81,12 @@ def make_polygon(rng: np.random.Generator) -> tuple[np.ndarray, float]:
 
 
 def measure_distance(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
-    """Distance of points (q, 2) from a convex polygon (v, 2), 0 inside."""
-    after = np.roll(polygon, -1, axis=0)
-    edge, start = after - polygon, points[:, None] - polygon
-    share = np.clip((start * edge).sum(2) / np.maximum((edge**2).sum(1), 1e-300), 0.0, 1.0)
-    distance = np.hypot(*(start - share[..., None] * edge).transpose(2, 0, 1)).min(axis=1)
+    """Distance of points (..., 2) from a convex polygon (v, 2), 0 inside."""
+    edge, start = np.roll(polygon, -1, axis=0) - polygon, points[..., None, :] - polygon
+    share = np.clip((start * edge).sum(-1) / np.maximum((edge**2).sum(-1), 1e-300), 0.0, 1.0)
+    distance = np.linalg.norm(start - share[..., None] * edge, axis=-1).min(axis=-1)
     left = edge[:, 0] * start[..., 1] - edge[:, 1] * start[..., 0]
-    return np.where((left > 0).all(axis=1) & (len(polygon) > 2), 0.0, distance)
+    return np.where((left > 0).all(axis=-1) & (len(polygon) > 2), 0.0, distance)
 
 
 def round_off(polygon: np.ndarray, radius: float, corners: int) -> np.ndarray:

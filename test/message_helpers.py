@@ -111,7 +111,7 @@ def transform(
 def read_columns(cloud: Any) -> dict[str, np.ndarray]:
     """Read a cloud by its own field descriptions."""
     raw = np.frombuffer(bytes(cloud.data), np.uint8).reshape(cloud.height * cloud.width, cloud.point_step)
-    dtypes = {7: '<f4', 6: '<u4'}
+    dtypes = {7: '<f4', 6: '<u4', 5: '<i4'}
     return {
         field.name: raw[:, field.offset : field.offset + 4].copy().view(dtypes[field.datatype])[:, 0] for field in cloud.fields
     }

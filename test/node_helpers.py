@@ -18,13 +18,7 @@ OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
 ROWS = [(0.15, 0.02, 0.0, 0.03)]
 CROWD = [(0.01 * (i % 100) - 0.35, 0.05 + 0.01 * (i // 100), 0.0, 0.004) for i in range(10_000)]
 GOALS = [(0.3, 0.0, 0.0)]
-QUICK = {
-    'foc.steps': 20,
-    'homotopy.max_candidates': 2,
-    'scene.timeout_s': 0.0,
-    'estimator.hand_timeout_s': 0.0,
-    'budget_s': 0.0,
-}
+QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2, 'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0, 'budget_s': 0.0}
 """Parameters for quick predictions, without time limits that a slow machine would exceed."""
 RELIABLE = {f'qos_overrides./{name}.subscription.reliability': 'reliable' for name in ('hand_pose', 'obstacles')}
 """Reliable inputs, so that a test can wait until all of them are received."""
@@ -112,7 +106,6 @@ class Bench:
     def publish_scene(
         self, rows: Sequence[tuple[float, ...]] = ROWS, goals: Sequence[Sequence[float]] = GOALS, stamp_s: float = 10.0
     ) -> None:
-        """Publish obstacles and goals."""
         self.deliver('obstacles', cloud(TYPES, obstacle_table(rows), round(stamp_s * SECOND)))
         self.deliver('goals', pose_array(TYPES, goals))
 
@@ -122,7 +115,6 @@ class Bench:
             self.deliver('hand_pose', pose)
 
     def wait_for(self, name: str, count: int) -> list[Any]:
-        """Return the messages of an output when there are so many."""
         self.ros.spin_until(lambda: len(self.received[name]) >= count, f'{count} messages of {name}')
         return self.received[name]
 
@@ -138,7 +130,6 @@ class Bench:
         return [array.status[0] for array in self.diagnostics if array.status[0].hardware_id == own]
 
     def call(self, kind: Any, name: str, **fields: Any) -> Any:
-        """Return the response of a service of the node."""
         return self.ros.call(self.player, kind, f'foc/{name}', kind.Request(**fields))
 
     def change(self, *transitions: str | int) -> bool:
@@ -151,13 +142,11 @@ class Bench:
 
     @property
     def state(self) -> str:
-        """The state of the managed node."""
         from lifecycle_msgs.srv import GetState
 
         return str(self.call(GetState, 'get_state').current_state.label)
 
     def set(self, **values: Any) -> Any:
-        """Set parameters together, and return the result."""
         from rcl_interfaces.srv import SetParametersAtomically
 
         return self.call(SetParametersAtomically, 'set_parameters_atomically', parameters=list_parameters(**values)).result
@@ -184,10 +173,8 @@ def list_labels(table: Any) -> list[str]:
 
 
 def figures(status: Any) -> dict[str, str]:
-    """Return the values of diagnostics by name."""
     return {entry.key: entry.value for entry in status.values}
 
 
 def stamps(messages: Iterable[Any]) -> list[int]:
-    """Return the stamps of messages [ns]."""
     return [message.header.stamp.sec * SECOND + message.header.stamp.nanosec for message in messages]

@@ -57,13 +57,8 @@ def collision_object(
 
 
 def detection(
-    place: Sequence[float],
-    size: Sequence[float],
-    name: str = '',
-    turned: dict[str, float] | None = None,
-    frame_id: str = '',
+    place: Sequence[float], size: Sequence[float], name: str = '', turned: dict[str, float] | None = None, frame_id: str = ''
 ) -> Any:
-    """Return a Detection3D."""
     make = OBJECT_TYPES.make
     length = OBJECT_TYPES.fill('geometry_msgs/msg/Vector3', size)
     box = make('vision_msgs/msg/BoundingBox3D', center=pose(OBJECT_TYPES, place, turned or {'w': 1.0}), size=length)
@@ -71,6 +66,5 @@ def detection(
 
 
 def detections(*each: Any, stamp_ns: int = SECOND, frame_id: str = 'world') -> Any:
-    """Return a Detection3DArray."""
     header = make_header(OBJECT_TYPES, stamp_ns, frame_id)
     return OBJECT_TYPES.make('vision_msgs/msg/Detection3DArray', header=header, detections=list(each))

@@ -26,7 +26,6 @@ const point = ([x, y]) => canvas.dispatchEvent(new PointerEvent('pointermove', {
 let at = view.hand.target;
 let row = 0;
 let last = performance.now();
-const seen = [];
 function step() {
   const now = performance.now();
   const left = targets[row].map((value, axis) => value - at[axis]);
@@ -35,40 +34,32 @@ function step() {
   last = now;
   at = at.map((value, axis) => value + share * left[axis]);
   point(at);
-  seen.push([now, view.candidates.map((each) => [each.way, each.goal, each.likelihood])]);
-  if (share === 1 && (row += 1) === targets.length) done(seen);
+  if (share === 1 && (row += 1) === targets.length) done();
   else setTimeout(step, 8);
 }
 step();
 """
-"""Moves the pointer through targets [m] at a speed [m/s]; returns times [ms], and way, goal and likelihood of candidates."""
+"""Moves the pointer through targets [m] at a speed [m/s]."""
 
 
 class Play:
-    """A process of `foc_ros play`. Attributes: url, of the page; data, the folder of recordings; process."""
+    """A process of `foc_ros play`. Attributes: process; data, the folder of recordings."""
 
-    def __init__(self, folder: Path, *arguments: str, program: str = '') -> None:
-        self.data = folder / 'data'
-        self._log = (folder / 'play.txt').open('w+', encoding='utf-8')
-        start = ['-c', program] if program else ['-m', 'foc_ros']
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self.data, self._log = folder / 'data', (folder / 'play.txt').open('w+', encoding='utf-8')
         port = [] if '--port' in arguments else ['--port', '0']
-        command = [sys.executable, *start, 'play', '--data', str(self.data), *port, *arguments]
+        command = [sys.executable, '-m', 'foc_ros', 'play', '--data', str(self.data), *port, *arguments]
         self.process = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
-
-    def wait(self) -> None:
-        """Wait until the page is served."""
-        until(lambda: STARTED.search(self.output) or self.process.poll() is not None, 'the address of the page', 100.0)
-        assert STARTED.search(self.output), self.output
-
-    @property
-    def url(self) -> str:
-        found = STARTED.search(self.output)
-        assert found
-        return found.group(1)
 
     @property
     def output(self) -> str:
         return Path(self._log.name).read_text(encoding='utf-8')
+
+    @property
+    def url(self) -> str:
+        """The address of the page, or nothing while the program has not printed it."""
+        found = STARTED.search(self.output)
+        return found.group(1) if found else ''
 
     def stop(self) -> int:
         """Interrupt the process and return its exit code."""
@@ -81,11 +72,12 @@ class Play:
 
 
 @contextmanager
-def play(folder: Path, *arguments: str, program: str = '') -> Iterator[Play]:
-    """Run `foc_ros play` within a context, at whose end it is stopped; program: Python code in place of `-m foc_ros`."""
-    started = Play(folder, *arguments, program=program)
+def play(folder: Path, *arguments: str) -> Iterator[Play]:
+    """Run `foc_ros play` within a context, at whose end it is stopped."""
+    started = Play(folder, *arguments)
     try:
-        started.wait()
+        until(lambda: started.url or started.process.poll() is not None, 'the address of the page', 100.0)
+        assert started.url, started.output
         yield started
     except BaseException:
         started.stop()
@@ -109,19 +101,16 @@ def visit(browser: Any, started: Play, width: int = 1280, height: int = 1000, da
 
 
 def wait_for(browser: Any, expression: str, what: str, seconds: float = 60.0) -> Any:
-    """Wait until an expression of the page is true."""
     return until(lambda: browser.execute_script(f'return {expression}'), what, seconds)
 
 
-def steer(browser: Any, *targets: tuple[float, float], speed: float = 0.3) -> list[Any]:
-    """Move the pointer through targets [m]; return what the page showed on the way."""
+def steer(browser: Any, *targets: tuple[float, float], speed: float = 0.3) -> None:
+    """Move the pointer through targets [m]."""
     browser.set_script_timeout(60)
-    seen: list[Any] = browser.execute_async_script(STEER, [list(each) for each in targets], speed)
-    return seen
+    browser.execute_async_script(STEER, [list(each) for each in targets], speed)
 
 
 def wait_for_answer(browser: Any) -> None:
-    """Wait for a prediction from the present position of the hand."""
     distance = 'Math.hypot(...play.view.hand.position.map((value, axis) => value - play.view.candidates[0].path[0][axis]))'
     wait_for(browser, f'play.view.candidates.length && {distance} < 0.005', 'predictions')
 
@@ -139,15 +128,15 @@ def find_point(browser: Any, position: tuple[float, float]) -> tuple[float, floa
 
 
 def await_layout(browser: Any) -> None:
-    """Wait until the scene stays where it is: controls that appear move it."""
-    place = None
-    while (found := find_point(browser, (0.0, 0.0))) != place:
-        place = found
-        time.sleep(0.2)
+    """Wait until the scene has stayed where it is for a while: controls that appear move it."""
+    place, since = None, time.monotonic()
+    while time.monotonic() - since < 0.6:
+        if (found := find_point(browser, (0.0, 0.0))) != place:
+            place, since = found, time.monotonic()
+        time.sleep(0.05)
 
 
 def tab_to(browser: Any, name: str) -> None:
-    """Press Tab until a control of the page has the focus."""
     for _ in range(60):
         if browser.execute_script('return document.activeElement.id') == name:
             return

@@ -54,7 +54,6 @@ def prediction(*outcomes: PredictedCandidate, stamp_ns: int = 5_000_000_000, **c
 
 
 def three_ways() -> Prediction:
-    """Return two solved candidates and one that is not."""
     return prediction(
         outcome('goal0:+l1', 0.7, 0.1, 2.0),
         outcome('goal0:-l1', 0.3, -0.1, 5.0, eta=0.91),

@@ -72,24 +72,19 @@ class Player:
 
     @property
     def statuses(self) -> list[Any]:
-        """The diagnostics so far."""
         return [each.status[0] for each in self.diagnostics]
 
     def figure(self, name: str) -> str | None:
-        """Return a value of the newest diagnostics."""
         return figures(self.statuses[-1]).get(name) if self.diagnostics else None
 
     def connect(self) -> None:
-        """Wait for the subscriptions of the node."""
         self.ros.spin_until(lambda: all(each.get_subscription_count() for each in self.publishers.values()), 'the node', 30.0)
 
     def publish_scene(self, stamp_ns: int = 10 * SECOND) -> None:
-        """Publish an obstacle and a goal."""
         self.publishers['obstacles'].publish(cloud(TYPES, obstacle_table(ROWS), stamp_ns))
         self.publishers['goals'].publish(pose_array(TYPES, GOALS))
 
     def is_scene_known(self) -> bool:
-        """Return whether the diagnostics count obstacles and a goal."""
         return self.figure('obstacles of cloud') is not None and self.figure('goals') == '1'
 
     def publish_pose(self, stamp_ns: int, x: float) -> None:
@@ -128,7 +123,6 @@ class Player:
 
 
 def predict_once(ros: Graph, hand: str = 'hand_pose') -> Player:
-    """Return a player that has heard a prediction of the node."""
     player = Player(ros, hand)
     player.play_until(lambda: bool(player.predictions), 'a prediction')
     return player

@@ -64,14 +64,12 @@ def make_shape(kind: str = '', **fields) -> Shape:
 
 
 def case_guess(case: dict) -> np.ndarray:
-    """Return the guess of a reference case, (N + 1, 2)."""
     return bowed(case['start'], case['goal'], case['steps'], case['guess']['amplitude'])
 
 
 def reach(
     obstacles: Obstacles, goal=(0.3, 0.0), start=(0.0, 0.0), steps=50, duration=1.0, noise=(0.15, 0.15), eta=0.9, **rest
 ) -> Problem:
-    """Return a rest-to-rest problem."""
     initial = np.zeros(6)
     initial[:2] = start
     horizon = build_triple_integrator_horizon(duration / steps, steps)
@@ -84,7 +82,6 @@ def one_obstacle(eta=0.9, noise=(0.15, 0.15), **rest) -> Problem:
 
 
 def solved(problem: Problem, guess: np.ndarray, strategy: str = 'lv', **settings) -> Solution:
-    """Solve from a guess (N + 1, 2)."""
     return solve_problem(problem, cold_start(guess), FocConfig(strategy=strategy, **settings))
 
 

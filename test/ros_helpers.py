@@ -64,13 +64,11 @@ class Graph:
         return os.environ | {'ROS_DOMAIN_ID': str(self.domain)}
 
     def add(self, node: Any) -> Any:
-        """Spin a node (made with `context=graph.context`) with the others."""
         self.nodes.append(node)
         self.executor.add_node(node)
         return node
 
     def node(self, name: str = 'helper', **options: Any) -> Any:
-        """Return a plain node."""
         from rclpy.node import Node
 
         return self.add(Node(name, context=self.context, **options))
@@ -114,7 +112,6 @@ class Graph:
         return next(future.result() for future in futures if future.done())
 
     def close(self) -> None:
-        """Destroy the nodes, the executor and the context."""
         for node in self.nodes:
             self.executor.remove_node(node)
             node.destroy_node()

@@ -25,8 +25,6 @@ def parse(message: object) -> Any:
 
 
 class Silent(Predictor):
-    """A predictor that keeps what it is given."""
-
     def __init__(self, config: Config, receive: Any) -> None:
         super().__init__(config, receive)
         self.sent: list[tuple[str, Any]] = []
@@ -50,8 +48,6 @@ class Silent(Predictor):
 
 
 class Page:
-    """A page that keeps what it receives."""
-
     def __init__(self, session: Session) -> None:
         self.session, self.received = session, []
         self.t_ms = 0.0

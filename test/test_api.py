@@ -22,12 +22,8 @@ import foc_ros.solving
 from foc_ros import Circle, Goal
 from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.interpolation import interpolate_covariance
-from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.predict import predict
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 from foc_ros.core.solution import Status
-from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import HandState
 
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003, name='cup')
 FAST = foc_ros.Config().with_values({'foc.steps': 20, 'budget_s': 0.0})
@@ -126,9 +122,8 @@ def test_an_outlier_is_refused_and_the_movement_goes_on():
 
 def test_lists_states_and_tables_are_accepted():
     by_position = foc_ros.solve([0, 0], [0.3, 0], [CUP], config=FAST)
-    by_state = foc_ros.solve(
-        np.zeros(6), np.array([0.3, 0.0]), foc_ros.core.obstacles.shapes.collect_obstacles([CUP]), config=FAST
-    )
+    table = foc_ros.core.obstacles.shapes.collect_obstacles([CUP])
+    by_state = foc_ros.solve(np.zeros(6), np.array([0.3, 0.0]), table, config=FAST)
     np.testing.assert_array_equal(by_position.mean, by_state.mean)
     moving = foc_ros.solve((0, 0, 0.3, 0, 0, 0), (0.3, 0), config=FAST)
     np.testing.assert_allclose(moving.mean[0, 2], 0.3)
@@ -234,6 +229,10 @@ def test_positions_between_the_steps_are_on_the_mean_path(predicted):
         speed = (each.position_at(between + step) - each.position_at(between - step)) / (2.0 * step)
         half_way = 0.5 * (begin + end)[:, 2:4] - dt / 8.0 * (end - begin)[:, 4:6]  # of a constant jerk
         np.testing.assert_allclose(speed, half_way, atol=1e-5)
+        for ask in (each.position_at, each.covariance_at):
+            for t in (-0.1, 99.0, float('nan'), 'now', None, [0.1, 99.0]):
+                with pytest.raises(foc_ros.InputError, match=r'^t: expected seconds from now in \[0, 1\.\d+\], .*, got'):
+                    ask(t)
 
 
 def test_covariances_between_the_steps_are_those_of_the_motor_noise():
@@ -249,22 +248,12 @@ def test_covariances_between_the_steps_are_those_of_the_motor_noise():
     np.testing.assert_allclose(found[:, [0, 1], [0, 1]], exact, atol=1e-5 * exact.max())
 
 
-@pytest.mark.parametrize('t', [-0.1, 99.0, float('nan'), 'now', None, [0.1, 99.0]])
-def test_no_position_is_told_beyond_the_prediction(predicted, t):
-    for ask in (predicted.candidates[0].position_at, predicted.candidates[0].covariance_at):
-        with pytest.raises(foc_ros.InputError, match=r'^t: expected seconds from now in \[0, 1\.\d+\], .*, got'):
-            ask(t)
-
-
-def test_plain_values_are_those_of_the_prediction(predicted):
+def test_plain_values_and_the_table_are_those_of_the_prediction(predicted):
     read = json.loads(json.dumps(predicted.to_dict(), allow_nan=False))
     assert [each['name'] for each in read['goals']] == ['bowl', 'goal1']
     assert [each['likelihood'] for each in read['goals']] == [each.likelihood for each in predicted.goals]
     assert [each['label'] for each in read['candidates']] == [each.label for each in predicted]
     np.testing.assert_array_equal(read['candidates'][0]['mean'], predicted.candidates[0].mean[:, :2])
-
-
-def test_the_table_has_a_row_for_each_step_of_each_candidate(predicted):
     rows = predicted.to_records()
     assert len(rows) == 4 * 21 and len({tuple(row) for row in rows}) == 1
     assert all(isinstance(value, (str, int, float)) for value in rows[0].values())
@@ -279,6 +268,9 @@ def test_a_group_of_parameters_is_given_as_a_whole_or_by_its_values():
     assert isinstance(Config(foc={'eta': 0}).foc.eta, float), 'a whole number becomes the type of the parameter'
     groups = [item.name for item in fields(Config) if 'bound' not in item.metadata]
     assert groups == [type(getattr(Config(), name)).__name__.removesuffix('Config').lower() for name in groups]
+    with pytest.raises(foc_ros.ParameterError, match=r'foc\.steps') as caught:
+        Config(foc={'steps': 1, 'eta': 2})
+    assert [each.partition(':')[0] for each in caught.value.__notes__] == ['foc.eta'], 'all that are wrong are named at once'
 
 
 def solve_with(**changed):
@@ -335,12 +327,6 @@ def test_what_cannot_be_meant_is_refused_in_one_sentence(create, text):
         create()
 
 
-def test_all_wrong_parameters_are_named_at_once():
-    with pytest.raises(foc_ros.ParameterError, match=r'foc\.steps') as caught:
-        Config(foc={'steps': 1, 'eta': 2})
-    assert [each.partition(':')[0] for each in caught.value.__notes__] == ['foc.eta']
-
-
 @pytest.mark.parametrize('goals', [(0.3, 0.0), np.array([0.3, 0.0]), Goal((0.3, 0.0)), [(0.3, 0.0)], iter([(0.3, 0.0)])])
 def test_one_goal_needs_no_list(goals):
     predictor = foc_ros.Predictor(FAST)
@@ -362,20 +348,9 @@ def test_both_spellings_of_the_centre_are_taken():
     assert foc_ros.Box(center=(0.1, 0.2), size=(0.1, 0.1)) == foc_ros.Box((0.1, 0.2), (0.1, 0.1))
 
 
-@pytest.fixture(scope='module')
-def kept():
-    """Predict a reach past one obstacle."""
-    hand = HandState(0, np.zeros(6), 1e-6 * np.eye(6))
-    return predict(Config(), hand, make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]]), NO_TRACKS)[0]
-
-
-def test_a_record_from_another_process_is_read_only():
-    kept = pickle.loads(pickle.dumps(make_obstacles([[0.15, 0.0]], 0.02)))
-    assert not any(value.flags.writeable for value in vars(kept).values() if isinstance(value, np.ndarray))
-
-
-def test_all_arrays_of_a_prediction_are_read_only(kept):
-    for each in kept.candidates:
-        for record in (each.solution, each.candidate):
-            arrays = [value for value in vars(record).values() if isinstance(value, np.ndarray)]
+@pytest.mark.parametrize('copy', [lambda given: given, lambda given: pickle.loads(pickle.dumps(given))], ids=['own', 'pickled'])
+def test_arrays_are_read_only(predicted, copy):
+    for each in predicted.candidates:
+        for record in (each.solution, each.candidate, predicted.obstacles):
+            arrays = [value for value in vars(copy(record)).values() if isinstance(value, np.ndarray)]
             assert arrays and not any(array.flags.writeable for array in arrays)

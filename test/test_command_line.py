@@ -9,10 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from bag_helpers import messages, write_bag
 
 from foc_ros.cli import main as command_line
-from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
 from foc_ros.io import terminal
 from foc_ros.io.terminal import COLUMNS, show_table
@@ -22,9 +20,8 @@ ROOT = Path(__file__).parents[1]
 
 def start(program, *arguments, **options):
     command = [sys.executable, '-c', program, *arguments]
-    return subprocess.run(
-        command, **{'cwd': ROOT, 'capture_output': True, 'text': True, 'timeout': 100, 'check': False, **options}
-    )
+    given = {'cwd': ROOT, 'capture_output': True, 'text': True, 'timeout': 100, 'check': False}
+    return subprocess.run(command, **given | options)
 
 
 def test_the_program_exits_with_the_code_of_its_command():
@@ -108,25 +105,19 @@ NO_NUMBERS = (
     "tables/recordings.csv: row 3, column t_s: expected a number in [0, 86400], got 'x'",
     "tables/recordings.csv: row 5, column y_m: expected a number in [-10000, 10000], got 'y'",
 )
-NAMES = 'accurate, noisy, laggy, changes_way, unannounced_goal, human_paths'
-INPUTS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections, goals, goal_pose'
-
+NAMES = '--operators: expected names of accurate, noisy, laggy, changes_way, unannounced_goal, human_paths'
+KINDS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections, goals, goal_pose'
+INPUTS = f'--remap: expected one of the inputs {KINDS}'
+SCHEDULER = '--scheduler: expected the address of a Dask scheduler, as in tcp://host:8786'
 
 WRONG = [
     (['solve', 'scene.yaml'], WRONG_SCENE),
     (['solve', 'scene.yaml', '--plot', 'a.gif'], ['--plot: expected a name that ends in .png, .pdf, .svg, got a.gif']),
-    (
-        ['simulate', '--operators', 'noisi,x'],
-        [
-            f'--operators: expected names of {NAMES} (did you mean noisy?), got noisi',
-            f'--operators: expected names of {NAMES}, got x',
-        ],
-    ),
+    (['solve', 'scene.yaml', '--plot', 'no/a.png'], ['--plot: expected a file in a directory that exists, got no/a.png']),
+    (['simulate', '--operators', 'noisi,x'], [f'{NAMES} (did you mean noisy?), got noisi', f'{NAMES}, got x']),
     (['simulate', '--report', 'scene.yaml'], ['--report: expected a folder, got scene.yaml, which is a file']),
-    (
-        ['replay', 'bag.mcap', '--remap', 'hand_pos:=/a'],
-        [f'--remap: expected one of the inputs {INPUTS} (did you mean hand_pose?), got hand_pos'],
-    ),
+    (['replay', 'bag.mcap', '--remap', 'hand_pos:=/a'], [f'{INPUTS} (did you mean hand_pose?), got hand_pos']),
+    (['replay', 'bag.mcap', '--remap', 'hand_pose:='], ['--remap: expected INPUT:=TOPIC, got hand_pose:=']),
     (['replay', 'bag.mcap', '--learn', 'no/a'], ['--learn: expected a file in a directory that exists, got no/a']),
     (['evaluate', 'tables'], NO_NUMBERS),
     (['evaluate', 'scene.yaml'], ['scene.yaml: expected a bag directory, a .mcap or a .db3 file']),
@@ -135,12 +126,9 @@ WRONG = [
         ['fit', '.', '--output', 'a', '--allow', 'etta'],
         ['--allow: expected names of eta, positions (did you mean eta?), got etta'],
     ),
-    (
-        ['evaluate', '.', '--scheduler', 'here'],
-        ['--scheduler: expected the address of a Dask scheduler, as in tcp://host:8786, got here'],
-    ),
+    (['evaluate', '.', '--scheduler', 'here'], [f'{SCHEDULER}, got here']),
     (['learn', '.', '--output', '/proc/sys/a'], ['--output: expected a file that can be written, got /proc/sys/a']),
-]  # fmt: skip
+]
 ANSWERS = """
 import contextlib, io, json, sys
 from foc_ros.cli.main import main
@@ -208,18 +196,6 @@ def test_arguments_of_node_are_passed_to_ros(monkeypatch):
     assert taken == [ros]
 
 
-def test_a_name_that_standard_output_cannot_show_is_escaped():
-    program = (
-        'import sys\nfrom foc_ros.cli import main as command_line\n'
-        '@command_line.app.command\n'
-        'def end(): print("b\\udcff", "\u2500")\n'
-        'sys.exit(command_line.main(["end"]))'
-    )
-    environment = {**os.environ, 'PYTHONIOENCODING': 'ascii', 'PYTHONUTF8': '1'}
-    result = start(program, env=environment)
-    assert (result.returncode, result.stdout, result.stderr) == (0, 'b\\udcff \\u2500\n', '')
-
-
 LOUD = """
 import sys
 from foc_ros.cli import main as command_line
@@ -228,67 +204,35 @@ def loud():
     {}
 sys.exit(command_line.main(["loud"]))
 """
-MANY_LINES, A_LINE = 'for _ in range(100000): print("x" * 100)', 'print("x")'
-A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 10000)'
+FULL = '/dev/full'
+A_LINE, MANY_LINES = 'print("x")', 'for _ in range(100000): print("x" * 100)'
+A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 1000)'
 
 
-def printed_to(output, what):
-    """Run a command that prints; output: file descriptor of its standard output, which is closed without one."""
-    closing = {'preexec_fn': lambda: os.close(1)} if output is None else {'stdout': output}
-    command = [sys.executable, '-c', LOUD.format(what)]
-    return subprocess.run(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, timeout=100, check=False, **closing)
+def test_a_name_that_standard_output_cannot_show_is_escaped():
+    environment = {**os.environ, 'PYTHONIOENCODING': 'ascii', 'PYTHONUTF8': '1'}
+    result = start(LOUD.format('print("b\\udcff", "\u2500")'), env=environment)
+    assert (result.returncode, result.stdout, result.stderr) == (0, 'b\\udcff \\u2500\n', '')
+
+
+def printed_to(what, **options):
+    result = start(LOUD.format(what), **{'capture_output': False, 'stderr': subprocess.PIPE, **options})
+    return result.returncode, result.stderr
 
 
 @pytest.mark.parametrize('what', [A_LINE, A_TABLE])
 def test_a_pipe_whose_reader_has_closed_it_gives_141_and_no_traceback(what):
     reading, writing = os.pipe()
     os.close(reading)
-    try:
-        result = printed_to(writing, what)
-    finally:
-        os.close(writing)
-    assert (result.returncode, result.stderr) == (141, '')
+    with os.fdopen(writing, 'wb') as pipe:
+        assert printed_to(what, stdout=pipe) == (141, '')
 
 
-@pytest.mark.skipif(not Path('/dev/full').exists(), reason='only Linux has a device that is always full')
-@pytest.mark.parametrize('what', [MANY_LINES])
-def test_a_full_standard_output_gives_2_and_one_line_and_a_closed_one_changes_no_exit_code(what):
-    with Path('/dev/full').open('w') as full:
-        result = printed_to(full.fileno(), what)
-    assert (result.returncode, result.stderr) == (2, 'foc_ros loud: [Errno 28] No space left on device\n')
-    result = printed_to(None, A_LINE)
-    assert (result.returncode, result.stderr) == (0, '')
-
-
-POST_NAMES = ('front_left_post', 'front_right_post_of_the_shelf', 'a_name_that_is_longer_than_a_column_40')
-POSTS = [
-    f'{{x: {x}, y: {y}, radius: 0.02, id: {name}}}'
-    for name, x, y in zip(POST_NAMES, (0.15, 0.2, 0.25), (0.01, 0.05, -0.02), strict=True)
-]
-POST_SCENE = f'start: [0, 0]\ngoals: [[0.3, 0.0], [0.3, 0.1]]\nobstacles: [{", ".join(POSTS)}]\n'
-
-
-def find_widest(printed):
-    return max(map(len, printed.splitlines()))
-
-
-@pytest.mark.parametrize(
-    'arguments',
-    [
-        ['solve', 'scene.yaml', '--monte-carlo', '100'],
-        ['replay', 'bag', '--params', 'slow.yaml'],
-        ['simulate', '--operators', 'unannounced_goal', '--trials', '1', '--workers', '1', '--params', 'quick.yaml'],
-    ],
-    ids=lambda arguments: arguments[0],
-)
-def test_the_output_of_a_command_fits(tmp_path, monkeypatch, capsys, arguments):
-    monkeypatch.chdir(tmp_path)
-    Path('scene.yaml').write_text(POST_SCENE)
-    Path('slow.yaml').write_text('/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 10}}')
-    Path('quick.yaml').write_text('/**: {ros__parameters: {rate_hz: 5.0, foc.steps: 10}}')
-    write_bag(Path('bag'), messages(0.1))
-    assert main(arguments) == 0
-    assert 0 < find_widest(capsys.readouterr().out) <= COLUMNS
+@pytest.mark.skipif(not Path(FULL).exists(), reason='only Linux has a device that is always full')
+def test_a_full_standard_output_gives_2_and_one_line_and_a_closed_one_changes_no_exit_code():
+    with Path(FULL).open('w') as full:
+        assert printed_to(MANY_LINES, stdout=full) == (2, 'foc_ros loud: [Errno 28] No space left on device\n')
+    assert printed_to(A_LINE, preexec_fn=lambda: os.close(1)) == (0, '')
 
 
 def test_a_wide_table_is_divided_and_loses_nothing(capsys):
@@ -296,7 +240,7 @@ def test_a_wide_table_is_divided_and_loses_nothing(capsys):
     rows = [[f'rule {row}', *(f'{row}.{number} (1 to 2)' for number in range(7)), f'end {row}'] for row in range(3)]
     show_table(columns, rows, 'title')
     printed = capsys.readouterr().out
-    assert find_widest(printed) <= COLUMNS
+    assert max(map(len, printed.splitlines())) <= COLUMNS
     assert all(printed.count(text) == 1 for text in ('title', *columns[1:], *(cell for row in rows for cell in row[1:])))
     assert printed.count('rule 2') == 4
 

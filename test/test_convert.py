@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from message_helpers import read_columns
 
 from foc_ros.analysis.recordings import read_tables
 from foc_ros.cli.main import main
@@ -26,12 +27,8 @@ def convert(folder, recordings=RECORDINGS, obstacles=OBSTACLES, goals=GOALS):
     return main(arguments)
 
 
-def table(message):
-    names = [field.name for field in message.fields]
-    formats = [{7: '<f4', 5: '<i4'}[field.datatype] for field in message.fields]
-    offsets = [field.offset for field in message.fields]
-    kind = np.dtype({'names': names, 'formats': formats, 'offsets': offsets, 'itemsize': message.point_step})
-    return np.frombuffer(message.data.tobytes(), kind)
+def rows(message):
+    return np.column_stack([*read_columns(message).values()])
 
 
 def test_every_number_arrives(tmp_path, capsys):
@@ -44,20 +41,13 @@ def test_every_number_arrives(tmp_path, capsys):
     assert [item.log_ns for item in hands] == [1_000_000_000, 1_500_000_000, 2_200_000_000]
     stamps = [item.message.header.stamp for item in hands]
     assert [stamp.sec * 10**9 + stamp.nanosec for stamp in stamps] == [item.log_ns for item in hands]
-    positions = [item.message.pose.position for item in hands]
-    assert [(each.x, each.y, each.z) for each in positions] == [(0.1, 0.2, 0.0), (0.3, 0.4, 0.0), (0.5, 0.6, 0.0)]
-    assert {item.message.pose.orientation.w for item in hands} == {1.0}
+    poses = [(each.position.x, each.position.y, each.position.z, each.orientation.w) for each in (i.message.pose for i in hands)]
+    assert poses == [(0.1, 0.2, 0.0, 1.0), (0.3, 0.4, 0.0, 1.0), (0.5, 0.6, 0.0, 1.0)]
     assert {item.message.header.frame_id for item in items} == {'world'}
-    goals = [item for item in items if item.role == 'goals']
-    assert [(each.position.x, each.position.y) for each in goals[0].message.poses] == [(0.28, 0.35), (0.42, 0.35)]
-    rows = table(next(item.message for item in items if item.role == 'obstacles'))
-    assert rows['id'].tolist() == [0, 1]
-    assert (
-        np.allclose(rows['x'], [0.5, 0.425])
-        and np.allclose(rows['y'], [-0.1, 0.08])
-        and np.allclose(rows['radius'], [0.03, 0.025])
-    )
-    assert not rows['z'].any() and not rows['radius_stddev'].any()
+    goals = next(item.message.poses for item in items if item.role == 'goals')
+    assert [(each.position.x, each.position.y) for each in goals] == [(0.28, 0.35), (0.42, 0.35)]
+    obstacles = next(item.message for item in items if item.role == 'obstacles')
+    assert np.allclose(rows(obstacles), [(0.5, -0.1, 0, 0.03, 0, 0), (0.425, 0.08, 0, 0.025, 0, 1)])
 
 
 def test_optional_columns(tmp_path):
@@ -65,10 +55,8 @@ def test_optional_columns(tmp_path):
     assert convert(tmp_path, 'recording,t_s,x_m,y_m,z_m\n1,0,0.1,0.2,0.3\n', obstacles, 'x_m,y_m,z_m\n0.1,0.2,0.4\n') == 0
     with BagReader(tmp_path / 'bags' / '1') as reader:
         items = {item.role: item.message for item in reader}
-    assert items['hand_pose'].pose.position.z == 0.3
-    assert [pose.position.z for pose in items['goals'].poses] == [0.4]
-    expected = [(0.5, -0.1, 0.1, 0.03, 0.002, 7), (0.0, 0.0, 0.0, 0.0, 0.0, -2)]
-    assert np.allclose(table(items['obstacles']).tolist(), expected)
+    assert (items['hand_pose'].pose.position.z, items['goals'].poses[0].position.z) == (0.3, 0.4)
+    assert np.allclose(rows(items['obstacles']), [(0.5, -0.1, 0.1, 0.03, 0.002, 7), (0.0, 0.0, 0.0, 0.0, 0.0, -2)])
 
 
 def test_boxes_and_circles_share_a_table(tmp_path):
@@ -76,7 +64,7 @@ def test_boxes_and_circles_share_a_table(tmp_path):
     assert convert(tmp_path, obstacles=obstacles) == 0
     with BagReader(tmp_path / 'bags' / 'a') as reader:
         message = next(item.message for item in reader if item.role == 'obstacles')
-    assert np.allclose(table(message).tolist(), [(0.5, -0.1, 0, 0, 0, 0, 0.2, 0.1, 0.3), (0.6, 0.1, 0, 0.02, 0, 1, 0, 0, 0)])
+    assert np.allclose(rows(message), [(0.5, -0.1, 0, 0, 0, 0, 0.2, 0.1, 0.3), (0.6, 0.1, 0, 0.02, 0, 1, 0, 0, 0)])
     assert decode_point_cloud(message, 'xy').obstacles.corners.tolist() == [4, 1]
 
 
@@ -84,11 +72,10 @@ def test_each_recording_has_its_own_scene(tmp_path, capsys):
     obstacles = 'recording,x_m,y_m,radius_m\na,0.5,-0.1,0.03\nb,0.1,0,0.01\na,0.6,0,0.02\n'
     assert convert(tmp_path, obstacles=obstacles, goals='recording,x_m,y_m\nb,1,0\na,2,0\na,3,0\n') == 0
     assert '2 bags with 4 hand poses and 1 to 2 obstacles written' in capsys.readouterr().out
-    for name, radii, goals in (('a', [0.03, 0.02], [2, 3]), ('b', [0.01], [1])):
+    for name, expected, goals in (('a', [(0.03, 0), (0.02, 1)], [2, 3]), ('b', [(0.01, 0)], [1])):
         with BagReader(tmp_path / 'bags' / name) as reader:
             items = {item.role: item.message for item in reader}
-        rows = table(items['obstacles'])
-        assert np.allclose(rows['radius'], radii) and rows['id'].tolist() == [*range(len(radii))]
+        assert np.allclose(rows(items['obstacles'])[:, [3, 5]], expected)
         assert [pose.position.x for pose in items['goals'].poses] == goals
 
 
@@ -98,15 +85,11 @@ def test_a_table_needs_obstacles_beside_it(tmp_path, capsys):
     assert '--obstacles: expected a table of obstacles, which may be without rows, got nothing' in capsys.readouterr().err
 
 
-def test_without_goals_the_bag_has_none(tmp_path):
-    assert convert(tmp_path, goals=None) == 0
-    with pytest.raises(RecordingError, match='no topic for goals'), BagReader(tmp_path / 'bags' / 'a'):
-        pass
-
-
-def test_names_are_safe(tmp_path):
-    assert convert(tmp_path, 'recording,t_s,x_m,y_m\n../up,0,0,0\nüb er,0,0,0\n..,0,0,0\n') == 0
+def test_without_goals_the_bag_has_none_and_names_of_bags_are_safe(tmp_path):
+    assert convert(tmp_path, 'recording,t_s,x_m,y_m\n../up,0,0,0\nüb er,0,0,0\n..,0,0,0\n', goals=None) == 0
     assert sorted(each.name for each in (tmp_path / 'bags').iterdir()) == ['_', '_b_er', '_up']
+    with pytest.raises(RecordingError, match='no topic for goals'), BagReader(tmp_path / 'bags' / '_'):
+        pass
 
 
 def test_an_existing_bag_stops_before_anything_is_written(tmp_path, capsys):
@@ -152,17 +135,15 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, capsys, which, text, messag
 
 
 def test_all_errors_of_a_table_are_found_at_once(tmp_path, capsys):
-    rows = 'recording,t_s,x_m,y_m\na,0,x,y\na,1,0\na,2,0,0\na,1,0,0\n'
-    assert convert(tmp_path, rows) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.partition('r.csv: ')[2].partition(':')[0] for line in lines] == [
-        'row 3', 'row 2, column x_m', 'row 2, column y_m', 'row 5, column t_s',
-    ]  # fmt: skip
-    assert convert(tmp_path, obstacles='x_m,y_m,radius_m,id\n0,0,-1,0\n0,a,1,1\n0,0,1,1\n0,0,1,1\n') == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.partition('o.csv: ')[2].partition(':')[0] for line in lines] == [
-        'row 2, column radius_m', 'row 3, column y_m', 'row 5, column id',
-    ]  # fmt: skip
+    recordings = 'recording,t_s,x_m,y_m\na,0,x,y\na,1,0\na,2,0,0\na,1,0,0\n'
+    obstacles = 'x_m,y_m,radius_m,id\n0,0,-1,0\n0,a,1,1\n0,0,1,1\n0,0,1,1\n'
+    for tables, places in (
+        ({'recordings': recordings}, ['row 3', 'row 2, column x_m', 'row 2, column y_m', 'row 5, column t_s']),
+        ({'obstacles': obstacles}, ['row 2, column radius_m', 'row 3, column y_m', 'row 5, column id']),
+    ):
+        assert convert(tmp_path, **tables) == 2
+        lines = capsys.readouterr().err.splitlines()
+        assert [line.partition('.csv: ')[2].partition(':')[0] for line in lines] == places
 
 
 def write_folder(folder, separator=',', comma=False, seconds=1.0, metres=1.0):

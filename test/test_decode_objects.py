@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Collision objects and detections become obstacles, in messages and in bags; their packages need not be installed."""
+"""Poses, collision objects and detections in messages and bags, the packages of which need not be installed; topics of bags."""
 
 import math
 import re
@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 from bag_helpers import CONFIG, messages, ns
-from message_helpers import SECOND, pose_stamped
+from hypothesis import given
+from hypothesis import strategies as st
+from message_helpers import SECOND, both_kinds, message_types, pose, pose_array, pose_stamped
 from object_messages import OBJECT_TYPES, STORE, collision_object, detection, detections
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from foc_ros.analysis.replay import replay
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import LostHandError, MessageError, RecordingError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.polygons import make_box_polygon
-from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import SampleStatus
-from foc_ros.io.topics import OPTIONAL, TYPES
-from foc_ros.ros.intake import Intake
+from foc_ros.io.topics import OPTIONAL, TYPES, assign_topics
 from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
+from foc_ros.ros.messages.decode_poses import MAX_GOALS, decode_goal, decode_goals, decode_hand_sample
 from foc_ros.ros.messages.plane import Transform, compute_rotation
 
 BOX, SPHERE, CYLINDER, CONE = 1, 2, 3, 4
@@ -99,11 +99,8 @@ def test_a_wrong_object_is_refused(message, words):
 
 
 def test_detections_are_boxes_by_id():
-    found = decode_detections(
-        detections(detection((1, 2, 3), (0.4, 0.2, 0.1), 'cup;1'), detection((4, 5, 6), (0.4, 0.2, 0.1), turned=QUARTER)),
-        'xy',
-        0.01,
-    )
+    boxes = detection((1, 2, 3), (0.4, 0.2, 0.1), 'cup;1'), detection((4, 5, 6), (0.4, 0.2, 0.1), turned=QUARTER)
+    found = decode_detections(detections(*boxes), 'xy', 0.01)
     assert (found.stamp_ns, found.frame_id, found.dropped) == (SECOND, 'world', {})
     assert found.obstacles.ids == ('cup%3B1', '1') and found.obstacles.radius_stddev.tolist() == [0.01, 0.01]
     check_polygon(found.obstacles, 0, (1.0, 2.0), (0.4, 0.2), 0.0)
@@ -129,22 +126,6 @@ def test_detections_that_are_not_finite_or_repeated_are_dropped():
 def test_a_wrong_detection_is_refused(each, words):
     with pytest.raises(MessageError, match=re.escape(words)):
         decode_detections(detections(each), 'xy', 0.0)
-
-
-def test_both_inputs_reach_the_pipeline():
-    intake = Intake(Pipeline(CONFIG))
-    intake.take('hand_pose', pose_stamped(OBJECT_TYPES, (0.0, 0.0, 0.2)))
-    ball = (SPHERE, (0.05,), (0.5, 0, 0))
-    assert intake.take('collision_objects', collision_object(ball)) is SampleStatus.ACCEPTED
-    assert intake.take('collision_objects', collision_object(ball, name='cup', stamp_ns=SECOND - 1000)) is SampleStatus.ACCEPTED
-    assert intake.take('detections', detections(detection((1, 0, 0), (1, 1, 1), 'a'))) is SampleStatus.ACCEPTED
-    assert intake.take('detections', detections(frame_id='base')) is SampleStatus.WRONG_FRAME
-    assert intake.take('collision_objects', collision_object(operation=9)) is None
-    assert intake.pipeline.scene.obstacles(SECOND).ids == ('table/0', 'cup/0', 'a')
-    assert intake.counts == {'obstacles_wrong_frame': 1, 'collision_objects_invalid': 1}
-    intake.remove_source('collision_objects')
-    intake.take('collision_objects', collision_object(ball, name='lamp'))
-    assert intake.pipeline.scene.obstacles(SECOND).ids == ('a', 'lamp/0')
 
 
 @pytest.mark.parametrize('topic', ['/collision_objects', '/other'])
@@ -199,3 +180,144 @@ def test_the_node_receives_them_or_names_the_package_that_is_missing_for_a_publi
         node.create_publisher(String, role, 1)
         node._publish_health()
         assert said == [f'{role} is published, but cannot be received: the package {package} is not installed']
+
+
+BAGS = message_types('rosbags')
+
+
+@both_kinds
+def test_a_hand_pose_becomes_a_sample_whatever_its_orientation(types):
+    message = pose_stamped(types, (0.1, 0.2, 0.3), 5 * SECOND + 7, 'base')
+    message.pose.orientation = types.make('geometry_msgs/msg/Quaternion', x=math.nan, y=7.0, z=0.0, w=0.0)
+    sample = decode_hand_sample(message, 'xz')
+    assert (sample.stamp_ns, sample.frame_id) == (5 * SECOND + 7, 'base')
+    assert (*sample.position, sample.height) == (0.1, 0.3, 0.2)
+    assert not sample.position.flags.writeable
+
+
+@both_kinds
+@pytest.mark.parametrize('turn', [(0, 0, 0, 0), (0, 0, 0, 1e-3), (9, 9, 9, 9), (math.nan, 0, 0, 1), (math.inf, 0, 0, 0)])
+def test_the_position_0_without_an_orientation_means_no_data(types, turn):
+    message = pose_stamped(types, (0.0, 0.0, 0.0))
+    for turned in ({'w': 1.0}, *({'y': 0.6 * size, 'w': 0.8 * size} for size in (1.0, -1.0, 0.95))):
+        message.pose = pose(types, (0.0, 0.0, 0.0), turned)
+        assert decode_hand_sample(message, 'xy').height == 0.0
+    message.pose = pose(types, (0.0, 0.0, 0.0), dict(zip('xyzw', turn, strict=True)))
+    with pytest.raises(LostHandError, match='the tracker has lost the hand'):
+        decode_hand_sample(message, 'xy')
+
+
+@both_kinds
+@pytest.mark.parametrize('axis', [0, 1, 2])
+@pytest.mark.parametrize(
+    ('value', 'words'),
+    [
+        (math.nan, r'expected a finite number \[m\], got nan'),
+        (math.inf, r'expected a finite number \[m\], got inf'),
+        (-math.inf, r'expected a finite number \[m\], got -inf'),
+        (1.1e4, r'expected a coordinate within 10000 m of the origin, got 11000'),
+    ],
+)
+def test_a_coordinate_that_is_not_finite_or_too_large_is_refused(types, axis, value, words):
+    name, position = f'position.{"xyz"[axis]}', [0.0, 0.0, 0.0]
+    position[axis] = value
+    for decode in (decode_hand_sample, decode_goal):
+        with pytest.raises(MessageError, match=f'pose.{name}: {words}') as caught:
+            decode(pose_stamped(types, position), 'xy')
+        assert caught.value.field == f'pose.{name}'
+    with pytest.raises(MessageError, match=rf'poses\[1\].{name}: {words}'):
+        decode_goals(pose_array(types, [(0, 0, 0), position]), 'xy')
+
+
+@both_kinds
+@pytest.mark.parametrize(
+    ('sec', 'nanosec', 'words'),
+    [
+        (0, 0, r'header\.stamp: expected a time after 0, got 0 s'),
+        (-1, 5, r'header\.stamp\.sec: expected at least 0, got -1'),
+        (1, SECOND, r'header\.stamp\.nanosec: expected below 1000000000, got 1000000000'),
+    ],
+)
+def test_a_wrong_stamp_is_refused(types, sec, nanosec, words):
+    message = pose_stamped(types, (0, 0, 0))
+    message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
+    with pytest.raises(MessageError, match=words):
+        decode_hand_sample(message, 'xy')
+
+
+@both_kinds
+def test_goals_keep_their_order_and_need_no_stamp(types):
+    goals, frame_id, heights = decode_goal(pose_stamped(types, (1.0, 2.0, 3.0), 0, 'base'), 'yz')
+    assert (frame_id, goals.tolist(), heights.tolist()) == ('base', [[2.0, 3.0]], [1.0])
+    goals, frame_id, heights = decode_goals(pose_array(types, [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)]), 'xy')
+    assert (frame_id, goals.tolist(), heights.tolist()) == ('world', [[1.0, 2.0], [4.0, 5.0]], [3.0, 6.0])
+    assert decode_goals(pose_array(types, []), 'xy')[0].shape == (0, 2)
+
+
+def test_too_many_goals_are_refused():
+    assert len(decode_goals(pose_array(BAGS, [(0, 0, 0)] * MAX_GOALS), 'xy')[0]) == MAX_GOALS
+    with pytest.raises(MessageError, match=f'poses: expected at most {MAX_GOALS} goals, got {MAX_GOALS + 1}'):
+        decode_goals(pose_array(BAGS, [(0, 0, 0)] * (MAX_GOALS + 1)), 'xy')
+
+
+@given(st.tuples(*[st.floats()] * 3), st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**32 - 1))
+def test_any_pose_is_decoded_or_refused(position, sec, nanosec):
+    message = pose_stamped(BAGS, position)
+    message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
+    good = all(abs(value) <= 1e4 for value in position) and sec >= 0 and nanosec < SECOND and (sec, nanosec) != (0, 0)
+    if good:
+        assert decode_hand_sample(message, 'xy').stamp_ns == sec * SECOND + nanosec
+    else:
+        with pytest.raises(MessageError, match=r'expected .*, got '):
+            decode_hand_sample(message, 'xy')
+
+
+POSE, CLOUD, MARKERS, POSES = (
+    'geometry_msgs/msg/PoseStamped',
+    'sensor_msgs/msg/PointCloud2',
+    'visualization_msgs/msg/MarkerArray',
+    'geometry_msgs/msg/PoseArray',
+)
+PLAIN = {'/hand_pose': POSE, '/obstacles': CLOUD, '/goals': POSES}
+PSM = {'/PSM1/measured_cp': POSE, '/PSM1/setpoint_cp': POSE, '/a/obstacle_markers': MARKERS, '/goal_pose': POSE}
+OTHERS = {'/tool': POSE, '/scene': CLOUD, '/targets': POSES, '/camera': 'sensor_msgs/msg/Image'}
+OUTPUTS = {'/hand_pose': POSE, '/shapes': MARKERS, '/goals': POSES, '/foc/prediction': CLOUD, '/foc/markers': MARKERS}
+TWO_ARMS = {'/r/measured_cp': POSE, '/l/measured_cp': POSE, '/obstacles': CLOUD, '/goals': POSES}
+CHOOSE = 'several topics could be'
+
+
+@pytest.mark.parametrize(
+    ('topics', 'expected'),
+    [
+        (PLAIN, {'hand_pose': '/hand_pose', 'obstacles': '/obstacles', 'goals': '/goals'}),
+        (PSM, {'hand_pose': '/PSM1/measured_cp', 'obstacle_markers': '/a/obstacle_markers', 'goal_pose': '/goal_pose'}),
+        (OTHERS, {'hand_pose': '/tool', 'obstacles': '/scene', 'goals': '/targets'}),
+        ({**PLAIN, '/left/measured_cp': POSE, '/right/measured_cp': POSE}, {'hand_pose': '/hand_pose'}),
+        ({**PLAIN, '/obstacle_markers': MARKERS}, {'obstacles': '/obstacles', 'obstacle_markers': '/obstacle_markers'}),
+        ({'/hand_pose': POSE, '/obstacles': MARKERS, '/goals': POSES}, {'obstacle_markers': '/obstacles'}),
+        (OUTPUTS, {'obstacle_markers': '/shapes'}),
+    ],
+)
+def test_topics_are_found(topics, expected):
+    roles = assign_topics(topics)
+    assert {role: roles[role] for role in expected} == expected
+    assert len(set(roles.values())) == len(roles)
+
+
+@pytest.mark.parametrize(
+    ('topics', 'chosen', 'message'),
+    [
+        ({'/obstacles': CLOUD, '/goals': POSES}, None, f'no topic for hand_pose ({POSE}); the recording has /goals'),
+        ({'/hand_pose': POSE, '/goals': POSES}, None, f'no topic for obstacles ({CLOUD}) or obstacle_markers'),
+        ({'/hand_pose': POSE, '/obstacles': CLOUD}, None, f'no topic for goals ({POSES}) or goal_pose'),
+        ({}, None, 'the recording has no topics'),
+        (TWO_ARMS, None, f'{CHOOSE} hand_pose: /l/measured_cp, /r/measured_cp; choose with --remap hand_pose:=TOPIC'),
+        ({'/hand_pose': POSE, '/a': CLOUD, '/b': MARKERS, '/goals': POSES}, None, f'{CHOOSE} obstacles: /a, /b'),
+        (PLAIN, {'hand': '/hand_pose'}, "no input is named 'hand': expected one of hand_pose, obstacles"),
+        (PLAIN, {'hand_pose': '/other'}, 'topic /other chosen for hand_pose is not in the recording, which has'),
+        (PLAIN, {'goals': '/obstacles'}, f'topic /obstacles chosen for goals: expected type {POSES}, got {CLOUD}'),
+    ],
+)
+def test_a_wrong_choice_of_topics_is_refused(topics, chosen, message):
+    with pytest.raises(RecordingError, match=re.escape(message)):
+        assign_topics(topics, chosen)

@@ -16,12 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.polygons import make_box_polygon
 from foc_ros.core.obstacles.shapes import Box
 from foc_ros.ros.messages import decode_objects
 from foc_ros.ros.messages.decode_objects import MarkerTable
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
-from foc_ros.ros.messages.encode_inputs import encode_obstacles
 from foc_ros.ros.messages.plane import project
 
 BAGS = message_types('rosbags')
@@ -33,16 +31,31 @@ def decode(table, types=BAGS, **changes):
     return decode_point_cloud(cloud(types, table, **changes), 'xy')
 
 
-def check_refusal(words, table, types=BAGS, **changes):
-    with pytest.raises(MessageError, match=re.escape(words)):
-        decode(table, types, **changes)
+def with_cells(layout, **cells):
+    """Return a table of two rows, of which the second has other cells."""
+    table = np.zeros(2, dtype=layout)
+    table['radius'][0] = 1
+    for column, value in cells.items():
+        table[column][1] = value
+    return table
+
+
+def with_field(field, **values):
+    """Return the fields of a table, of which one has other values."""
+    found = cloud(BAGS, np.zeros(2, dtype=FULL)).fields
+    for attribute, value in values.items():
+        setattr(next(each for each in found if each.name == field), attribute, value)
+    return {'fields': found}
+
+
+def without_column(missing):
+    return np.zeros(1, dtype=[(name, '<f4') for name in ('x', 'y', 'z', 'radius') if name != missing])
 
 
 @both_kinds
 def test_rows_become_obstacles(types):
-    table = obstacle_table(
-        [(0.5, 0.25, 0.125, 0.0625, 0.5, 1.0, 2.0, 3.0, 7), (1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 4000000000)], FULL
-    )
+    rows = (0.5, 0.25, 0.125, 0.0625, 0.5, 1.0, 2.0, 3.0, 7), (1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 4000000000)
+    table = obstacle_table([*rows], FULL)
     scene = decode_point_cloud(cloud(types, table, 3 * SECOND, 'base'), 'xz')
     assert (scene.stamp_ns, scene.frame_id, scene.dropped) == (3 * SECOND, 'base', {})
     assert scene.obstacles.ids == ('7', '4000000000')
@@ -129,91 +142,59 @@ def test_boxes_of_a_cloud_are_those_of_the_public_interface(rows):
         np.testing.assert_array_equal(obstacles.vertices[row, : len(polygon)], polygon)
 
 
-@pytest.mark.parametrize(
-    ('layout', 'changes', 'words'),
-    [
-        (FULL, {'radius': -0.5}, 'radius[1]: expected a number in [0, 10000] m, got -0.5'),
-        (FULL, {'radius': 2e4}, 'radius[1]: expected a number in [0, 10000] m, got 20000'),
-        (FULL, {'radius_stddev': -0.5}, 'radius_stddev[1]: expected a number in [0, 10000] m, got -0.5'),
-        (FULL, {'x': -2e4}, 'x[1]: expected a number in [-10000, 10000] m, got -20000'),
-        (FULL, {'vz': 2e4}, 'vz[1]: expected a number in [-10000, 10000] m/s, got 20000'),
-        (BOX, {'size_x': -0.5, 'size_y': 1}, 'size_x[1]: expected a number in [0, 10000] m, got -0.5'),
-        (BOX, {'size_x': 1, 'size_y': 2e4}, 'size_y[1]: expected a number in [0, 10000] m, got 20000'),
-        (BOX, {'size_x': 1, 'yaw': -2e4}, 'yaw[1]: expected a number in [-10000, 10000] rad, got -20000'),
-        (BOX, {'yaw': 1}, 'radius[1]: expected a number > 0 m where size_x and size_y are 0, got 0'),
-    ],
-)
-def test_a_scene_with_a_number_out_of_bounds_is_refused(layout, changes, words):
-    table = np.zeros(2, dtype=layout)
-    table['radius'][0] = 1
-    for column, value in changes.items():
-        table[column][1] = value
-    check_refusal(words, table)
-
-
-@pytest.mark.parametrize('size', [(), (0.0, 0.0, 0.0), (0.25, 0.5, 0.75)])
-def test_encoded_obstacles_are_decoded(size):
-    message = encode_obstacles(BAGS, SECOND, 'world', [(1.0, 2.0, 3.0, 0.5, 0.125, 7, *size), (4.0, 5.0, 6.0, 1.0, 0.0, 8)])
-    assert ('size_x' in [field.name for field in message.fields]) == any(size)
-    obstacles = decode_point_cloud(message, 'xy').obstacles
-    assert obstacles.ids == ('7', '8') and obstacles.corners.tolist() == [4 if any(size) else 1, 1]
-    np.testing.assert_array_equal(obstacles.centre, [[1, 2], [4, 5]])
-    polygon = make_box_polygon(size[:2] or (0, 0), size[2] if size else 0)
-    np.testing.assert_allclose(obstacles.vertices[0, : len(polygon)], polygon)
-
-
-@pytest.mark.parametrize('missing', ['x', 'y', 'z', 'radius'])
-def test_a_missing_field_is_named(missing):
-    names = [name for name in ('x', 'y', 'z', 'radius') if name != missing]
-    words = f'fields: expected a field {missing} (needed are x, y, z, radius), got {", ".join(names)}'
-    check_refusal(words, np.zeros(1, dtype=[(name, '<f4') for name in names]))
-
-
-@both_kinds
-@pytest.mark.parametrize(
-    ('changes', 'words'),
-    [
-        ({'data': b'\0' * 31}, 'data: expected 32 bytes (1 rows of row_step 32 and 2 points of point_step 16), got 31'),
-        ({'data': b'\0' * 33}, 'data: expected 32 bytes (1 rows of row_step 32 and 2 points of point_step 16), got 33'),
-        ({'data': b''}, 'data: expected 32 bytes'),
-        ({'width': 4_000_000_000}, 'height * width: expected at most 20000 obstacles, got 4000000000'),
-        ({'width': 3}, 'data: expected 48 bytes'),
-        ({'width': 0}, 'data: expected 0 bytes'),
-        ({'height': 0}, 'data: expected 0 bytes'),
-        ({'height': 2, 'width': 1, 'row_step': 8}, 'data: expected 32 bytes'),
-        ({'point_step': 0, 'data': b''}, 'fields[x].offset: expected 4 bytes inside point_step 0, got 0'),
-        ({'point_step': 12, 'data': b'\0' * 24}, 'fields[radius].offset: expected 4 bytes inside point_step 12, got 12'),
-        ({'fields': []}, 'got no fields'),
-        ({'stamp_ns': -SECOND}, 'header.stamp.sec: expected at least 0, got -1'),
-    ],
-)
-def test_a_layout_that_does_not_fit_is_refused(types, changes, words):
-    check_refusal(words, obstacle_table([(1, 2, 3, 4)] * 2), types, **changes)
+ROWS = obstacle_table([(1, 2, 3, 4)] * 2)
+ZEROS = np.zeros(2, dtype=FULL)
 
 
 @pytest.mark.parametrize(
-    ('field', 'attribute', 'value', 'words'),
+    ('table', 'changes', 'words'),
     [
-        ('x', 'datatype', 5, 'fields[x].datatype: expected 7 or 8, got 5'),
-        ('radius', 'datatype', 0, 'fields[radius].datatype: expected 7 or 8, got 0'),
-        ('id', 'datatype', 7, 'fields[id].datatype: expected an integer (1-6), got 7'),
-        ('id', 'datatype', 99, 'fields[id].datatype: expected an integer (1-6), got 99'),
-        ('y', 'count', 3, 'fields[y].count: expected 1, got 3'),
-        ('z', 'name', 'x', 'fields: expected a field z'),
-        ('radius_stddev', 'name', 'x', 'fields: expected one field x, got 2'),
+        (with_cells(FULL, radius=-0.5), {}, 'radius[1]: expected a number in [0, 10000] m, got -0.5'),
+        (with_cells(FULL, radius=2e4), {}, 'radius[1]: expected a number in [0, 10000] m, got 20000'),
+        (with_cells(FULL, radius_stddev=-0.5), {}, 'radius_stddev[1]: expected a number in [0, 10000] m, got -0.5'),
+        (with_cells(FULL, x=-2e4), {}, 'x[1]: expected a number in [-10000, 10000] m, got -20000'),
+        (with_cells(FULL, vz=2e4), {}, 'vz[1]: expected a number in [-10000, 10000] m/s, got 20000'),
+        (with_cells(BOX, size_x=-0.5, size_y=1), {}, 'size_x[1]: expected a number in [0, 10000] m, got -0.5'),
+        (with_cells(BOX, size_x=1, size_y=2e4), {}, 'size_y[1]: expected a number in [0, 10000] m, got 20000'),
+        (with_cells(BOX, size_x=1, yaw=-2e4), {}, 'yaw[1]: expected a number in [-10000, 10000] rad, got -20000'),
+        (with_cells(BOX, yaw=1), {}, 'radius[1]: expected a number > 0 m where size_x and size_y are 0, got 0'),
+        (without_column('x'), {}, 'fields: expected a field x (needed are x, y, z, radius), got y, z, radius'),
+        (without_column('y'), {}, 'fields: expected a field y (needed are x, y, z, radius), got x, z, radius'),
+        (without_column('z'), {}, 'fields: expected a field z (needed are x, y, z, radius), got x, y, radius'),
+        (without_column('radius'), {}, 'fields: expected a field radius (needed are x, y, z, radius), got x, y, z'),
+        (ROWS, {'data': b'\0' * 31}, 'data: expected 32 bytes (1 rows of row_step 32 and 2 points of point_step 16), got 31'),
+        (ROWS, {'data': b'\0' * 33}, 'data: expected 32 bytes (1 rows of row_step 32 and 2 points of point_step 16), got 33'),
+        (ROWS, {'data': b''}, 'data: expected 32 bytes'),
+        (ROWS, {'width': 4_000_000_000}, 'height * width: expected at most 20000 obstacles, got 4000000000'),
+        (ROWS, {'width': 3}, 'data: expected 48 bytes'),
+        (ROWS, {'width': 0}, 'data: expected 0 bytes'),
+        (ROWS, {'height': 0}, 'data: expected 0 bytes'),
+        (ROWS, {'height': 2, 'width': 1, 'row_step': 8}, 'data: expected 32 bytes'),
+        (ROWS, {'point_step': 0, 'data': b''}, 'fields[x].offset: expected 4 bytes inside point_step 0, got 0'),
+        (ROWS, {'point_step': 12, 'data': b'\0' * 24}, 'fields[radius].offset: expected 4 bytes inside point_step 12, got 12'),
+        (ROWS, {'fields': []}, 'got no fields'),
+        (ROWS, {'stamp_ns': -SECOND}, 'header.stamp.sec: expected at least 0, got -1'),
+        (ZEROS, with_field('x', datatype=5), 'fields[x].datatype: expected 7 or 8, got 5'),
+        (ZEROS, with_field('radius', datatype=0), 'fields[radius].datatype: expected 7 or 8, got 0'),
+        (ZEROS, with_field('id', datatype=7), 'fields[id].datatype: expected an integer (1-6), got 7'),
+        (ZEROS, with_field('id', datatype=99), 'fields[id].datatype: expected an integer (1-6), got 99'),
+        (ZEROS, with_field('y', count=3), 'fields[y].count: expected 1, got 3'),
+        (ZEROS, with_field('z', name='x'), 'fields: expected a field z'),
+        (ZEROS, with_field('radius_stddev', name='x'), 'fields: expected one field x, got 2'),
     ],
 )
-def test_a_field_of_the_wrong_kind_is_refused(field, attribute, value, words):
-    message = cloud(BAGS, np.zeros(2, dtype=FULL))
-    entry = next(each for each in message.fields if each.name == field)
-    setattr(entry, attribute, value)
+def test_a_wrong_table_is_refused(table, changes, words):
     with pytest.raises(MessageError, match=re.escape(words)):
-        decode_point_cloud(message, 'xy')
+        decode(table, **changes)
 
 
-def test_the_largest_scene_is_accepted():
+def test_the_number_of_obstacles_is_bounded(monkeypatch):
     scene = decode(np.zeros(MAX_ROWS, dtype=FULL[:4]), stamp_ns=0)
     assert (len(scene.obstacles), scene.stamp_ns) == (MAX_ROWS, 0)
+    monkeypatch.setattr(decode_objects, 'MAX_ROWS', 3)
+    markers = after(marker_array(BAGS, *[marker(BAGS, id=i) for i in range(3)]))
+    with pytest.raises(MessageError, match='markers: expected at most 3 obstacles held at a time, got 4'):
+        markers.with_message(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy', 0.0)
 
 
 NAMES = ['x', 'y', 'z', 'radius', 'radius_stddev', 'id', 'vx', 'size_x', 'yaw', 'rgb']
@@ -308,7 +289,7 @@ def test_delete_all_empties_its_namespace_or_everything(ns, left):
     assert ids(after(first, marker_array(BAGS, marker(BAGS, action=3, ns=ns), marker(BAGS, id=2, ns='b')))) == left
 
 
-def test_a_lifetime_starts_at_the_stamp():
+def test_a_lifetime_starts_at_the_stamp_or_now_if_the_marker_has_none_and_the_time_is_known():
     scene = after(marker_array(BAGS, marker(BAGS, id=1, lifetime=0.5, stamp_ns=4 * SECOND), marker(BAGS, id=2)))
     assert scene.find_unchanged_interval(4 * SECOND) == (-math.inf, 4.5 * SECOND)
     assert scene.find_unchanged_interval(5 * SECOND) == (4.5 * SECOND, math.inf)
@@ -317,9 +298,6 @@ def test_a_lifetime_starts_at_the_stamp():
     later = scene.with_message(marker_array(BAGS), 5 * SECOND, 'xy', 0.0)
     assert list(later.markers) == [('a', 2)]
     assert later.find_unchanged_interval(5 * SECOND) == (-math.inf, math.inf)
-
-
-def test_the_lifetime_of_an_unstamped_marker_starts_now_if_the_time_is_known():
     message = marker_array(BAGS, marker(BAGS, lifetime=0.5, stamp_ns=0))
     assert after(message, now_ns=7 * SECOND).find_unchanged_interval(7 * SECOND) == (-math.inf, 7.5 * SECOND)
     assert after(message, now_ns=0).find_unchanged_interval(0) == (-math.inf, math.inf)
@@ -364,13 +342,6 @@ def test_a_message_with_a_wrong_marker_is_refused(types, changes, words):
     with pytest.raises(MessageError, match=re.escape(words)):
         scene.with_message(marker_array(types, marker(types, id=1), marker(types, id=2, **changes)), SECOND, 'xy', 0.0)
     assert ids(scene) == ('a/7',)
-
-
-def test_the_number_of_markers_is_bounded(monkeypatch):
-    monkeypatch.setattr(decode_objects, 'MAX_ROWS', 3)
-    scene = after(marker_array(BAGS, *[marker(BAGS, id=i) for i in range(3)]))
-    with pytest.raises(MessageError, match='markers: expected at most 3 obstacles held at a time, got 4'):
-        scene.with_message(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy', 0.0)
 
 
 def test_ids_contain_no_separator_and_remain_distinct():

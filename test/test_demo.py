@@ -48,13 +48,13 @@ def test_end_to_end(tmp_path, capsys):
     assert perform(tmp_path / 'out', last_s=LAST_S) == 0
     assert dict(os.environ) == before
     printed = capsys.readouterr().out
-    told = [
+    told = (
         'The node starts ...',
         ' of 2.0 s   hand samples ',
         'The report is written ...',
-        'predictions were made',
+        'predictions were',
         'report/index.html',
-    ]
+    )
     places = [printed.find(words) for words in told]
     assert places == sorted(places) and places[0] == 0
     found = counted(tmp_path / 'out' / 'bag')
@@ -87,9 +87,8 @@ def enter(self):
 isolated_node.NodeProcess.__enter__ = enter
 sys.exit(demo.perform(Path({str(output)!r})))
 """
-    demo = subprocess.Popen(
-        [sys.executable, '-u', '-c', program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
-    )
+    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
+    demo = subprocess.Popen([sys.executable, '-u', '-c', program], cwd=ROOT, **pipes)
     assert demo.stdout is not None
     pid = 0
     for line in demo.stdout:

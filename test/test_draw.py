@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures for print: what is drawn is what was computed, and it can be told apart, read and placed anywhere."""
 
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -13,18 +12,13 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from matplotlib import pyplot as plt
 from matplotlib.legend import Legend
 from matplotlib.patches import Circle, Ellipse
-from report_samples import START_NS, prediction, predictions, samples, widen
+from report_samples import START_NS, prediction, widen
 
-from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import Status
-from foc_ros.reporting.draw import (
-    ELLIPSES_PER_CANDIDATE,
-    GHOST_COLOUR,
-    get_candidate_style,
-)
-from foc_ros.reporting.figures import make_moment_figure, make_scene_figure, plot_prediction, write_picture
-from foc_ros.reporting.views import build_hand_trajectory, build_snapshot, list_unsolved
+from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, GHOST_COLOUR, get_candidate_style
+from foc_ros.reporting.figures import make_scene_figure, plot_prediction, write_picture
+from foc_ros.reporting.views import build_snapshot
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
 PNG = b'\x89PNG\r\n\x1a\n'
@@ -59,14 +53,10 @@ def legends_of(axes):
     return [each for each in below.get_children() if isinstance(each, Legend)]
 
 
-def entries_of(axes):
-    """Return the lines of the legend."""
-    return [text.get_text() for each in legends_of(axes) for text in each.get_texts()]
-
-
 def legend_of(axes):
     """Return the text of the legend without its line breaks."""
-    return ' '.join(' '.join(each.split()) for each in entries_of(axes))
+    texts = [text.get_text() for each in legends_of(axes) for text in each.get_texts()]
+    return ' '.join(' '.join(each.split()) for each in texts)
 
 
 def test_a_scene_holds_every_obstacle_goal_and_candidate():
@@ -123,30 +113,6 @@ def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse
     assert (paths >= [left, bottom]).all() and (paths <= [right, top]).all() and right - left < 0.35
 
 
-def test_everything_drawn_is_in_the_legend_once_and_the_hand_has_past_and_future():
-    hand = build_hand_trajectory(samples())
-    (span,) = hand.find_movements(0.05)
-    during = [build_snapshot(widen(each)) for each in predictions(samples()) if span[0] <= each.stamp_ns <= span[1]]
-    axes = make_moment_figure(hand, during[5], span).axes[0]
-    text = legend_of(axes)
-    assert all(not line.get_label().startswith('_') for line in axes.lines), 'no line without a name'
-    assert all(not patch.get_label().startswith('_') for patch in axes.patches)
-    for artist in (*axes.lines, *axes.patches):
-        assert text.count(' '.join(artist.get_label().split())) >= 1
-    assert max(Counter(entries_of(axes)).values()) == 1
-    assert [each[2:6].strip() for each in entries_of(axes)[:4]] == sorted_shares(during[5])
-    before, later = ([line for line in axes.lines if line.get_label().startswith(f'hand {name}')] for name in ('b', 'l'))
-    now = hand.positions[hand.stamps_ns == during[5].stamp_ns][0]
-    np.testing.assert_array_equal(before[0].get_xydata()[-1], now)
-    np.testing.assert_array_equal(later[0].get_xydata()[0], now)
-
-
-def sorted_shares(snapshot):
-    """Return the shares of the candidates in the legend, those without one last."""
-    shares = [f'{100 * each.likelihood:.0f}' for each in snapshot.candidates_with_likelihood]
-    return shares + ['-'] * len(list_unsolved(snapshot))
-
-
 def layouts():
     """Return axes by how they were made, as users do."""
     return {
@@ -190,12 +156,3 @@ def test_a_picture_without_a_solution_or_an_obstacle_shows_the_attempt_and_the_s
     axes = make_scene_figure(replace(made, candidates=tuple(begun))).axes[0]
     assert any(np.array_equal(line.get_xydata(), [[-0.1, 0.02]]) for line in axes.lines)
     assert axes.get_xlim()[0] < -0.1
-
-
-@pytest.mark.parametrize(
-    ('name', 'expected'), [('scene.xyz', r'\.png'), ('scene', r'\.png'), ('no/such/scene.png', 'can be written')]
-)
-def test_a_file_that_cannot_be_written(tmp_path, name, expected):
-    with pytest.raises(InputError, match=expected):
-        write_picture(tmp_path / name, prediction(START_NS, NOWHERE))
-    assert list(tmp_path.iterdir()) == []

@@ -13,14 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, DurationConfig, EstimatorConfig, replace_values
 from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go
-from foc_ros.core.hand.kalman import (
-    JUMP_SPEED,
-    JUMP_STDDEVS,
-    FilterState,
-    compute_gramian,
-    compute_transition,
-    update,
-)
+from foc_ros.core.hand.kalman import JUMP_SPEED, JUMP_STDDEVS, FilterState, compute_gramian, compute_transition, update
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
@@ -185,23 +178,25 @@ def test_fitts_law_at_whole_bits():
         assert compute_movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
 
 
-def test_during_a_movement_the_time_to_go_is_the_duration_less_the_time_since_onset():
-    assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), DURATION_GOAL, FITTS) == pytest.approx(1.2 - 0.4)
-    assert time_to_go(hand(0.1, onset=0.0, since_s=0.4), DURATION_GOAL, FIXED) == pytest.approx(1.5 - 0.4)
-
-
-def test_lower_and_upper_limit():
-    assert time_to_go(hand(0.29, onset=0.0, since_s=5.0), DURATION_GOAL, FITTS) == 0.3
-    assert time_to_go(hand(0.3), DURATION_GOAL, replace(FITTS, fitts_a_s=0.0)) == 0.3
-    assert time_to_go(hand(0.0), DURATION_GOAL, replace(FIXED, fixed_s=30.0)) == 10.0
-    assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.0), DURATION_GOAL, FIXED) == 10.0
-
-
-def test_a_slow_hand_needs_the_time_of_the_distance_at_its_speed():
-    assert time_to_go(hand(0.1, onset=0.0, since_s=1.0, speed=0.05), DURATION_GOAL, FIXED) == pytest.approx(0.2 / 0.05)
-    assert time_to_go(hand(0.1, onset=0.0, since_s=3.0, speed=0.05), DURATION_GOAL, FIXED) == pytest.approx(0.2 / 0.05)
-    # too early for the speed to count
-    assert time_to_go(hand(0.01, onset=0.0, since_s=0.29 * 1.5, speed=0.05), DURATION_GOAL, FIXED) == pytest.approx(0.71 * 1.5)
+@pytest.mark.parametrize(
+    ('state', 'config', 'expected'),
+    [
+        # during a movement, the duration less the time since its onset
+        (hand(0.1, onset=0.0, since_s=0.4), FITTS, 1.2 - 0.4),
+        (hand(0.1, onset=0.0, since_s=0.4), FIXED, 1.5 - 0.4),
+        # the lower and the upper limit
+        (hand(0.29, onset=0.0, since_s=5.0), FITTS, 0.3),
+        (hand(0.3), replace(FITTS, fitts_a_s=0.0), 0.3),
+        (hand(0.0), replace(FIXED, fixed_s=30.0), 10.0),
+        (hand(0.1, onset=0.0, since_s=1.0, speed=0.0), FIXED, 10.0),
+        # a slow hand needs the time of the distance at its speed, unless it is too early for the speed to count
+        (hand(0.1, onset=0.0, since_s=1.0, speed=0.05), FIXED, 0.2 / 0.05),
+        (hand(0.1, onset=0.0, since_s=3.0, speed=0.05), FIXED, 0.2 / 0.05),
+        (hand(0.01, onset=0.0, since_s=0.29 * 1.5, speed=0.05), FIXED, 0.71 * 1.5),
+    ],
+)
+def test_the_time_to_go(state, config, expected):
+    assert time_to_go(state, DURATION_GOAL, config) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 10))
@@ -232,42 +227,21 @@ def test_the_goal_that_the_speed_fits_best_gives_the_factor_for_all_goals():
 MEAN = np.array([0.0, 0.0, 0.2, 0.1, -0.4, 1.0])
 
 
-def first(time_s, onset_ns=0):
-    """The state of the predicted movement at its first step."""
-    config = replace_values(Config(), {'estimator.acceleration_time_s': time_s})
-    hand = HandState(200_000_000, MEAN, 1e-6 * np.eye(6), onset_ns=onset_ns, onset_position=np.zeros(2))
-    prediction, _ = predict(config, hand, make_obstacles(), np.array([[0.3, 0.1]]), NO_TRACKS)
-    return prediction.candidates[0].solution.mean[0]
-
-
 @pytest.mark.parametrize(
-    ('time_s', 'expected'),
-    [(0.0, MEAN), (0.1, [0.0, 0.0, 0.16, 0.2, 0.0, 0.0]), (0.5, [0.0, 0.0, 0.0, 0.6, 0.0, 0.0])],
+    ('time_s', 'onset_ns', 'expected'),
+    [
+        (0.0, 0, MEAN),
+        (0.1, 0, [0.0, 0.0, 0.16, 0.2, 0.0, 0.0]),
+        (0.5, 0, [0.0, 0.0, 0.0, 0.6, 0.0, 0.0]),
+        (0.0, None, np.zeros(6)),
+        (0.5, None, np.zeros(6)),
+    ],
 )
-def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to(time_s, expected):
-    np.testing.assert_allclose(first(time_s), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize('time_s', [0.0, 0.5])
-def test_a_hand_that_has_not_begun_to_move_is_at_rest(time_s):
-    np.testing.assert_allclose(first(time_s, None), np.zeros(6), atol=1e-12)
-
-
-PASSING = replace_values(
-    Config(),
-    {
-        'duration.arrival': 'passing',
-        'duration.model': 'fixed',
-        'duration.fixed_s': 1.0,
-        'foc.process_noise': 0.5,
-        'estimator.acceleration_time_s': 0.0,
-    },
-)
-FREE = make_obstacles()
-
-
-def moving_hand(*mean):
-    return HandState(0, np.array(mean), 1e-8 * np.eye(6), onset_ns=0, onset_position=np.array(mean[:2]))
+def test_a_movement_goes_on_at_the_speed_that_its_acceleration_leads_to_and_a_hand_at_rest_rests(time_s, onset_ns, expected):
+    config = replace_values(Config(), {'estimator.acceleration_time_s': time_s})
+    state = HandState(200_000_000, MEAN, 1e-6 * np.eye(6), onset_ns=onset_ns, onset_position=np.zeros(2))
+    prediction, _ = predict(config, state, make_obstacles(), np.array([[0.3, 0.1]]), NO_TRACKS)
+    np.testing.assert_allclose(prediction.candidates[0].solution.mean[0], expected, atol=1e-12)
 
 
 def compute_least_effort(length, speed, acceleration):
@@ -277,18 +251,12 @@ def compute_least_effort(length, speed, acceleration):
     return float(missing @ np.linalg.solve(compute_gramian(1.0)[np.ix_(held, held)], missing))
 
 
-def test_a_hand_that_keeps_its_speed_passes_without_effort():
-    (found,) = predict(PASSING, moving_hand(0.0, 0.0, 0.3, 0.1, 0.0, 0.0), FREE, np.array([[0.3, 0.1]]), NO_TRACKS)[
-        0
-    ].solved_candidates
-    assert found.solution.effort == pytest.approx(0.0, abs=1e-12)
-    assert_allclose(found.solution.mean[-1], [0.3, 0.1, 0.3, 0.1, 0.0, 0.0], atol=1e-9)
-
-
 def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration():
     start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
-    config = replace_values(PASSING, {'foc.steps': 150})
-    (found,) = predict(config, moving_hand(*start), FREE, np.array([[0.3, 0.1]]), NO_TRACKS)[0].solved_candidates
+    values = {'duration.arrival': 'passing', 'duration.model': 'fixed', 'duration.fixed_s': 1.0, 'foc.steps': 150}
+    config = replace_values(Config(), values | {'estimator.acceleration_time_s': 0.0})
+    state = HandState(0, start, 1e-8 * np.eye(6), onset_ns=0, onset_position=start[:2])
+    (found,) = predict(config, state, make_obstacles(), np.array([[0.3, 0.1]]), NO_TRACKS)[0].solved_candidates
     along = [compute_least_effort(way, *start[2 + axis :: 2]) for axis, way in enumerate((0.3, 0.1))]
     assert found.solution.effort * found.solution.dt == pytest.approx(sum(along), rel=3e-3)
     assert_allclose(found.solution.mean[-1, [0, 1, 4, 5]], [0.3, 0.1, 0.0, 0.0], atol=1e-9)
@@ -313,13 +281,6 @@ GOAL = np.array([0.3, 0.1])
 HAND = HandState(0, np.array([0.05, 0.0, 0.3, -0.1, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 
 
-def _plan(duration_s, passing, mean):
-    """Plan a movement without obstacles."""
-    stacked = build_triple_integrator_horizon(duration_s / STEPS, STEPS)
-    problem = rest_to_goal(stacked, mean, GOAL, make_obstacles([], []), np.array([0.05, 0.05]), 0.9, passing=passing)
-    return solve_problem(problem, cold_start(np.linspace(mean[:2], GOAL, STEPS + 1)), Config().foc)
-
-
 def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoods():
     scene = make_obstacles([[0.2, 0.0]], 0.02), np.array([GOAL, [0.4, -0.1]])
     announced = replace_values(Config(), {'likelihood.other_goal': 0.0, 'foc.steps': STEPS})
@@ -342,7 +303,9 @@ def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoo
 
 
 def test_the_onset_delay_covariance_agrees_with_samples():
-    plan, wait_s = _plan(0.8, False, np.zeros(6)), 0.15
+    horizon, wait_s = build_triple_integrator_horizon(0.8 / STEPS, STEPS), 0.15
+    problem = rest_to_goal(horizon, np.zeros(6), GOAL, make_obstacles(), np.array([0.05, 0.05]), 0.9)
+    plan = solve_problem(problem, cold_start(np.linspace(np.zeros(2), GOAL, STEPS + 1)), Config().foc)
     delays = np.random.default_rng(4).exponential(wait_s, 20_000)
     found = compute_onset_delay_covariance(plan, wait_s)
     for step in (5, 20, 40, STEPS):

@@ -8,10 +8,7 @@ from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.csv_recordings import EPOCH_NS
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
-from foc_ros.analysis.evaluation.observations import (
-    observe,
-    observe_in_order,
-)
+from foc_ros.analysis.evaluation.observations import observe, observe_in_order
 from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth
 from foc_ros.analysis.recordings import find_recordings
@@ -104,14 +101,14 @@ def test_in_order_a_recording_has_its_own_hand_and_obstacles_only(tmp_path, dura
     assert before == {'Near', 'Far'} and after == {'Near'}
 
 
-DIRECTION = np.array([1.0, 0.0])
-
-
 def test_obstacles_that_overlap_along_the_direction_stand_in_one_row():
     centre = np.array([[3.0, 0.0], [1.0, 1.0], [1.15, -1.0], [2.0, 0.0]])
     ends = np.zeros(2), np.array([[4.0, 0.0]])
     assert find_rows(make_obstacles(centre, 0.1), DIRECTION, *ends).tolist() == [2, 0, 0, 1]
     assert find_rows(make_obstacles(), DIRECTION, *ends).shape == (0,)
+
+
+DIRECTION = np.array([1.0, 0.0])
 
 
 TRUE_GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])

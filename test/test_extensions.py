@@ -1,22 +1,29 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parts from outside the package, each one function: a strategy, a plant, a likelihood rule and a QP backend."""
+"""Parts from outside the package, each one function, and the plants that `foc.plant` chooses."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from reach_helpers import bowed, one_obstacle, solved
+from scipy.linalg import expm
 
 import foc_ros
+from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import k_of_eta
-from foc_ros.core.ocp.backend import Answer, DenseQP, solve_piqp
+from foc_ros.core.ocp.backend import DenseQP, solve_piqp
 from foc_ros.core.ocp.strategies import Strategy, solve_fixed
-from foc_ros.core.plant.models import PlantModel
-from foc_ros.core.plant.plants import Plant
+from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
+from foc_ros.core.plant.plants import Plant, discretise_damped_mass, discretise_triple_integrator
+from foc_ros.core.predict import build_problem, predict
 from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 from foc_ros.core.solution import Status
+from foc_ros.core.tracks import NO_TRACKS
+from foc_ros.core.types import HandState
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
@@ -36,26 +43,6 @@ def discretise_double_integrator(dt):
     return Plant(A, np.vstack([dt**2 / 2 * np.eye(2), dt * np.eye(2)]), dt)
 
 
-def solve_by_active_sets(qp):
-    """Solve a strictly convex QP by trying rows as equalities: add the most broken one, drop those that pull."""
-    rows = np.concatenate([np.zeros((0, len(qp.c))) if qp.G is None else qp.G, np.eye(len(qp.c))])
-    limits = np.concatenate([np.zeros(0) if qp.g is None else qp.g, qp.lower])
-    active: list[int] = []
-    for _ in range(200):
-        G = rows[active]
-        kkt = np.block([[qp.P, -G.T], [G, 1e-13 * np.eye(len(active))]])
-        found = np.linalg.solve(kkt, np.concatenate([-qp.c, limits[active]]))
-        x, forces = found[: len(qp.c)], found[len(qp.c) :]
-        if len(active) and forces.min() < -1e-12:
-            del active[int(forces.argmin())]
-            continue
-        missing = rows @ x - limits
-        if missing.min() > -1e-11:
-            return Answer(True, x)
-        active.append(int(missing.argmin()))
-    return Answer(False, x)
-
-
 @pytest.fixture(autouse=True)
 def parts(monkeypatch):
     for registry in (STRATEGIES, PLANTS, LIKELIHOOD_RULES, QP_BACKENDS):
@@ -64,7 +51,7 @@ def parts(monkeypatch):
     foc_ros.register_strategy('margin', strategy)
     foc_ros.register_plant('double', lambda settings: PlantModel(discretise_double_integrator))
     foc_ros.register_likelihood_rule('linear', lambda costs, config: -config.beta * costs)
-    foc_ros.register_qp_backend('active sets', solve_by_active_sets)
+    foc_ros.register_qp_backend('outside', lambda qp: QP_BACKENDS.get('quadprog')(qp))
 
 
 def test_a_strategy_is_solved_by_its_name():
@@ -128,7 +115,107 @@ def test_a_problem_on_which_piqp_oscillates_is_solved_with_other_settings():
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed'])
 def test_a_qp_backend_has_the_same_solution(strategy):
-    one, other = (solved(one_obstacle(0.75), BOWED, strategy, tau=1e-3, qp_backend=each) for each in ('piqp', 'active sets'))
+    pytest.importorskip('quadprog', reason='quadprog is not installed')
+    one, other = (solved(one_obstacle(0.75), BOWED, strategy, tau=1e-3, qp_backend=each) for each in ('piqp', 'outside'))
     assert other.status is one.status is Status.SOLVED
     np.testing.assert_allclose(other.path, one.path, atol=3e-5)
     assert other.effort == pytest.approx(one.effort, rel=1e-4)
+
+
+STEPS, MASS, DAMPING = 50, 1.5, 4.0
+MASS_CONFIG = Config().with_values(
+    {'foc.plant': 'damped_mass', 'foc.plant_mass': MASS, 'foc.plant_damping': DAMPING, 'estimator.acceleration_time_s': 0.0}
+)
+MOVING = HandState(0, np.array([0.0, 0.0, 0.1, -0.05, 1.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
+GOAL = np.array([[0.3, 0.0]])
+
+
+@pytest.fixture
+def register(monkeypatch):
+    def add(name, factory):
+        foc_ros.register_plant(name, factory)
+        return Config().with_values({'foc.plant': name})
+
+    monkeypatch.setattr(PLANTS, '_parts', dict(PLANTS._parts))
+    yield add
+    make_plant_model.cache_clear()
+
+
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
+def test_a_damped_mass_avoids_obstacles_as_surely_as_wanted(strategy):
+    candidates = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy=strategy, config=MASS_CONFIG)
+    assert len(candidates) == 2
+    for each in candidates:
+        assert each.status is foc_ros.Status.SOLVED
+        assert each.eta >= 0.9 - 1e-5
+        assert foc_ros.monte_carlo(each.solution, 2000).step[2] >= 0.9
+        offset = each.mean[1:, :2] - np.array([0.15, 0.01])
+        distance = np.hypot(*offset.T)
+        normal = offset / distance[:, None]
+        variance = np.einsum('ti,tij,tj->t', normal, each.covariance[1:, :2, :2], normal)
+        expected = 0.03**2 + 0.003**2 - distance**2
+        total = 4 * 0.03**2 * 0.003**2 + 2 * 0.003**4 + 4 * distance**2 * variance
+        assert (expected + k_of_eta(0.9) * np.sqrt(total)).max() <= 1e-6
+
+
+def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(register):
+    config = register('outside', lambda settings: PlantModel(discretise_triple_integrator))
+    values = {'foc.steps': STEPS, 'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2, 'duration.wait_s': 0.1}
+    scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
+    ours, theirs = (predict(each.with_values(values), MOVING, *scene, NO_TRACKS)[0] for each in (Config(), config))
+    assert [each.label for each in ours.candidates] == [each.label for each in theirs.candidates]
+    for one, other in zip(ours.candidates, theirs.candidates, strict=True):
+        assert_allclose(other.mean, one.mean, atol=1e-6 * np.abs(one.mean).max())
+        assert_allclose(
+            other.covariance[:, :2, :2], one.covariance[:, :2, :2], atol=0.03 * np.abs(one.covariance[:, :2, :2]).max()
+        )
+        assert other.likelihood == pytest.approx(one.likelihood, rel=1e-6)
+    noise = make_plant_model(config.foc).compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
+    exact = TRIPLE_INTEGRATOR.compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
+    assert_allclose(noise, exact, atol=0.02 * exact.max())
+
+
+@pytest.mark.parametrize(
+    ('A', 'B', 'dt'),
+    [
+        (np.eye(3), np.ones((3, 2)), 0.1),
+        (np.eye(4), np.ones((4, 1)), 0.1),
+        (np.eye(4), np.full((4, 2), np.nan), 0.1),
+        (np.eye(4), np.ones((4, 2)), 0.0),
+    ],
+)
+def test_what_is_no_plant_or_plant_model_is_refused(register, A, B, dt):
+    with pytest.raises(InputError, match='plant'):
+        Plant(A, B, dt)
+    config = register('wrong', lambda settings: discretise_triple_integrator(0.02))
+    with pytest.raises(foc_ros.InputError, match='plant wrong: expected a factory that returns a PlantModel'):
+        build_problem(config, MOVING, make_obstacles(), GOAL[0], 1.0)
+    with pytest.raises(foc_ros.InputError, match='4 to 6 states'):
+        PlantModel(lambda dt: Plant(np.eye(8), np.ones((8, 2)), dt))
+    with pytest.raises(foc_ros.ParameterError, match=r'foc\.plant: expected one of triple_integrator, damped_mass'):
+        Config().with_values({'foc.plant': 'unicycle'})
+
+
+def zero_order_hold(a, b, dt):
+    n, m = b.shape
+    block = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * dt)
+    return block[:n, :n], block[:n, n:]
+
+
+def test_triple_integrator_is_the_exact_discretisation():
+    chain = np.kron(np.diag([1.0, 1.0], k=1), np.eye(2))
+    A, B = zero_order_hold(chain, np.kron([[0.0], [0.0], [1.0]], np.eye(2)), 0.02)
+    plant = discretise_triple_integrator(0.02)
+    np.testing.assert_allclose(plant.A, A, atol=1e-15)
+    np.testing.assert_allclose(plant.B, B, atol=1e-15)
+
+
+@pytest.mark.parametrize('damping', [0.0, 1e-6, 0.3, 5.0, 80.0])
+def test_damped_mass_is_the_exact_discretisation(damping):
+    mass, dt = 1.7, 0.03
+    A, B = zero_order_hold(
+        np.kron([[0.0, 1.0], [0.0, -damping / mass]], np.eye(2)), np.kron([[0.0], [1.0 / mass]], np.eye(2)), dt
+    )
+    plant = discretise_damped_mass(dt, mass, damping)
+    np.testing.assert_allclose(plant.A, A, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(plant.B, B, rtol=1e-9, atol=1e-12)

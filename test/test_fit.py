@@ -64,13 +64,8 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle, capsys)
     assert classes['fitted'] >= classes['without the recording'] and classes['fitted'] > classes['uniform']
     assert set(classes) == {'uniform', 'as given', 'fitted', 'without the recording', 'without its way'}
     assert 0.5 < answer['scores']['inside_90']['fitted'] <= 1.0
-    assert set(answer['comparison']) == {
-        'class_gain',
-        'gap_right',
-        'nlpd',
-        'inside_90',
-        *(f'error_m {t}' for t in ('0.25', '0.5', '1')),
-    }
+    errors = {f'error_m {t}' for t in ('0.25', '0.5', '1')}
+    assert set(answer['comparison']) == {'class_gain', 'gap_right', 'nlpd', 'inside_90', *errors}
     # six recordings determine how the hand moves, not how classes are weighed, so that these gain nothing
     assert answer['comparison']['class_gain']['after'] > answer['comparison']['class_gain']['before'] - 0.02
     assert answer['comparison']['nlpd']['after'] < answer['comparison']['nlpd']['before']
@@ -83,22 +78,14 @@ def test_without_obstacles_goals_are_distinguished_and_margins_are_kept(tmp_path
     answer, config = _fit(write_tables(tmp_path / 'data', obstacle=False), capsys, **{'homotopy.max_candidates': 3})
     assert not {'foc.eta', 'foc.noise_x', 'foc.noise_y'} & set(answer['parameters'])
     assert (config.foc.eta, config.foc.noise_x) == (Config().foc.eta, Config().foc.noise_x)
-    assert all(
-        answer['undetermined'][name]['why'].startswith('no recording has an obstacle')
-        for name in ('foc.eta', 'foc.noise_x', 'foc.noise_y')
-    )
+    why = [answer['undetermined'][name]['why'] for name in ('foc.eta', 'foc.noise_x', 'foc.noise_y')]
+    assert all(each.startswith('no recording has an obstacle') for each in why)
     assert answer['scores']['ways']['fitted'] > answer['scores']['ways']['uniform'] + 0.1
 
 
 def test_two_recordings_do_not_determine_the_likelihood(tmp_path, capsys):
     answer, config = _fit(write_tables(tmp_path / 'data', count=2), capsys)
-    kept = {
-        'likelihood.beta',
-        'likelihood.planning_horizon_s',
-        'likelihood.lookahead_s',
-        'likelihood.weaving',
-        'duration.arrival',
-    }
+    kept = {f'likelihood.{name}' for name in ('beta', 'planning_horizon_s', 'lookahead_s', 'weaving')} | {'duration.arrival'}
     assert kept <= set(answer['undetermined'])
     given = flatten(Config())
     assert {name: flatten(config)[name] for name in kept} == {name: given[name] for name in kept}

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
@@ -18,15 +17,7 @@ from foc_ros.core.obstacles.geometry import (
     tabulate_edges,
     trace_obstacle,
 )
-from foc_ros.core.obstacles.shapes import (
-    Box,
-    Capsule,
-    Circle,
-    Hull,
-    collect_obstacles,
-    make_box_polygon,
-    make_hull_polygon,
-)
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles, make_box_polygon, make_hull_polygon
 from foc_ros.ros.messages.plane import lift, project
 
 SEEDS = st.integers(0, 10_000)
@@ -104,68 +95,31 @@ def test_a_hull_is_convex_and_holds_its_points(seed):
     assert distance.max() < 1e-9
 
 
-def make_circle_of_points(corners):
-    turns = 2 * np.pi * np.arange(corners) / corners
-    return 0.1 * np.stack((np.cos(turns), np.sin(turns)), axis=1)
-
-
 REFUSED = {
-    'a negative length': (lambda: Box((0, 0), size=(-0.1, 0.2)), 'obstacle.size'),
-    'one length only': (lambda: Box((0, 0), size=(0.2,)), 'obstacle.size'),
-    'an angle that is not a number': (lambda: Box((0, 0), size=(0.1, 0.2), yaw=np.nan), 'obstacle.yaw'),
-    'a box without size and radius': (lambda: Box((0, 0), size=(0, 0)), 'obstacle.radius'),
-    'a circle without radius': (lambda: Circle((0, 0), radius=0.0), 'obstacle.radius'),
-    'a hull without size and radius': (lambda: Hull([(0.1, 0.1), (0.1, 0.1)]), 'obstacle.radius'),
-    'a negative radius': (lambda: Box((0, 0), size=(0.1, 0.1), radius=-0.01), 'obstacle.radius'),
-    'a negative deviation': (lambda: Hull([(0, 0), (0.1, 0)], radius_stddev=-0.01), 'obstacle.radius_stddev'),
-    'a negative deviation of the centre': (lambda: Box((0, 0), size=(0.1, 0), centre_stddev=-1.0), 'obstacle.centre_stddev'),
-    'a hull of no points': (lambda: Hull(np.zeros((0, 2))), 'obstacle.points'),
-    'a hull of 17 corners': (lambda: Hull(make_circle_of_points(17)), 'obstacle.points'),
-    'an end in space': (lambda: Capsule((0, 0, 0), (0.1, 0), radius=0.1), 'obstacle.start'),
-    'a height that is not a number': (lambda: Circle((0, 0), 0.1, heights=(0.0, np.nan)), 'obstacle.heights: expected numbers'),
-    'one height only': (
-        lambda: Hull([(0, 0), (0.1, 0)], 0.1, heights=(0.1,)),
-        'obstacle.heights: expected finite numbers of shape',
-    ),
-    'heights in the wrong order': (
-        lambda: Circle((0, 0), 0.1, heights=(0.2, 0.1)),
-        'obstacle.heights: expected the lowest point below the highest',
-    ),
-    'a velocity of one number': (lambda: Box((0, 0), size=(0.1, 0.1), velocity=(1.0,)), 'obstacle.velocity'),
+    'a negative length': (lambda: Box((0, 0), size=(-0.1, 0.2)), 'size'),
+    'one length only': (lambda: Box((0, 0), size=(0.2,)), 'size'),
+    'an angle that is not a number': (lambda: Box((0, 0), size=(0.1, 0.2), yaw=np.nan), 'yaw'),
+    'a box without size and radius': (lambda: Box((0, 0), size=(0, 0)), 'radius'),
+    'a circle without radius': (lambda: Circle((0, 0), radius=0.0), 'radius'),
+    'a hull without size and radius': (lambda: Hull([(0.1, 0.1), (0.1, 0.1)]), 'radius'),
+    'a negative radius': (lambda: Box((0, 0), size=(0.1, 0.1), radius=-0.01), 'radius'),
+    'a negative deviation': (lambda: Hull([(0, 0), (0.1, 0)], radius_stddev=-0.01), 'radius_stddev'),
+    'a negative deviation of the centre': (lambda: Box((0, 0), size=(0.1, 0), centre_stddev=-1.0), 'centre_stddev'),
+    'a hull of no points': (lambda: Hull(np.zeros((0, 2))), 'points'),
+    'a hull of 17 corners': (lambda: Hull([(np.cos(turn), np.sin(turn)) for turn in 2 * np.pi * np.arange(17) / 17]), 'points'),
+    'an end in space': (lambda: Capsule((0, 0, 0), (0.1, 0), radius=0.1), 'start'),
+    'a height that is not a number': (lambda: Circle((0, 0), 0.1, heights=(0.0, np.nan)), 'heights: expected numbers'),
+    'one height only': (lambda: Hull([(0, 0), (0.1, 0)], 0.1, heights=(0.1,)), 'heights: expected finite numbers of shape'),
+    'heights in the wrong order': (lambda: Circle((0, 0), 0.1, heights=(0.2, 0.1)), 'heights: expected the lowest point below'),
+    'a velocity of one number': (lambda: Box((0, 0), size=(0.1, 0.1), velocity=(1.0,)), 'velocity'),
 }
 
 
 @pytest.mark.parametrize('case', REFUSED)
 def test_shapes_refuse_by_the_name_of_the_field(case):
     make, field = REFUSED[case]
-    with pytest.raises(SceneError, match=f'^{field}'):
+    with pytest.raises(SceneError, match=rf'^obstacle\.{field}'):
         make()
-
-
-SHAPES = (
-    Circle((0.1, 0.2), radius=0.03),
-    Capsule((0.0, 0.0), (0.2, 0.1), radius=0.02),
-    Box((0.3, -0.1), (0.2, 0.05), 0.4),
-    Box((0.3, -0.1), (0.2, 0.05), -2.0, radius=0.01),
-    Hull([(0.0, 0.0), (0.3, 0.0), (0.1, 0.2), (0.05, 0.05)], radius=0.02),
-)
-
-
-def measure_area(points):
-    (x, y), (after_x, after_y) = points.T, np.roll(points, -1, axis=0).T
-    return float((x * after_y - y * after_x).sum() / 2.0)
-
-
-@pytest.mark.parametrize('shape', SHAPES, ids=repr)
-@pytest.mark.parametrize('growth', [0.0, 0.015])
-def test_every_point_is_at_the_radius_and_the_area_is_that_of_steiner(shape, growth):
-    obstacles = collect_obstacles([shape])
-    outline, radius = trace_obstacle(obstacles, 0, growth, points=400), shape.radius + growth
-    np.testing.assert_array_equal(outline[0], outline[-1])
-    np.testing.assert_allclose(measure_offsets(outline, obstacles)[1], radius, atol=2e-9)
-    edges = np.roll(shape.polygon, -1, axis=0) - shape.polygon
-    expected = measure_area(shape.polygon) + np.hypot(*edges.T).sum() * radius + np.pi * radius**2
-    assert measure_area(outline) == pytest.approx(expected, rel=1e-3)
 
 
 @given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=12), st.floats(1e-3, 0.1))
@@ -177,10 +131,6 @@ def test_the_limits_are_those_of_the_outline(points, radius):
     np.testing.assert_array_equal([low[1], high[1]], [[1.0, 1.0], [3.0, 3.0]])
 
 
-PLANES = ('xy', 'xz', 'yz')
-points = arrays(np.float64, st.tuples(st.integers(0, 5), st.just(3)), elements=st.floats(-1e4, 1e4))
-
-
 @pytest.mark.parametrize(
     ('plane', 'position', 'height'), [('xy', (1.0, 2.0), 3.0), ('xz', (1.0, 3.0), 2.0), ('yz', (2.0, 3.0), 1.0)]
 )
@@ -189,10 +139,3 @@ def test_axes_of_each_plane(plane, position, height):
     assert tuple(projected) == position
     assert above == height
     assert tuple(lift(projected, above, plane)) == (1.0, 2.0, 3.0)
-
-
-@given(points, st.sampled_from(PLANES))
-def test_lift_is_the_inverse_of_project(table, plane):
-    positions, heights = project(table, plane)
-    assert positions.shape == (len(table), 2)
-    np.testing.assert_array_equal(lift(positions, heights, plane), table)

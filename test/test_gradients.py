@@ -99,22 +99,6 @@ def check_derivatives(made, control, find, least, rate, within):
 
 
 @EVERY
-def test_the_gradient_of_a_margin_is_its_derivative_at_any_time(case):
-    make, *given = MADE[case]
-    problem, control = make(*given)
-    margins = Margins([problem], np.zeros(1), is_chance=True)
-    times = np.array([time for time in np.arange(2.3, STEPS - 1, 0.7) if is_smooth(margins, control, time)])
-    assert len(times) > 8
-    at, h = linearise(margins, control, times), 1e-4
-    for direction in 1e-6 * random_directions(control):
-        more, less = (linearise(margins, control + sign * direction, times).value for sign in (1, -1))
-        expected = (more - less) / 2
-        np.testing.assert_allclose(at.gradient @ direction, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
-    more, less = (linearise(margins, control, times, K + sign * h).value for sign in (1, -1))
-    np.testing.assert_allclose(-at.stddev_rate, (more - less) / (2 * h), rtol=1e-6)
-
-
-@EVERY
 @pytest.mark.parametrize('is_free', [False, True], ids=['margin', 'safety factor'])
 def test_the_hessian_is_that_of_the_least_margin_which_slides_or_of_the_least_safety_factor(case, is_free):
     """Second differences of G(u) = min_t g(u, t), minus those that a unit of the multiplier adds to the Lagrangian.

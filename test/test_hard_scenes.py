@@ -1,21 +1,24 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes at the edge of what can be predicted: each has a decided answer, finite and never a guess (doc/troubleshoot.md)."""
+"""Scenes at the edge of what can be predicted: each has a decided answer, and what fails or is not followed keeps a share."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from bag_helpers import TYPES
+from prediction_samples import outcome as make_outcome
 
 import foc_ros
+from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.shapes import collect_obstacles
 from foc_ros.core.predict import predict
 from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
+from foc_ros.io.json_output import encode_prediction
+from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_markers
 
 GOAL = np.array([[0.3, 0.0]])
 CONFIG = replace_values(Config(), {'foc.steps': 30})
@@ -37,13 +40,6 @@ def predicted(obstacles, goals=GOAL, config=CONFIG):
     return prediction
 
 
-def test_an_empty_scene_is_the_straight_way():
-    prediction = predicted(make_obstacles())
-    (only,) = prediction.solved_candidates
-    assert only.likelihood == pytest.approx(1.0 - prediction.other)
-    assert abs(only.solution.path[:, 1]).max() < 1e-9
-
-
 def test_a_hand_inside_an_obstacle_leaves_it_or_says_why_not():
     prediction = predicted(make_obstacles([[0.01, 0.0]], [0.03], 0.001))
     assert prediction.notes['hand_inside'] == 1
@@ -63,16 +59,6 @@ def test_a_class_whose_search_goes_astray_for_a_moment_is_not_unlikely():
     assert first['goal0:+0+1'].likelihood > 0.05
 
 
-def test_an_obstacle_that_holds_a_goal_does_not_hide_it_and_another_goal_keeps_its_candidates():
-    obstacle = make_obstacles([[0.3, 0.01]], [0.03], 0.001)
-    prediction = predicted(obstacle)
-    assert [outcome.label for outcome in prediction.candidates] == ['goal0:']
-    assert prediction.notes['goal_inside'] == 1
-    prediction = predicted(obstacle, np.array([[0.3, 0.0], [0.0, 0.3]]))
-    assert {outcome.candidate.goal for outcome in prediction.candidates} == {0, 1}
-    assert 1 in {outcome.candidate.goal for outcome in prediction.solved_candidates}
-
-
 def test_of_ten_thousand_obstacles_those_near_the_way_decide():
     near = [[0.1, 0.02], [0.2, -0.02]]
     angles = np.random.default_rng(7).uniform(0.0, 2.0 * np.pi, 9_998)
@@ -80,41 +66,14 @@ def test_of_ten_thousand_obstacles_those_near_the_way_decide():
     few, many = predicted(make_obstacles(near, 0.02, 0.001)), predicted(make_obstacles([*near, *far], 0.02, 0.001))
     assert many.notes['culled'] == 10_000 - CONFIG.scene.max_obstacles
     assert 'culled' not in few.notes
-    assert [outcome.candidate.label for outcome in many.solved_candidates] == [
-        outcome.candidate.label for outcome in few.solved_candidates
-    ]
+    assert [each.label for each in many.solved_candidates] == [each.label for each in few.solved_candidates]
     for one, other in zip(many.solved_candidates, few.solved_candidates, strict=True):
         assert one.likelihood == pytest.approx(other.likelihood, rel=1e-6)
         assert np.abs(one.solution.path - other.solution.path).max() < 1e-6
 
 
-def test_an_eta_out_of_reach_is_said_with_the_one_that_is_reached():
-    config = replace_values(CONFIG, {'foc.eta': 0.999, 'foc.noise_x': 1.0, 'foc.noise_y': 1.0})
-    obstacle = make_obstacles([[0.15, 0.0]], [0.03], 0.003)
-    soft = predicted(obstacle, config=config)
-    assert soft.solved_candidates == ()
-    assert {outcome.status for outcome in soft.candidates_with_likelihood} == {Status.COMPROMISED}
-    prediction = predicted(obstacle, config=replace_values(config, {'likelihood.shortfall': math.inf}))
-    assert prediction.candidates_with_likelihood == ()
-    assert {outcome.solution.status for outcome in prediction.candidates} == {Status.ETA_UNREACHABLE}
-    assert all('eta 0.999 is out of reach: the largest' in outcome.solution.message for outcome in prediction.candidates)
-
-
 WIDE = foc_ros.Config().with_values({'scene.hand_radius': 0.01})
 CUPS = foc_ros.Circle((0.15, 0.01), radius=0.02, radius_stddev=0.002), foc_ros.Circle((0.2, -0.05), radius=0.015)
-ONE_GOAL = np.array([[0.3, 0.0]])
-
-
-def test_a_prediction_is_that_for_larger_obstacles_and_holds_the_given_ones():
-    hand, given = HandState(0, np.zeros(6), np.zeros((6, 6))), collect_obstacles(CUPS)
-    wide, _ = predict(WIDE, hand, given, ONE_GOAL, NO_TRACKS)
-    grown, _ = predict(foc_ros.Config(), hand, replace(given, radius=given.radius + 0.01), ONE_GOAL, NO_TRACKS)
-    narrow, _ = predict(foc_ros.Config(), hand, given, ONE_GOAL, NO_TRACKS)
-    assert wide.obstacles is given
-    assert [each.label for each in wide.candidates] == [each.label for each in grown.candidates]
-    for each, other in zip(wide.candidates, grown.candidates, strict=True):
-        np.testing.assert_array_equal(each.mean, other.mean)
-    assert wide.candidates[0].effort > narrow.candidates[0].effort
 
 
 def test_a_solution_keeps_the_hand_away_and_shows_the_given_obstacles():
@@ -135,3 +94,101 @@ def test_the_hand_has_to_fit_at_the_start_and_a_goal_that_it_cannot_reach_beside
     solution = foc_ros.solve((0, 0), beside, CUPS, config=WIDE)
     assert solution.status is foc_ros.Status.SOLVED
     np.testing.assert_allclose(solution.mean[-1, :2], beside, atol=1e-6)
+
+
+SHARE_CONFIG = replace_values(Config(), {'foc.steps': 20, 'likelihood.other_goal': 0.0, 'homotopy.max_detour': 100.0})
+HAND = HandState(0, np.zeros(6), np.zeros((6, 6)), frame_id='world')
+ROW = make_obstacles([[0.15, 0.04], [0.15, -0.045]], 0.025, 0.001)
+GOALS = np.array([[0.3, 0.0]])
+
+
+def ask(config=SHARE_CONFIG, goals=GOALS, obstacles=ROW):
+    return predict(config, HAND, obstacles, goals, NO_TRACKS)[0]
+
+
+def let_fail(monkeypatch, number, status):
+    solve = candidates.solve_problems
+
+    def fail(*given):
+        return [replace(each, status=status) if row == number else each for row, each in enumerate(solve(*given))]
+
+    monkeypatch.setattr(candidates, 'solve_problems', fail)
+
+
+def total(prediction):
+    return sum(each.likelihood for each in prediction.candidates) + prediction.unknown + prediction.other
+
+
+@pytest.mark.parametrize(('number', 'status'), [(0, Status.LEFT_CLASS), (1, Status.ITERATION_LIMIT), (2, Status.INFEASIBLE)])
+def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(monkeypatch, status, number):
+    known = {each.way: each for each in ask().candidates}
+    let_fail(monkeypatch, number, status)
+    found = ask()
+    (failed,) = [each for each in found.candidates if 'estimated from the path' in each.solution.message]
+    assert failed.way == number and failed.status is Status.ESTIMATED and len(found.candidates) == 4
+    # classes that are so unlikely that they go on in the next prediction are estimated too
+    assert found.notes['estimated'] == sum(each.status is Status.ESTIMATED for each in found.candidates)
+    assert 0.25 < failed.likelihood / known[number].likelihood < 4.0
+    assert total(found) == pytest.approx(1.0)
+    np.testing.assert_allclose(failed.mean[0], HAND.mean, atol=1e-12)
+    np.testing.assert_allclose(failed.mean[-1, :2], GOALS[0], atol=1e-9)
+
+
+@pytest.mark.parametrize('horizon_s', [1000.0, 0.0])
+def test_what_is_seen_and_not_followed_is_unknown(horizon_s):
+    """The share of the classes that are not followed is about what they have where they are, by the same rule."""
+    config = replace_values(SHARE_CONFIG, {'likelihood.planning_horizon_s': horizon_s})
+    whole, one = ask(config), ask(replace_values(config, {'homotopy.max_candidates': 1}))
+    assert whole.unknown == 0.0 and len(whole.candidates) == 4 and len(one.candidates) == 1
+    followed = next(each for each in whole.candidates if each.label == one.most_likely)
+    assert one.unknown == pytest.approx(1.0 - followed.likelihood, abs=0.15)
+    assert one.candidates[0].likelihood == pytest.approx(1.0 - one.unknown)
+
+
+def test_goals_that_are_not_followed_are_unknown():
+    angles = np.linspace(-0.7, 0.7, 80)
+    goals = 0.3 * np.column_stack([np.cos(angles), np.sin(angles)])
+    found = ask(replace_values(SHARE_CONFIG, {'foc.steps': 5}), goals, make_obstacles())
+    assert len(found.candidates) == 64
+    assert found.unknown == pytest.approx(16.0 / 80.0, abs=0.02) and total(found) == pytest.approx(1.0)
+
+
+def test_the_cost_of_a_class_that_is_not_followed_is_the_largest_that_candidates_lead_to_expect():
+    right, left = make_outcome('goal0:+1', cost=1.0), make_outcome('goal1:-1', bend=-0.1, cost=50.0, safety_factor=1.0)
+    left = replace(left, candidate=replace(left.candidate, goal=1))
+    unfollowed = replace(left.candidate, label='goal0:-1', goal=0, length=1.1 * left.candidate.length)
+    for solved, known_cost in (([right, left], 50.0), ([right], 1.0)):
+        (found,) = candidates.estimate_unfollowed([unfollowed], solved, [1.0, 1.0])
+        assert known_cost < found.cost < 3.0 * known_cost and found.status is Status.ESTIMATED
+
+
+def test_where_nothing_is_solved_all_is_unknown():
+    hard = {'foc.eta': 0.999, 'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': np.inf}
+    found = ask(replace_values(SHARE_CONFIG, hard))
+    assert found.unknown == 1.0 and found.most_likely is None and total(found) == 1.0
+
+
+def test_the_unknown_share_is_published():
+    whole, one = ask(), ask(replace_values(SHARE_CONFIG, {'homotopy.max_candidates': 1}))
+    table = encode_likelihoods(one, TYPES)
+    assert table.layout.dim[0].label == f'{one.candidates[0].label};unknown'
+    rows = np.asarray(table.data).reshape(-1, 4)
+    assert rows[:, 0].sum() == pytest.approx(1.0) and np.isnan(rows[1, 1:]).all() and rows[1, 0] == one.unknown
+    assert 'unknown' not in encode_likelihoods(whole, TYPES).layout.dim[0].label
+    texts = [each.text for each in encode_markers(one, 'xy', TYPES).markers]
+    assert any(text.endswith(f'{100 * one.unknown:.0f} % unknown') for text in texts)
+    assert encode_prediction(one)['unknown'] == one.unknown
+
+
+def test_a_class_that_the_search_misses_keeps_its_answer_for_a_moment():
+    one = replace_values(SHARE_CONFIG, {'homotopy.max_candidates': 1})
+    whole, tracks = predict(SHARE_CONFIG, HAND, ROW, GOALS, NO_TRACKS)
+    ages = []
+    for tick in range(1, 13):
+        prediction, tracks = predict(one, replace(HAND, stamp_ns=20_000_000 * tick), ROW, GOALS, tracks)
+        ages.append({each.label: each.age_s for each in prediction.candidates if each.age_s})
+        assert total(prediction) == pytest.approx(1.0)
+        assert all(np.hypot(*each.mean[0, :2]) < 1e-9 for each in prediction.candidates)
+    lost = {each.label for each in whole.candidates} - {whole.most_likely}
+    for tick, found in enumerate(ages, 1):
+        assert found == ({label: pytest.approx(0.02 * tick) for label in lost} if tick <= 10 else {})

@@ -1,23 +1,39 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The third axis: the height over the task plane, its variance, and the obstacles that it clears."""
+"""The third axis: heights, their variance, the obstacles that are cleared, and heights in messages in every task plane."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
+from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
 from numpy.testing import assert_allclose, assert_array_equal
+from object_messages import collision_object, detection, detections
+from prediction_samples import DT as MESSAGE_DT
+from prediction_samples import STEPS as MESSAGE_STEPS
+from prediction_samples import outcome, prediction
 
 import foc_ros
+from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.core.config import Config, replace_values
+from foc_ros.core.errors import MessageError
 from foc_ros.core.height import predict_height, reach_along_axis
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
+from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.plant.covariance import SharedCovariances
 from foc_ros.core.predict import build_problem, predict
+from foc_ros.core.prediction import HeightTrajectory
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
+from foc_ros.io.json_output import encode_prediction
+from foc_ros.ros.intake import Intake
+from foc_ros.ros.messages.decode_objects import CollisionTable, MarkerTable, decode_detections
+from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
+from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
+from foc_ros.ros.messages.plane import Transform, compute_rotation, lift
 
 CONFIG = replace_values(Config(), {'foc.steps': 50, 'budget_s': 0.0, 'foc.noise_x': 0.1, 'foc.noise_y': 0.1})
 STEPS, DT = CONFIG.foc.steps, 0.02
@@ -47,12 +63,7 @@ def predict_over(obstacles, height, goal_height, **changes):
 
 @pytest.mark.parametrize(
     'changes',
-    [
-        {},
-        {'foc.goal_weight': 1e7},
-        {'duration.arrival': 'passing'},
-        {'foc.plant': 'damped_mass', 'foc.plant_damping': 3.0},
-    ],
+    [{}, {'foc.goal_weight': 1e7}, {'duration.arrival': 'passing'}, {'foc.plant': 'damped_mass', 'foc.plant_damping': 3.0}],
     ids=str,
 )
 def test_it_is_the_solution_of_the_plane_without_obstacles(changes):
@@ -155,3 +166,163 @@ def test_a_predictor_with_heights_predicts_and_clears():
     for position in ((0.1, 0.0), (0.1, 0.0, float('nan'))):
         with pytest.raises(foc_ros.SceneError, match=r'^position: expected'):
             predictor.update(1.0, position)
+
+
+TYPES = message_types('rosbags')
+CUBE, SPHERE, CYLINDER = 1, 2, 3
+PLANES = {'xy': [0, 1, 2], 'xz': [0, 2, 1], 'yz': [2, 0, 1]}
+"""For each plane, the place of x, y and z among the two axes of the plane and the height."""
+UNKNOWN = [-np.inf, np.inf]
+COLUMNS = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'size_z', 'vx', 'vy', 'vz')]
+MESSAGE_CONFIG = replace_values(Config(), {'budget_s': 0.0, 'foc.steps': 20, 'foc.endpoint_stddev': 0.0})
+
+
+def in_space(point, plane):
+    """Return x, y, z of a point that is given by its position in the plane and its height."""
+    return [point[place] for place in PLANES[plane]]
+
+
+def table(*rows):
+    return obstacle_table([(*row, *(0.0,) * (len(COLUMNS) - len(row))) for row in rows], COLUMNS)
+
+
+@pytest.mark.parametrize('plane', PLANES)
+def test_the_size_of_a_row_gives_its_heights(plane):
+    rows = [(*in_space((0.1, 0.0, 0.5), plane), 0.02, size) for size in (0.2, 0.0)]
+    climbing = (*rows[0][:4], 0.2, *in_space((0.0, 0.0, 0.1), plane))
+    passing = (*rows[0][:4], 0.2, *in_space((0.1, 0.0, 0.0), plane))
+    obstacles = decode_point_cloud(cloud(TYPES, table(*rows, climbing, passing)), plane).obstacles
+    assert_allclose(obstacles.heights, [[0.4, 0.6], UNKNOWN, UNKNOWN, [0.4, 0.6]], rtol=1e-6)
+    assert obstacles.corners.tolist() == [1] * 4
+
+
+def test_a_wrong_size_is_refused_and_one_that_is_not_finite_is_dropped():
+    with pytest.raises(MessageError, match=r'size_z\[1\]: expected a number in \[0, 10000\] m, got -0.1'):
+        decode_point_cloud(cloud(TYPES, table((0, 0, 0, 0.1, 0.1), (1, 0, 0, 0.1, -0.1))), 'xy')
+    decoded = decode_point_cloud(cloud(TYPES, table((0, 0, 0, 0.1, np.nan), (1, 0, 0, 0.1, 0.1))), 'xy')
+    assert decoded.obstacles.ids == ('1',) and decoded.dropped == {'not_finite': 1}
+
+
+@pytest.mark.parametrize('plane', PLANES)
+def test_markers_say_their_heights(plane):
+    place = in_space((0.1, 0.0, 0.5), plane)
+    turned = {'x': np.sin(np.pi / 8), 'w': np.cos(np.pi / 8)} if plane == 'xy' else {'w': 1.0}
+    kinds = [(CUBE, (0.2, 0.2, 0.2), turned), (CYLINDER, (0.1, 0.1, 0.3), {'w': 1.0}), (SPHERE, (0.1, 0.1, 0.3), {'w': 1.0})]
+    markers = (marker(TYPES, place, size, type=kind, id=i, turned=by) for i, (kind, size, by) in enumerate(kinds))
+    message = marker_array(TYPES, *markers)
+    flat = marker(TYPES, place, (0.1, 0.1, 0.0), type=CYLINDER, id=3)
+    message.markers.append(flat)
+    half = 0.1 * np.sqrt(2.0) if plane == 'xy' else 0.1
+    obstacles = MarkerTable().with_message(message, SECOND, plane, 0.0).obstacles(SECOND)
+    assert_allclose(obstacles.heights, [[0.5 - half, 0.5 + half], [0.35, 0.65], UNKNOWN, UNKNOWN], rtol=1e-12)
+    assert MarkerTable().obstacles(SECOND).heights.shape == (0, 2)
+
+
+def test_objects_and_detections_say_their_heights():
+    tilted = {'x': np.sin(np.pi / 8), 'w': np.cos(np.pi / 8)}
+    parts = (1, (0.4, 0.2, 0.1), (0, 0, 0.5)), (2, (0.05,), (0, 0, 0.5)), (3, (0.4, 0.02), (0, 0, 0.5))
+    heights = CollisionTable().with_message(collision_object(*parts)).obstacles('xy', 0.0).heights
+    assert_allclose(heights, [[0.45, 0.55], UNKNOWN, [0.3, 0.7]])
+    leaning = CollisionTable().with_message(collision_object((3, (0.4, 0.02), (0, 0, 0)), turned=tilted)).obstacles('xy', 0.0)
+    half = (0.2 + 0.02) * np.sqrt(0.5)
+    assert_allclose(leaning.heights, [[-half, half]])
+    found = decode_detections(detections(detection((0, 0, 0.5), (0.2, 0.3, 0.4))), 'xy', 0.0).obstacles
+    assert_allclose(found.heights, [[0.3, 0.7]])
+    assert decode_detections(detections(), 'xy', 0.0).obstacles.heights.shape == (0, 2)
+
+
+def make_transform(angle, z):
+    """Return a rotation about the x axis, and a shift along z."""
+    quaternion = pose_stamped(TYPES, (0, 0, 0)).pose.orientation
+    quaternion.x, quaternion.w = float(np.sin(angle / 2)), float(np.cos(angle / 2))
+    return Transform(compute_rotation(quaternion), np.array([0.0, 0.0, z]))
+
+
+def test_a_transform_moves_heights_and_must_not_tilt_them():
+    message = cloud(TYPES, table((0.1, 0.0, 0.5, 0.02, 0.2)), frame_id='camera')
+    for angle, middle in ((0.0, 1.5), (np.pi, 0.5)):
+        moved = decode_point_cloud(message, 'xy', lambda _, angle=angle: ('world', make_transform(angle, 1.0)))
+        assert_allclose(moved.obstacles.heights, [[middle - 0.1, middle + 0.1]], rtol=1e-6)
+    with pytest.raises(MessageError, match=r'fields\[size_z\]: expected boxes that the transform leaves in the task plane'):
+        decode_point_cloud(message, 'xy', lambda _: ('world', make_transform(0.1, 0.0)))
+
+
+@cache
+def predict_in(plane):
+    """Return the last prediction for a hand that goes down between a high, a low and a tall obstacle."""
+    intake = Intake(Pipeline(replace_values(MESSAGE_CONFIG, {'plane': plane})))
+    rows = ((0.2, 0.0, 0.5), 0.02, 0.2), ((0.2, 0.06, 0.1), 0.02, 0.04), ((0.2, -0.06, 0.3), 0.02, 0.0)
+    intake.take('goals', pose_array(TYPES, [in_space((0.4, 0.0, 0.2), plane)]))
+    scene = table(*((*in_space(place, plane), radius, size) for place, radius, size in rows))
+    intake.take('obstacles', cloud(TYPES, scene))
+    for tick in range(20):
+        t = 0.02 * tick
+        intake.take('hand_pose', pose_stamped(TYPES, in_space((t**2, 0.0, 0.25 - 0.1 * t**2), plane), round((1 + t) * SECOND)))
+        made = intake.pipeline.predict()
+    assert made is not None
+    return made
+
+
+@pytest.mark.parametrize('plane', PLANES)
+def test_every_plane_has_the_same_heights(plane):
+    expected, made = predict_in('xy'), predict_in(plane)
+    assert made.cleared == expected.cleared == (True, True, False)
+    for one, other in zip(made.candidates, expected.candidates, strict=True):
+        assert one.height is not None and other.height is not None
+        assert_allclose(one.height.mean, other.height.mean, atol=1e-12)
+        assert_allclose(one.height.covariance, other.height.covariance, atol=1e-12)
+    rows = np.frombuffer(encode_outputs(made, plane, TYPES, ['prediction'])['prediction'].data, CLOUD_ROW)
+    normal = next(axis for axis in 'xyz' if axis not in plane)
+    first = made.candidates[0].height
+    assert first is not None
+    for name, column in (
+        (normal, first.mean[:, 0]),
+        (f'v{normal}', first.mean[:, 1]),
+        (2 * normal, first.covariance[:, 0, 0]),
+        (f'motor_{2 * normal}', first.motor_covariance[:, 0, 0]),
+    ):
+        assert_allclose(rows[name][rows['candidate'] == 0], column, rtol=1e-6, atol=1e-9)
+    for axis in plane:
+        assert_array_equal(rows[''.join(sorted(axis + normal))], 0.0)
+
+
+def sample():
+    """Return a prediction by hand, with a height that rises."""
+    covariance = np.zeros((MESSAGE_STEPS + 1, 3, 3))
+    covariance[:, 0, 0] = np.linspace(0.0, 0.03, MESSAGE_STEPS + 1) ** 2
+    mean = np.column_stack((np.linspace(0.2, 0.4, MESSAGE_STEPS + 1), np.ones(MESSAGE_STEPS + 1), np.zeros(MESSAGE_STEPS + 1)))
+    return prediction(replace(outcome(), height=HeightTrajectory(mean, covariance, covariance / 9.0)))
+
+
+@pytest.mark.parametrize('plane', PLANES)
+def test_path_and_markers_rise(plane):
+    given = sample()
+    (candidate,) = given.candidates
+    assert candidate.height is not None
+    heights = candidate.height.mean[:, 0]
+    messages = encode_outputs(given, plane, TYPES)
+    points = [[getattr(each.pose.position, axis) for axis in 'xyz'] for each in messages['path'].poses]
+    assert_allclose(points, lift(candidate.solution.path, heights, plane))
+    assert len(messages['path'].poses) == len(np.arange(0.0, MESSAGE_STEPS * MESSAGE_DT + MESSAGE_DT / 2, MESSAGE_DT))
+    drawn = {name: [each for each in messages['markers'].markers if each.ns == name] for name in ('path', 'total_uncertainty')}
+    normal = next(axis for axis in 'xyz' if axis not in plane)
+    curve = [getattr(point, normal) for point in drawn['path'][0].points]
+    assert_allclose(curve, np.linspace(0.2, 0.4, len(curve)))
+    ellipses = drawn['total_uncertainty']
+    assert_allclose([getattr(each.pose.position, normal) for each in ellipses], heights[1:])
+    assert_allclose([each.scale.z for each in ellipses], 2.0 * candidate.height.stddev[1:])
+
+
+def test_json_has_the_height_where_it_is_predicted():
+    (encoded,) = encode_prediction(sample())['candidates']
+    assert_allclose(encoded['height'], np.linspace(0.2, 0.4, MESSAGE_STEPS + 1))
+    assert_allclose(encoded['height_velocity'], 1.0)
+    assert_allclose(encoded['height_stddev'], np.linspace(0.0, 0.03, MESSAGE_STEPS + 1))
+    (without,) = encode_prediction(prediction(outcome()))['candidates']
+    assert not {name for name in without if name.startswith('height')}
+
+
+def test_a_replay_counts_what_was_cleared():
+    answer = Summary(samples=3, predictions=2, solved=2, cleared_by_height=5).answer({}, 1.0)
+    assert answer['cleared_by_height'] == 5
+    assert facts(answer)['obstacles cleared by height'] == '5 over all predictions'

@@ -8,18 +8,13 @@ from homotopy_scenes import CLEARANCE, find, gap_to_circles
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.core.classes import Turn, compute_swept_angles, find_path_sides, search
+from foc_ros.core.classes import Turn, find_path_sides, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT
 
 NOTHING = make_obstacles()
-
-
-def pass_as_named(found, obstacles):
-    """Whether each guess passes the named obstacles as its name says."""
-    return all(dict(one.sides).items() <= find_path_sides(one.guess, obstacles).items() for one in found.candidates)
 
 
 def test_no_obstacles_one_straight_candidate_per_goal():
@@ -38,18 +33,14 @@ def test_obstacle_exactly_on_the_line_is_passed_on_both_sides_the_same():
     assert left.guess[:, 1].max() > 0.034
 
 
-def test_hand_between_two_obstacles_too_near_to_each_other_gets_out():
-    found = find(make_obstacles([[0.0, 0.032], [0.0, -0.032]], 0.03))
-    assert found.notes == {'hand_inside': 2}
-    assert [one.label for one in found.candidates] == ['goal0:']
-
-
 def test_the_one_gap_in_a_ring_is_found_and_a_turn_back_is_long():
     angle = 2 * np.pi * np.arange(12) / 12
     ring = 0.1 * np.column_stack([np.cos(angle), np.sin(angle)])
     obstacles = make_obstacles(np.delete(ring, 6, axis=0), 0.03)
     found = find(obstacles, k=4)
-    assert len(found.candidates) == 2 and pass_as_named(found, obstacles)
+    assert len(found.candidates) == 2
+    for one in found.candidates:
+        assert dict(one.sides).items() <= find_path_sides(one.guess, obstacles).items()
     assert all(one.length > 0.1 + 0.1 * np.pi + 0.2 for one in found.candidates)
     assert all(gap_to_circles(one.guess, obstacles) > -1e-9 for one in found.candidates)
 
@@ -71,9 +62,8 @@ def test_long_detours_are_seen_and_not_followed_but_of_each_goal_the_shortest_wa
     left_out = {one.label for one in whole.candidates} - set(within)
     assert {one.label for one in few.unfollowed} & left_out
     before = next(one for one in whole.candidates if one.length > 1.1 * shortest[one.goal])
-    near = find(
-        obstacles, goals=[[0.1, 0.0], [0.2, 0.0]], detour=0.97 * before.length / shortest[before.goal], previous=(before,)
-    )
+    detour = 0.97 * before.length / shortest[before.goal]
+    near = find(obstacles, goals=[[0.1, 0.0], [0.2, 0.0]], detour=detour, previous=(before,))
     assert before.label in [one.label for one in near.candidates], 'a class that was followed stays a little longer'
 
 
@@ -87,14 +77,6 @@ def test_a_way_that_is_followed_to_one_goal_is_followed_unless_its_own_goal_has_
     beside = find(obstacles, goals=[[0.3, 0.01], [0.3, 0.02]], k=2)
     assert {each.label for each in beside.candidates} == {'goal0:+0', 'goal1:+0'}
     assert {each.label for each in beside.unfollowed} == {'goal0:-0', 'goal1:-0'}
-
-
-def test_the_guess_begins_at_the_present_speed_and_ends_at_rest():
-    found = find(NOTHING, velocity=(0.3, 0.0), steps=100)
-    speed = np.hypot(*np.diff(found.candidates[0].guess, axis=0).T) * 100
-    assert speed[0] == pytest.approx(0.3, rel=0.02)
-    assert speed[-1] < 0.01
-    assert (np.diff(found.candidates[0].guess[:, 0]) > 0).all()
 
 
 def test_each_goal_comes_in_and_of_very_many_the_nearest():
@@ -119,13 +101,6 @@ ABEAM = make_obstacles([[0.5, 0.0]], 0.1, ids=('post',))
 def bowed(amplitude, m=101):
     share = np.linspace(0.0, 1.0, m)
     return np.column_stack([share, amplitude * np.sin(np.pi * share)])
-
-
-def test_swept_angle_of_a_quarter_circle_and_of_two_turns():
-    angle = np.linspace(0.0, np.pi / 2, 50)
-    assert compute_swept_angles(np.column_stack([np.cos(angle), np.sin(angle)]), np.zeros((1, 2))) == pytest.approx([np.pi / 2])
-    twice = np.column_stack([np.cos(8 * angle), -np.sin(8 * angle)])
-    assert compute_swept_angles(twice, np.array([[0.0, 0.0], [3.0, 0.0]])) == pytest.approx([-4 * np.pi, 0.0])
 
 
 def test_obstacles_behind_the_start_and_beyond_the_end_are_not_passed():

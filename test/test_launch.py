@@ -48,25 +48,24 @@ class Recorded:
         self.given, self.named = given, named
 
 
-NAMES = {
-    'launch': ['LaunchContext', 'LaunchDescription'],
-    'launch.actions': ['DeclareLaunchArgument', 'IncludeLaunchDescription', 'OpaqueFunction'],
-    'launch.launch_description_sources': ['PythonLaunchDescriptionSource'],
-    'launch.substitutions': ['LaunchConfiguration'],
-    'launch_ros': [],
-    'launch_ros.actions': ['Node'],
-    'launch_ros.parameter_descriptions': ['ParameterValue'],
-}
+class Substitute(ModuleType):
+    """In place of a module of launch: every class of it is recorded."""
+
+    def __getattr__(self, name):
+        if name.startswith('__'):
+            raise AttributeError(name)
+        return type(name, (Recorded,), {})
+
+
+MODULES = [f'launch{part}' for part in ('', '.actions', '.launch_description_sources', '.substitutions')]
+MODULES += [f'launch_ros{part}' for part in ('', '.actions', '.parameter_descriptions')]
 
 
 @pytest.fixture
 def described(monkeypatch):
     """Return a function that runs a launch file with substitutes for launch, and returns its names and its description."""
-    for name, classes in NAMES.items():
-        module = ModuleType(name)
-        for each in classes:
-            setattr(module, each, type(each, (Recorded,), {}))
-        monkeypatch.setitem(sys.modules, name, module)
+    for name in MODULES:
+        monkeypatch.setitem(sys.modules, name, Substitute(name))
 
     def run(name):
         names = runpy.run_path(str(ROOT / 'launch' / f'{name}.launch.py'))
@@ -88,10 +87,8 @@ def test_every_input_and_only_known_parameters_are_arguments(described):
     (node,) = names['create_node'](context)
     assert (node.named['package'], node.named['executable']) == ('foc_ros', 'foc_node')
     (overrides,) = node.named['parameters']
-    assert {name: (each.given[0], each.named['value_type']) for name, each in overrides.items()} == {
-        'plane': ('xz', str),
-        'autostart': ('false', bool),
-    }
+    found = {name: (each.given[0], each.named['value_type']) for name, each in overrides.items()}
+    assert found == {'plane': ('xz', str), 'autostart': ('false', bool)}
 
 
 @pytest.mark.parametrize('name', ['two_arms', 'foc_rviz'])
@@ -173,13 +170,7 @@ def test_two_arms_share_the_obstacles(ros, prefix):
 
 CONFIG = ROOT / 'config'
 TOPICS = {f'/{name}': kind for name, kind in TYPES.items()} | {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()}
-SHOWN = {
-    'MarkerArray': 'MarkerArray',
-    'PointCloud2': 'PointCloud2',
-    'Path': 'Path',
-    'Pose': 'PoseStamped',
-    'PoseArray': 'PoseArray',
-}
+SHOWN = {name: name for name in ('MarkerArray', 'PointCloud2', 'Path', 'PoseArray')} | {'Pose': 'PoseStamped'}
 
 
 def test_rviz_shows_every_output_it_can_display():
@@ -216,20 +207,19 @@ def test_foxglove_shows_topics_of_the_node_in_its_panels():
 PERMISSIONS = ROOT / 'config' / 'sros2_policy.xml'
 
 
-def sparse(file, size):
-    with file.open('wb') as opened:
-        opened.truncate(size)
-    return file
-
-
-def test_a_document_larger_than_any_scene_is_refused(tmp_path):
-    with pytest.raises(RecordingError, match='expected at most 5,000,000 bytes'):
-        read_document(sparse(tmp_path / 'large.yaml', documents.MAX_BYTES + 1))
-
-
-def test_a_table_larger_than_any_recording_is_refused(tmp_path):
-    with pytest.raises(RecordingError, match='expected at most 1,000,000,000 bytes, got 1,000,000,001'):
-        next(tables.read_rows(sparse(tmp_path / 'large.csv', tables.MAX_BYTES + 1), ('t_s',)))
+@pytest.mark.parametrize(
+    ('read', 'size', 'words'),
+    [
+        (read_document, documents.MAX_BYTES, '5,000,000 bytes'),
+        (lambda file: next(tables.read_rows(file, ('t_s',))), tables.MAX_BYTES, '1,000,000,000 bytes, got 1,000,000,001'),
+    ],
+    ids=['document', 'table'],
+)
+def test_a_file_larger_than_any_scene_or_table_is_refused(tmp_path, read, size, words):
+    with (tmp_path / 'large').open('wb') as opened:
+        opened.truncate(size + 1)
+    with pytest.raises(RecordingError, match=f'expected at most {words}'):
+        read(tmp_path / 'large')
 
 
 def allowed(kind, action):

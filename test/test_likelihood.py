@@ -15,7 +15,6 @@ import foc_ros
 from foc_ros.core.classes.rows import Decisions, find_decisions
 from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.config import LikelihoodConfig
-from foc_ros.core.errors import InputError
 from foc_ros.core.likelihood import compute_likelihoods
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT, Status
@@ -42,12 +41,6 @@ def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs, beta):
     assert np.all(np.diff(p[np.argsort(costs, kind='stable')]) <= 0.0)
 
 
-@pytest.mark.parametrize('wrong', [-1.0, np.nan, np.inf])
-def test_a_negative_or_infinite_cost_is_refused_by_name(wrong):
-    with pytest.raises(InputError, match=r'costs\[1\]: expected a finite number >= 0'):
-        compute_likelihoods(np.array([1.0, wrong]), with_beta(0.5))
-
-
 THREE_COSTS = np.array([1.0, 2.0, 5.0])
 
 
@@ -62,19 +55,14 @@ def make_branch_times(after_s):
 @pytest.mark.parametrize('after_s', [0.0, 0.3, 2.0])
 def test_the_exponent_of_a_choice_fades_with_the_time_until_the_choice(after_s):
     fading = LikelihoodConfig(beta=2.0 * np.exp(-after_s / 0.7))
-    np.testing.assert_allclose(
-        compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(after_s)),
-        compute_likelihoods(THREE_COSTS, fading),
-        rtol=1e-12,
-    )
+    found = compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(after_s))
+    np.testing.assert_allclose(found, compute_likelihoods(THREE_COSTS, fading), rtol=1e-12)
 
 
 @pytest.mark.parametrize(('horizon_s', 'share'), [(1000.0, 0.0), (4.0, norm.cdf(-math.log(2.0) / 0.5)), (2.0, 0.5), (0.0, 1.0)])
 def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s, share):
-    planned, ahead = (
-        compute_likelihoods(THREE_COSTS, make_config(0.7)),
-        compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(1.0)),
-    )
+    planned = compute_likelihoods(THREE_COSTS, make_config(0.7))
+    ahead = compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(1.0))
     config = replace(make_config(0.7), planning_horizon_s=horizon_s)
     found = compute_likelihoods(THREE_COSTS, config, make_branch_times(1.0), time_s=2.0, planning_spread=0.5)
     np.testing.assert_allclose(found, (1.0 - share) * planned + share * ahead, rtol=1e-12)

@@ -11,19 +11,7 @@ import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import GetAvailableTransitions
 from message_helpers import SECOND, cloud, obstacle_table
-from node_helpers import (
-    OK,
-    QUICK,
-    ROWS,
-    TYPES,
-    WARN,
-    Bench,
-    begin,
-    figures,
-    hand_path,
-    list_labels,
-    stamps,
-)
+from node_helpers import OK, QUICK, ROWS, TYPES, WARN, Bench, begin, figures, hand_path, list_labels, stamps
 from ros_helpers import graph
 from std_srvs.srv import SetBool, Trigger
 

@@ -9,25 +9,12 @@ import ros_required  # noqa: F401
 import numpy as np
 import pytest
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
-from node_helpers import (
-    CROWD,
-    GOALS,
-    OK,
-    TYPES,
-    WARN,
-    Bench,
-    begin,
-    figures,
-    hand_path,
-    list_labels,
-    stamps,
-)
+from node_helpers import CROWD, GOALS, OK, TYPES, WARN, Bench, begin, figures, hand_path, list_labels, stamps
 from process_helpers import Player, ended, parameters, running
 from std_msgs.msg import Float64
 
-from foc_ros.ros import health, node
+from foc_ros.ros import health
 from foc_ros.ros.endpoints import MOST_GOAL_TOPICS
-from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 
 def test_nothing_is_predicted_before_all_inputs_are_received_and_diagnostics_report_it(ros):
@@ -75,14 +62,6 @@ def test_a_looping_bag_restarts_the_movement(ros):
     bench.move(hand_path(9, rate_hz=10.0)[8:])
     status = bench.health()
     assert status.level == OK, status.message
-
-
-def test_only_subscribed_outputs_are_encoded(ros, monkeypatch):
-    asked: list[list[str]] = []
-    monkeypatch.setattr(node, 'encode_outputs', lambda *args: asked.append(list(args[-1])) or encode_outputs(*args))
-    bench = begin(ros, 1, outputs=['likelihoods'])
-    bench.wait_for('likelihoods', 1)
-    assert asked == [['likelihoods']]
 
 
 def test_diagnostics_contain_rates_ages_times_and_candidates(ros):

@@ -49,10 +49,7 @@ def client():
 
 @pytest.mark.parametrize(
     ('command', 'number'),
-    [
-        ([sys.executable, '-m', 'foc_ros', 'node'], signal.SIGINT),
-        ([entry_point('foc_node')], signal.SIGTERM),
-    ],
+    [([sys.executable, '-m', 'foc_ros', 'node'], signal.SIGINT), ([entry_point('foc_node')], signal.SIGTERM)],
     ids=['command', 'entry point'],
 )
 def test_a_working_node_stops_without_an_error(ros, command, number):
@@ -100,32 +97,28 @@ def test_a_starting_node_stops_without_an_error_at_any_moment(ros):
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        (['--ros-args', '-p', 'foc.eta:=2.0'], 'foc_node: foc.eta: expected a number in [0, 0.999], got 2.0\n'),
-        (['--ros-args', '-p', 'rate_hz:=fast'], "foc_node: rate_hz: expected a finite number in [0.1, 1000] Hz, got 'fast'\n"),
-        (['--ros-args', '-p', 'autostart:=maybe'], "foc_node: autostart: expected true or false, got 'maybe'\n"),
-        (['--ros-args', '--params-file', '/nowhere/at/all.yaml'], '/nowhere/at/all.yaml'),
-        (['--ros-args', '-p', 'qos_overrides./obstacles.subscription.durability:=eternal'], 'eternal'),
-        (['--ros-args', '-p', 'homotopy.library:=/nowhere/ways.json'], 'foc_node: /nowhere/ways.json: cannot be read'),
-        (['--ros-args', '--no-such-option'], 'no-such-option'),
-        (['--ros-args', '-p', 'qqq:=1'], 'foc_node: qqq: expected a known parameter, got 1\n'),
-        (
-            ['--ros-args', '-p', 'foc.etta:=0.5'],
-            'foc_node: foc.etta: expected a known parameter (did you mean foc.eta?), got 0.5\n',
-        ),
-        (['--fast'], 'foc_node: unrecognized arguments: --fast (those of ROS follow --ros-args)\n'),
+        ('--ros-args -p foc.eta:=2.0', 'foc_node: foc.eta: expected a number in [0, 0.999], got 2.0\n'),
+        ('--ros-args -p rate_hz:=fast', "foc_node: rate_hz: expected a finite number in [0.1, 1000] Hz, got 'fast'\n"),
+        ('--ros-args -p autostart:=maybe', "foc_node: autostart: expected true or false, got 'maybe'\n"),
+        ('--ros-args --params-file /nowhere/at/all.yaml', '/nowhere/at/all.yaml'),
+        ('--ros-args -p qos_overrides./obstacles.subscription.durability:=eternal', 'eternal'),
+        ('--ros-args -p homotopy.library:=/nowhere/ways.json', 'foc_node: /nowhere/ways.json: cannot be read'),
+        ('--ros-args --no-such-option', 'no-such-option'),
+        ('--ros-args -p qqq:=1', 'foc_node: qqq: expected a known parameter, got 1\n'),
+        ('--ros-args -p foc.etta:=0.5', 'foc_node: foc.etta: expected a known parameter (did you mean foc.eta?), got 0.5\n'),
+        ('--fast', 'foc_node: unrecognized arguments: --fast (those of ROS follow --ros-args)\n'),
     ],
 )
 def test_a_node_that_cannot_start_prints_the_reason_in_one_line(capfd, monkeypatch, arguments, words):
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     with reserve_domain() as domain:
         monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
-        assert main(arguments) == 2
+        assert main(arguments.split()) == 2
     for number, handler in handlers.items():
         signal.signal(number, handler)
     errors = capfd.readouterr().err
     assert len([line for line in errors.splitlines() if line.startswith('foc_node: ')]) == 1
-    assert words in errors
-    assert 'Traceback' not in errors
+    assert words in errors and 'Traceback' not in errors
 
 
 def test_a_request_that_rclpy_cannot_handle_does_not_end_the_node(client):
@@ -167,12 +160,8 @@ def test_the_state_is_changed_and_every_topic_is_received(client):
         assert client.ask(ChangeState, 'change_state', ChangeState.Request(transition=Transition(label=label))).success
         return str(client.ask(GetState, 'get_state', GetState.Request()).current_state.label)
 
-    assert [change(each) for each in ('deactivate', 'cleanup', 'configure', 'activate')] == [
-        'inactive',
-        'unconfigured',
-        'inactive',
-        'active',
-    ]
+    states = {'deactivate': 'inactive', 'cleanup': 'unconfigured', 'configure': 'inactive', 'activate': 'active'}
+    assert {each: change(each) for each in states} == states
     Player(client.graph).play_until(lambda: all(received.values()), f'a message on each of {", ".join(kinds)}')
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Extreme scenes and faults of a robot cell: the outputs of a running node and the level of its diagnostics."""
+"""Extreme scenes and faults of a robot cell in a running node; and that it publishes what a replay predicts, to the last bit."""
 
 import math
 import resource
@@ -14,26 +14,19 @@ from typing import Any
 import ros_required  # noqa: F401
 import numpy as np
 import pytest
-from bag_helpers import write_bag, write_parameters
-from message_helpers import SECOND, marker, marker_array, pose_array, pose_stamped
-from node_helpers import (
-    CROWD,
-    GOALS,
-    OK,
-    ROWS,
-    TYPES,
-    WARN,
-    Bench,
-    begin,
-    figures,
-    hand_path,
-    list_labels,
-    stamps,
-)
+from bag_helpers import CONFIG, messages, write_bag, write_parameters
+from bag_helpers import TYPES as BAG_TYPES
+from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
+from node_helpers import CROWD, GOALS, OK, ROWS, TYPES, WARN, Bench, begin, figures, hand_path, list_labels, stamps
+from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 
-from foc_ros.core.config import Config
+from foc_ros.analysis.replay import Replay
+from foc_ros.core.classes.library import is_same_recording
+from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.solution import Status
+from foc_ros.io.bags import BagReader
+from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 ROOT = Path(__file__).parents[1]
 TAKING_PART = tuple(f'{status.value}, likelihood ' for status in Status if status.has_likelihood)
@@ -93,22 +86,6 @@ def test_the_outputs_and_the_level_of_an_extreme_scene(ros, name):
     assert len([value for value in told if value.startswith(TAKING_PART)]) == count
     solved = [value for value in told if value.startswith('solved')]
     assert (rows[:, 3] >= bench.node.pipeline.config.foc.eta - 1e-5).sum() >= len(solved)
-
-
-def test_hand_poses_are_taken_during_a_flood_of_obstacles(ros):
-    """Three messages of many markers for each pose: every pose is received, and predictions continue."""
-    kept = enumerate(CROWD[:400])
-    flood = marker_array(TYPES, *[marker(TYPES, row[:3], (0.008,) * 3, id=i, stamp_ns=10 * SECOND) for i, row in kept])
-    bench, poses = begin(ros), hand_path(10)
-    for pose in poses:
-        for _ in range(3):
-            bench.publishers['obstacle_markers'].publish(flood)
-        bench.deliver('hand_pose', pose)
-    assert len(bench.wait_for('prediction', 5)) == 5
-    status = bench.health()
-    values = figures(status)
-    assert (status.level, values['hand_pose refused']) == (OK, '0 of 10')
-    assert int(values['note culled']) > 300
 
 
 def test_goals_and_frames_that_change_with_every_pose(ros):
@@ -172,23 +149,26 @@ def test_several_nodes_of_one_process_are_independent(ros):
 
 def test_a_disk_that_is_full_ends_the_output_bag_in_one_line(tmp_path):
     bag = write_bag(tmp_path / 'reach')
-    command = [sys.executable, '-m', 'foc_ros', 'replay', str(bag), '--output', str(tmp_path / 'out')]
-    result = subprocess.run(
-        [*command, '--params', write_parameters(tmp_path)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-        # writes beyond this limit fail like those to a full disk
-        preexec_fn=lambda: (
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN),
-            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
-        ),
-    )
-    assert result.returncode == 2
-    assert len(result.stderr.strip().splitlines()) == 1
-    assert 'cannot be written' in result.stderr
+
+    def limit_files():
+        """Let writes beyond a limit fail like those to a full disk."""
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    command = [
+        sys.executable,
+        '-m',
+        'foc_ros',
+        'replay',
+        bag,
+        '--output',
+        tmp_path / 'out',
+        '--params',
+        write_parameters(tmp_path),
+    ]
+    pipes = {'capture_output': True, 'text': True, 'timeout': 100, 'check': False}
+    result = subprocess.run(command, cwd=ROOT, preexec_fn=limit_files, **pipes)
+    assert result.returncode == 2 and result.stderr.strip().count('\n') == 0 and 'cannot be written' in result.stderr
     assert not (tmp_path / 'out').exists()
 
 
@@ -204,3 +184,65 @@ def test_the_node_keeps_its_promises_in_a_hostile_scene(ros, monkeypatch, name, 
     assert row['made'] > 0
     assert row['age [s]'] <= Config().estimator.hand_timeout_s, 'of a published prediction'
     assert row['answer [s]'] < row['gap [s]'], 'a service is answered between two diagnostics'
+
+
+SECONDS = 0.2
+LV = replace_values(Config(), {'foc.eta': 0.3, 'foc.steps': 20, 'foc.noise_x': 0.02, 'foc.noise_y': 0.02})
+LEARNING = {'experience.learning': 'online', 'rate_hz': 10.0, 'foc.steps': 20, 'homotopy.max_candidates': 2}
+NO_LIMITS = {'scene.timeout_s': 0.0, 'estimator.hand_timeout_s': 0.0, 'budget_s': 0.0}
+
+
+def messages_in_space():
+    """Return a reach that goes down to a goal, over a low obstacle and past one of any height."""
+    columns = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'size_z')]
+    scene = obstacle_table([(0.15, 0.0, 0.02, 0.03, 0.04), (0.2, 0.02, 0.0, 0.02, 0.0)], columns)
+    found = []
+    for topic, stamp_ns, message in messages(SECONDS):
+        if topic == '/obstacles':
+            message = cloud(BAG_TYPES, scene, stamp_ns)
+        elif topic == '/goals':
+            message = pose_array(BAG_TYPES, [(0.3, 0.0, 0.2)])
+        else:
+            message.pose.position.z = 0.4 - 0.5 * message.pose.position.x
+        found.append((topic, stamp_ns, message))
+    return found
+
+
+REPLAY_CASES = {
+    'lv': (LV, lambda: messages(SECONDS)),
+    'heights': (CONFIG, messages_in_space),
+    '1 kHz': (CONFIG, lambda: messages(0.1, rate_hz=1000.0)),
+    'learning': (replace_values(Config(), LEARNING), lambda: messages(1.0)),
+}
+"""Parameters, and the messages of a recording."""
+
+
+def sent(message):
+    """Return the message after serialisation, with its float32 fields rounded."""
+    return deserialize_message(serialize_message(message), type(message))
+
+
+@pytest.mark.parametrize('case', REPLAY_CASES)
+def test_the_node_publishes_what_replay_computes(ros, tmp_path, case):
+    config, make_messages = REPLAY_CASES[case]
+    config = replace_values(config, NO_LIMITS)
+    bench, replay, expected = Bench(ros, **flatten(config)), Replay(config), []
+    with BagReader(write_bag(tmp_path / 'reach', make_messages())) as reader:
+        for step in replay.steps(reader):
+            bench.deliver(step.item.role, bytes(step.item.raw))
+            if step.prediction is not None:
+                expected.append(encode_outputs(step.prediction, 'xy', TYPES))
+    count = len(expected)
+    assert count > 3
+    assert max(each['prediction'].width for each in expected) == 2 * (config.foc.steps + 1)
+    for name in ('prediction', 'path', 'markers'):
+        assert bench.wait_for(name, count) == [sent(each[name]) for each in expected]
+    for received, each in zip(bench.wait_for('likelihoods', count), expected, strict=True):
+        assert received.layout == sent(each['likelihoods']).layout
+        assert np.array_equal(received.data, each['likelihoods'].data, equal_nan=True)  # of shares without a candidate
+    skipped = figures(bench.health()).get('count hand_skipped', '0')
+    assert skipped == str(replay.intake.counts.get('hand_skipped', 0))
+    assert (skipped != '0') == (case == '1 kHz')
+    live, learnt = (each.learnt.movements.finish().learnt for each in (bench.node.pipeline, replay.pipeline))
+    assert (len(live) > 0) == (case == 'learning')
+    assert all(is_same_recording(*each) for each in zip(live, learnt, strict=True))

@@ -12,12 +12,10 @@ from bag_helpers import FRAME, START_NS, TYPES, write_bag
 import foc_ros
 from foc_ros.analysis.replay import Replay
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.topics import CLOUD, GOALS, HAND
-from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 
 CONFIG = replace_values(
@@ -94,20 +92,6 @@ def test_the_library_predicts_what_a_replay_does(bag, replayed):
     assert refused == ['position']
     assert [strip(each) for each in made] == [strip(each) for each in replayed[0]]
     assert predictor.adapted_config.duration == replayed[1].adapted_config.duration
-
-
-def test_the_intake_of_the_node_predicts_what_a_replay_does(bag, replayed):
-    intake, made = Intake(Pipeline(replace_values(CONFIG, {'scene.timeout_s': 0.0}))), []
-    with BagReader(bag) as reader:
-        for item in reader:
-            intake.take(item.role, item.message)
-            if intake.pipeline.is_due:
-                made.append(intake.pipeline.predict())
-                state = intake.pipeline.hand_state
-                assert state is not None
-                apart = [np.hypot(*(each.mean[0, :2] - state.mean[:2])) for each in made[-1].candidates]
-                assert max(apart) < 1e-3, 'every path begins at the hand'
-    assert [strip(each) for each in made] == [strip(each) for each in replayed[0]]
 
 
 def test_the_page_predicts_what_a_replay_does(bag, replayed):

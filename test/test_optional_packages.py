@@ -12,7 +12,6 @@ import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-import pytest
 import ros_helpers
 
 ROOT = Path(__file__).parents[1]
@@ -140,15 +139,14 @@ sys.exit(main(arguments))
     assert json.loads(result.stdout)['summary']['predictions'] >= 10
 
 
-@pytest.mark.parametrize('name', ['foc_node', 'node'])
-def test_the_node_predicts_without_them(ros, tmp_path, monkeypatch, name):
+def test_the_node_predicts_without_them(ros, tmp_path, monkeypatch):
     """Started as by `ros2 run` and `ros2 launch`, by a file in `lib/foc_ros`."""
     ros_helpers.require_ros()
     from process_helpers import ended, predict_once, running
 
     (tmp_path / 'sitecustomize.py').write_text(BLOCK.format(names=OPTIONAL))
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join([str(tmp_path), str(ROOT)]), prepend=os.pathsep)
-    command = [sys.executable, str(ROOT / 'scripts' / 'ros2_run' / name)]
+    command = [sys.executable, str(ROOT / 'scripts' / 'ros2_run' / 'foc_node')]
     with running(ros, command=command) as process:
         player = predict_once(ros)
         code, errors = ended(process, signal.SIGINT)

@@ -25,29 +25,43 @@ from foc_ros.ros.intake import Intake
 
 CONFIG = replace_values(Config(), {'estimator.position_stddev': 1e-4})
 FAR_GOAL = np.array([[0.4, 0.0]])
-STEP_NS = NANOSECONDS // 50
+STEP_S = 0.01
+STRAIGHT = np.array([[0.0, 0.0], [0.4, 0.0]])
+ABOVE, BELOW = bow(0.03), bow(-0.03)
+TURNS = [0.1, 0.0] - 0.2 * np.column_stack([each(np.pi * np.linspace(0.0, 11.0, 400)) for each in (np.cos, np.sin)])
+"""A circle through the goal, around which a path goes five and a half times."""
 
 
-def reach(duration_s, distance=0.4):
-    """Return positions at 50 Hz of a minimum-jerk reach along x, at rest for 0.6 s before and after."""
-    s = np.clip((np.arange(0.0, duration_s + 1.2, 0.02) - 0.6) / duration_s, 0.0, 1.0)
-    return np.outer(distance * (10 * s**3 - 15 * s**4 + 6 * s**5), [1.0, 0.0])
+def move_along(path, seconds=1.5, rest_s=0.4, after_s=0.4):
+    """Return positions at 100 Hz of a minimum-jerk movement along a path, at rest before and after."""
+    s = np.clip((np.arange(0.0, seconds + rest_s + after_s, STEP_S) - rest_s) / seconds, 0.0, 1.0)
+    along, at = 10 * s**3 - 15 * s**4 + 6 * s**5, np.linspace(0.0, 1.0, len(path))
+    return np.column_stack([np.interp(along, at, axis) for axis in path.T])
 
 
-def follow(pipeline, *movements, goal=FAR_GOAL):
-    """Pass movements, and back to the start in between by a jump of time, to a pipeline."""
+def reach(duration_s):
+    return move_along(STRAIGHT, duration_s, 0.6, 0.6)
+
+
+def follow(pipeline, *movements, goals=FAR_GOAL, obstacles=None, is_predicting=False):
+    """Pass movements to a pipeline, with a jump of time before each; return the predictions."""
+    made = []
     for positions in movements:
-        pipeline.set_goals(goal, 'world')
+        if obstacles is not None:
+            pipeline.set_obstacles('cloud', obstacles, None, 'world')
+        pipeline.set_goals(goals, 'world')
         start_ns = (0 if pipeline.hand_state is None else pipeline.hand_state.stamp_ns) + 2 * NANOSECONDS
         for row, position in enumerate(positions):
-            pipeline.add_hand_sample(HandSample(start_ns + row * STEP_NS, position, 0.0, 'world'))
-    return pipeline
+            pipeline.add_hand_sample(HandSample(start_ns + round(row * STEP_S * NANOSECONDS), position, 0.0, 'world'))
+            if is_predicting and pipeline.is_due:
+                made.append(pipeline.predict())
+    return made
 
 
 @pytest.mark.parametrize('factor', [0.6, 1.0, 2.0, 3.0])
 def test_the_factor_approaches_that_of_the_operator(factor):
-    duration_s = factor * compute_movement_time(0.4, CONFIG.duration)
-    pipeline = follow(Pipeline(CONFIG), *[reach(duration_s)] * 3)
+    pipeline, duration_s = Pipeline(CONFIG), factor * compute_movement_time(0.4, CONFIG.duration)
+    follow(pipeline, *[reach(duration_s)] * 3)
     assert pipeline.learnt.pace.movements >= 2
     arrival, found = pipeline.learnt.pace.find_best(CONFIG.duration)
     assert arrival == 'rest' and found == pytest.approx(factor, rel=0.3)
@@ -56,37 +70,37 @@ def test_the_factor_approaches_that_of_the_operator(factor):
 
 def test_an_operator_who_passes_the_goals_is_recognised():
     """The hand crosses the goal at the constant speed with which it came, and stops beyond it."""
-    there = np.arange(0.0, 0.4, 0.02 * 0.2)
-    beyond = 0.4 + 0.2 * 0.05 * (1.0 - np.exp(-np.arange(0.0, 0.5, 0.02) / 0.05))
-    movement = np.outer(np.concatenate([np.zeros(30), there, beyond]), [1.0, 0.0])
-    pipeline = follow(Pipeline(CONFIG), *[movement] * 3)
+    there = np.arange(0.0, 0.4, 0.2 * STEP_S)
+    beyond = 0.4 + 0.2 * 0.05 * (1.0 - np.exp(-np.arange(0.0, 0.5, STEP_S) / 0.05))
+    pipeline, movement = Pipeline(CONFIG), np.outer(np.concatenate([np.zeros(60), there, beyond]), [1.0, 0.0])
+    follow(pipeline, *[movement] * 3)
     assert pipeline.learnt.pace.movements >= 2 and pipeline.learnt.pace.find_best(CONFIG.duration)[0] == 'passing'
     assert pipeline.adapted_config.duration.arrival == 'passing'
 
 
-def test_without_a_movement_nothing_changes():
-    pipeline = follow(Pipeline(CONFIG), np.zeros((100, 2)))
+def test_without_a_movement_nothing_changes_and_it_can_be_switched_off():
+    pipeline = Pipeline(CONFIG)
+    follow(pipeline, np.zeros((200, 2)))
     assert pipeline.learnt.pace.movements == 0 and pipeline.learnt.pace.find_best(CONFIG.duration) == ('rest', 1.0)
     assert pipeline.adapted_config is CONFIG
+    off = Pipeline(replace_values(CONFIG, {'duration.adaptation': 'none'}))
+    follow(off, reach(4.0), reach(4.0))
+    assert off.learnt.pace.movements == 0
 
 
-def test_equal_samples_give_equal_factors_and_a_reset_forgets_them():
-    one, other = (follow(Pipeline(CONFIG), reach(4.0), reach(3.5), reach(4.2)) for _ in range(2))
+def test_equal_samples_give_equal_factors_and_a_reset_and_new_durations_forget_them():
+    one, other = Pipeline(CONFIG), Pipeline(CONFIG)
+    for pipeline in (one, other):
+        follow(pipeline, reach(4.0), reach(3.5), reach(4.2))
     np.testing.assert_array_equal(one.learnt.pace.losses, other.learnt.pace.losses)
     assert one.learnt.pace.movements > 0
     one.reset()
     assert one.learnt.pace.movements == 0 and one.adapted_config is CONFIG
     np.testing.assert_array_equal(one.learnt.pace.losses, Pace().losses)
-
-
-def test_it_can_be_switched_off_and_new_durations_begin_anew():
-    off = replace_values(CONFIG, {'duration.adaptation': 'none'})
-    assert follow(Pipeline(off), reach(4.0), reach(4.0)).learnt.pace.movements == 0
-    pipeline = follow(Pipeline(CONFIG), reach(4.0), reach(4.0))
-    pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
-    assert pipeline.learnt.pace.movements > 0
-    pipeline.reconfigure(pipeline.adapted_config)
-    assert pipeline.learnt.pace.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
+    other.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
+    assert other.learnt.pace.movements > 0
+    other.reconfigure(other.adapted_config)
+    assert other.learnt.pace.movements == 0 and other.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
 
 
 STDDEV = 0.02
@@ -130,25 +144,18 @@ def test_the_factor_of_gaussian_errors_is_recovered(factor, ahead_s, duration_s,
         assert near == pytest.approx(1.0, abs=0.1)
 
 
-def reach_around(pipeline, start_s, until_s=1.6):
-    """Pass a reach_around around an obstacle through a pipeline that predicts; return the predictions."""
-    pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03, 0.001), int(start_s * NANOSECONDS), 'world')
-    pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
-    made = []
-    for t in np.arange(0.0, until_s, 0.05):
-        s = np.clip((t - 0.3) / 0.8, 0.0, 1.0)
-        x = 0.3 * (10 * s**3 - 15 * s**4 + 6 * s**5)
-        stamp_ns = int((start_s + t) * NANOSECONDS)
-        pipeline.add_hand_sample(HandSample(stamp_ns, np.array([x, 0.06 * np.sin(np.pi * x / 0.3)]), 0.0, 'world'))
-        prediction = pipeline.predict() if pipeline.is_due else None
-        made += [prediction] if prediction is not None else []
-    return made
+AROUND = move_along(np.column_stack([x := np.linspace(0.0, 0.3, 101), 0.06 * np.sin(np.pi * x / 0.3)]), 0.8, 0.3, 0.5)
+
+
+def reach_around(pipeline):
+    """Pass a reach around an obstacle through a pipeline that predicts; return the predictions."""
+    return follow(pipeline, AROUND, goals=GOAL, obstacles=make_obstacles([[0.15, 0.0]], 0.03, 0.001), is_predicting=True)
 
 
 def test_factors_scale_the_covariance_and_nothing_else():
     off = {'covariance.adaptation': 'none'}
-    plain = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off)), 1.0)
-    scaled = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off | {'covariance.near': 2.0, 'covariance.far': 2.0})), 1.0)
+    plain = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off)))
+    scaled = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off | {'covariance.near': 2.0, 'covariance.far': 2.0})))
     assert len(plain) == len(scaled) > 10
     at_rest = list[bool]()
     for one, other in zip(plain, scaled, strict=True):
@@ -163,54 +170,34 @@ def test_factors_scale_the_covariance_and_nothing_else():
 
 
 def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off():
-    pipeline = Pipeline(DISPERSION_CONFIG)
-    reach_around(pipeline, 1.0)
-    assert (
-        pipeline.adapted_config.covariance
-        == pipeline.learnt.dispersion.adapt(DISPERSION_CONFIG.covariance)
-        != DISPERSION_CONFIG.covariance
-    )
+    pipeline, given = Pipeline(DISPERSION_CONFIG), DISPERSION_CONFIG.covariance
+    reach_around(pipeline)
+    assert pipeline.adapted_config.covariance == pipeline.learnt.dispersion.adapt(given) != given
     pipeline.reconfigure(replace_values(DISPERSION_CONFIG, {'rate_hz': 20.0}))
     assert pipeline.learnt.dispersion.errors > 0
     pipeline.reconfigure(replace_values(DISPERSION_CONFIG, {'foc.endpoint_stddev': 0.1}))
     assert pipeline.learnt.dispersion.errors == 0
-    reach_around(pipeline, 11.0)
+    reach_around(pipeline)
     pipeline.reset()
-    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config.covariance == DISPERSION_CONFIG.covariance
-    off = replace_values(DISPERSION_CONFIG, {'covariance.adaptation': 'none'})
-    pipeline = Pipeline(off)
-    reach_around(pipeline, 1.0)
-    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config is off
+    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config.covariance == given
+    pipeline = Pipeline(replace_values(DISPERSION_CONFIG, {'covariance.adaptation': 'none'}))
+    reach_around(pipeline)
+    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config is pipeline.config
 
 
 MOVEMENT_CONFIG = Config().with_values(
     {'experience.learning': 'online', 'rate_hz': 4.0, 'foc.steps': 20, 'estimator.position_stddev': 1e-4}
 )
-STEP_S = 0.01
-ABOVE, BELOW = bow(0.03), bow(-0.03)
-TURNS = [0.1, 0.0] - 0.2 * np.column_stack([each(np.pi * np.linspace(0.0, 11.0, 400)) for each in (np.cos, np.sin)])
-"""A circle through the goal, around which a path goes five and a half times."""
 
 
-def move_along(path, seconds=1.5, rest_s=0.4, after_s=0.4):
-    """Return positions at 100 Hz of a minimum-jerk movement along a path, at rest before and after."""
-    s = np.clip((np.arange(0.0, seconds + rest_s + after_s, STEP_S) - rest_s) / seconds, 0.0, 1.0)
-    along, at = 10 * s**3 - 15 * s**4 + 6 * s**5, np.linspace(0.0, 1.0, len(path))
-    return np.column_stack([np.interp(along, at, axis) for axis in path.T])
+def learn(*movements, goals=GOAL, library=(), is_predicting=False, **values):
+    """Return a pipeline that has followed movements past obstacles, and what it predicted."""
+    pipeline = Pipeline(MOVEMENT_CONFIG.with_values(values), library)
+    return pipeline, follow(pipeline, *movements, goals=goals, obstacles=OBSTACLES, is_predicting=is_predicting)
 
 
-def follow_paths(pipeline, *paths, goals=GOAL, is_predicting=False):
-    """Pass movements to a pipeline, with a gap in time before each; return the predictions."""
-    predictions = []
-    for positions in paths:
-        pipeline.set_obstacles('cloud', OBSTACLES, None, 'world')
-        pipeline.set_goals(goals, 'world')
-        start_ns = (0 if pipeline.hand_state is None else pipeline.hand_state.stamp_ns) + 2 * NANOSECONDS
-        for row, position in enumerate(positions):
-            pipeline.add_hand_sample(HandSample(start_ns + round(row * STEP_S * NANOSECONDS), position, 0.0, 'world'))
-            if is_predicting and pipeline.is_due:
-                predictions.append(pipeline.predict())
-    return predictions
+def list_learnt(*movements, **options):
+    return learn(*movements, **options)[0].learnt.movements.learnt
 
 
 def likelihood_above(prediction):
@@ -222,24 +209,20 @@ def test_a_repeated_way_becomes_more_likely():
     first, last = [], []
     for learning_ in ('none', 'online'):
         values = {'experience.learning': learning_, 'likelihood.other_goal': 0.0, 'rate_hz': 1.0}
-        pipeline = Pipeline(MOVEMENT_CONFIG.with_values(values))
-        predicted = follow_paths(pipeline, *ways, is_predicting=True)
-        of_each = len(predicted) // len(ways)
+        _, predicted = learn(*ways, is_predicting=True, **values)
         first.append(likelihood_above(predicted[0]))
-        last.append(likelihood_above(predicted[3 * of_each]))
+        last.append(likelihood_above(predicted[3 * (len(predicted) // len(ways))]))
     assert first[0] == first[1], 'nothing is known before the first movement'
-    prior = PRIOR_COUNT
-    assert last[1] == pytest.approx((prior * last[0] + 3.0) / (prior + 3.0), abs=0.02)
+    assert last[1] == pytest.approx((PRIOR_COUNT * last[0] + 3.0) / (PRIOR_COUNT + 3.0), abs=0.02)
+
+
+REST = np.zeros((2, 2))
 
 
 def test_a_movement_is_learnt_when_it_has_ended():
-    pipeline, path = Pipeline(MOVEMENT_CONFIG), move_along(ABOVE, after_s=2.0)
-    ended = round((0.4 + 1.5) / STEP_S)
-    follow_paths(pipeline, path[:ended])
-    assert not pipeline.learnt.movements.learnt
-    pipeline = Pipeline(MOVEMENT_CONFIG)
-    follow_paths(pipeline, path)
-    (found,) = pipeline.learnt.movements.learnt
+    path = move_along(ABOVE, after_s=2.0)
+    assert not list_learnt(path[: round((0.4 + 1.5) / STEP_S)])
+    (found,) = list_learnt(path)
     assert found.states is not None
     around = np.hypot(*(found.states[-1, :2] - GOAL[0])), np.hypot(*found.states[0, :2])
     assert max(around) < 0.005
@@ -249,14 +232,10 @@ def test_a_movement_is_learnt_when_it_has_ended():
 def test_a_rest_on_the_way_is_part_of_a_movement_and_one_at_a_goal_ends_it():
     halfway = ABOVE[: len(ABOVE) // 2 + 1]
     paused = np.concatenate([move_along(halfway, after_s=0.1), move_along(ABOVE[len(ABOVE) // 2 :], rest_s=0.1)[1:]])
-    pipeline = Pipeline(MOVEMENT_CONFIG)
-    follow_paths(pipeline, paused, paused[:2])
-    (found,) = pipeline.learnt.movements.learnt
+    (found,) = list_learnt(paused, REST)
     assert np.hypot(*found.path[0]) < 0.01
     there_and_back = np.concatenate([move_along(ABOVE), move_along(ABOVE[::-1])[1:]])
-    pipeline = Pipeline(MOVEMENT_CONFIG)
-    follow_paths(pipeline, there_and_back, paused[:2], goals=np.array([[0.3, 0.0], [0.0, 0.0]]))
-    there, back = pipeline.learnt.movements.learnt
+    there, back = list_learnt(there_and_back, REST, goals=np.array([[0.3, 0.0], [0.0, 0.0]]))
     assert np.hypot(*(there.path[-1] - [0.3, 0.0])) == 0.0 and np.hypot(*back.path[-1]) == 0.0
     assert there.sides == tuple(-side for side in back.sides)
 
@@ -272,18 +251,15 @@ def test_a_rest_on_the_way_is_part_of_a_movement_and_one_at_a_goal_ends_it():
     ids=['no goal reached', 'short', 'long', 'no goals'],
 )
 def test_what_is_no_demonstration_is_refused(path, goals, reason):
-    pipeline = Pipeline(MOVEMENT_CONFIG)
-    follow_paths(pipeline, path, goals=goals)
-    movements = pipeline.learnt.movements.finish()
+    movements = learn(path, goals=goals)[0].learnt.movements.finish()
     assert not movements.learnt and movements.refused == 1 and reason in movements.refusal
     assert len(movements.states) <= MOST_STATES
 
 
 def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library():
-    given = follow_one(ABOVE)
+    (given,) = list_learnt(move_along(ABOVE), REST)
     for forget in (Pipeline.reset, lambda each: each.reconfigure(MOVEMENT_CONFIG.with_values({'estimator.jerk_density': 3.0}))):
-        pipeline = Pipeline(MOVEMENT_CONFIG, [given])
-        follow_paths(pipeline, move_along(BELOW), np.zeros((2, 2)))
+        pipeline, _ = learn(move_along(BELOW), REST, library=[given])
         assert len(pipeline.learnt.movements.learnt) == 1 and len(pipeline._library.recordings) == 2
         pipeline.reconfigure(MOVEMENT_CONFIG.with_values({'rate_hz': 5.0, 'likelihood.beta': 3.0}))
         assert len(pipeline.learnt.movements.learnt) == 1
@@ -291,14 +267,7 @@ def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library(
         assert not pipeline.learnt.movements.learnt and pipeline._library.recordings == (given,)
 
 
-def follow_one(path):
-    pipeline = Pipeline(MOVEMENT_CONFIG)
-    follow_paths(pipeline, move_along(path), np.zeros((2, 2)))
-    return pipeline.learnt.movements.learnt[0]
-
-
 def test_the_diagnostics_count_movements():
-    intake = Intake(Pipeline(MOVEMENT_CONFIG))
-    follow_paths(intake.pipeline, move_along(ABOVE), move_along(0.7 * BELOW), np.zeros((2, 2)))
-    health = Monitor(intake, Freshness(), 0.0).report(1.0, 'active', None, 0.0, [])
+    pipeline, _ = learn(move_along(ABOVE), move_along(0.7 * BELOW), REST)
+    health = Monitor(Intake(pipeline), Freshness(), 0.0).report(1.0, 'active', None, 0.0, [])
     assert any('1 movements recorded, 1 refused' in value for value in health.values.values())

@@ -109,16 +109,6 @@ def test_ros2_run_starts_the_command(script, monkeypatch, capsys):
     assert f'Usage: foc_ros {script.name.replace("foc_node", "node")}' in capsys.readouterr().out
 
 
-def test_ros2_run_starts_a_script_without_the_working_directory(tmp_path):
-    """Run one of the scripts as `ros2 run` does: in a process of its own, from any directory."""
-    paths = os.pathsep.join([str(Path(foc_ros.__file__).parents[1]), *filter(None, [os.environ.get('PYTHONPATH')])])
-    command = [sys.executable, ROOT / 'scripts' / 'ros2_run' / 'solve', '--help']
-    environment = os.environ | {'PYTHONPATH': paths}
-    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=100, check=False)
-    assert result.returncode == 0, result.stderr
-    assert ' solve ' in result.stdout
-
-
 def test_an_executable_runs_in_the_python_of_its_environment(tmp_path):
     """`lib/foc_ros` of a virtual environment that is not activated; without a Python in the environment, that of the PATH."""
     script, interpreter = tmp_path / 'lib' / 'foc_ros' / 'foc_node', tmp_path / 'bin' / 'python3'
@@ -146,10 +136,6 @@ def test_no_file_contains_a_path_of_one_machine():
 PIXI = tomllib.loads((ROOT / 'pixi.toml').read_text('utf-8'))
 CONDA = {'matplotlib-base': 'matplotlib'}
 """Packages whose names on conda-forge differ."""
-
-
-def read_yaml(name):
-    return yaml.safe_load((ROOT / name).read_text('utf-8'))
 
 
 def test_pixi_names_the_package_and_installs_what_package_xml_and_setup_py_name(package_xml):
@@ -211,44 +197,35 @@ def write_program(file, text):
     return file
 
 
-@needs_make
-def test_a_python_that_is_not_there_is_named(clone):
-    result = make(clone, 'setup', 'PYTHON=no_such_python')
-    assert result.returncode != 0
-    assert 'make: there is no no_such_python; choose another, as in make setup PYTHON=python3.12\n' in result.stderr
-    assert not (clone / '.venv').exists()
+SHIM = 'is a shim of pyenv, and no active version has it; activate one that has: pyenv shell 3.99.1'
 
 
 @needs_make
-def test_an_inactive_shim_of_pyenv_is_named_with_what_to_do(clone, tmp_path):
-    shim = write_program(tmp_path / 'shims' / 'python3.99', 'exit 127')
+@pytest.mark.parametrize(
+    ('name', 'program', 'words'),
+    [
+        ('no_such_python', None, 'there is no no_such_python; choose another, as in make setup PYTHON=python3.12\n'),
+        ('python3.99', 'exit 127', f'python3.99 {SHIM}\n'),
+        (
+            'python3',
+            'case "$*" in *version_info*) exit 1;; -V) echo Python 3.10.2;; esac',
+            'foc_ros needs Python 3.11 to 3.14, and ',
+        ),
+    ],
+    ids=['not there', 'inactive shim of pyenv', 'old'],
+)
+def test_a_python_that_cannot_be_used_is_named_before_anything_is_made(clone, tmp_path, name, program, words):
     write_program(tmp_path / 'shims' / 'pyenv', 'echo 3.99.1')
-    result = make(clone, 'setup', 'PYTHON=python3.99', path=shim.parent)
-    assert result.returncode != 0
-    words = 'make: python3.99 is a shim of pyenv, and no active version has it; activate one that has: pyenv shell 3.99.1\n'
-    assert words in result.stderr
+    if program is not None:
+        write_program(tmp_path / 'shims' / name, program)
+    result = make(clone, 'setup', f'PYTHON={name}', path=tmp_path / 'shims')
+    assert result.returncode != 0 and f'make: {words}' in result.stderr
     assert not (clone / '.venv').exists()
-
-
-@needs_make
-def test_an_old_python_is_refused_before_anything_is_made(clone, tmp_path):
-    old = write_program(tmp_path / 'bin' / 'python3', 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.10.2;; esac')
-    result = make(clone, 'setup', f'PYTHON={old}')
-    assert result.returncode != 0
-    assert f'make: foc_ros needs Python 3.11 to 3.14, and {old} is Python 3.10.2; choose another' in result.stderr
-    assert not (clone / '.venv').exists()
-
-
-def list_recipe(clone, target):
-    """Return what a target would run."""
-    result = make(clone, '--dry-run', target)
-    assert result.returncode == 0, result.stderr
-    return result.stdout
 
 
 @needs_make
 def test_setup_says_what_it_does_and_linters_and_peers_are_installed_by_their_targets_only(clone):
-    recipes = {target: list_recipe(clone, target) for target in ('setup', 'lint', 'doc', 'bench')}
+    recipes = {target: make(clone, '--dry-run', target).stdout for target in ('setup', 'lint', 'doc', 'bench')}
     told = re.findall(r'echo [\'"](setup: \w+)', recipes['setup'])
     assert told == ['setup: creating', 'setup: installing', 'setup: ready']
     assert 'setup: ready; next: make demo' in recipes['setup']

@@ -34,6 +34,8 @@ def test_results_come_in_order_and_an_exception_is_the_failure_of_its_item_whate
     with nullcontext() if count is None else open_workers(count):
         assert list(run(worker_tasks.squared, ITEMS)) == SQUARES
         found = dict(run(worker_tasks.faulty, ITEMS[:4]))
+        ((_, number),) = run(worker_tasks.process_id, [('alone', None)])
+    assert (number == os.getpid()) == (count in (None, 1)), 'a single worker is this process'
     assert found['r0'] == 0 and found['r3'] == 3
     assert found['r1'] == Failure('number: expected another than 1, got 1')
     assert found['r2'].reason.startswith("KeyError: 'two' (worker_tasks.py:")
@@ -74,26 +76,6 @@ def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(count):
 def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else(cluster_address):
     with open_workers(1, cluster_address):
         check_that_only_the_deadly_fail('KilledWorker')
-
-
-def test_an_argument_that_cannot_be_loaded_is_the_failure_of_its_item():
-    with open_workers(2):
-        found = dict(run(worker_tasks.squared, [('bad', worker_tasks.Unloadable()), ('good', 2)]))
-    assert found['good'] == 4 and isinstance(found['bad'], Failure)
-
-
-def test_an_exception_that_leaves_the_context_ends_the_work():
-    began = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        _run_interrupted()
-    assert time.monotonic() - began < LIMIT_S / 2.0
-
-
-def _run_interrupted():
-    with open_workers(2):
-        for found in run(worker_tasks.sleepy, [('short', 0.0), ('long', LIMIT_S), ('later', LIMIT_S)]):
-            assert found == ('short', 0.0)
-            raise KeyboardInterrupt
 
 
 def start_workers(tmp_path):

@@ -3,15 +3,12 @@
 """The pipeline: when a prediction is due, what is rejected and why, and that no outdated input is used as a new one."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from bag_helpers import CONFIG as BAG_CONFIG
-from bag_helpers import messages, write_bag
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
+from object_messages import collision_object
 
-from foc_ros.analysis.replay import Replay
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER
@@ -22,34 +19,12 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import ObstacleSource, Scene
 from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import NANOSECONDS, HandSample
-from foc_ros.io.bags import BagReader
 from foc_ros.ros.health import Freshness
 from foc_ros.ros.intake import Intake
 
 START = 1000 * NANOSECONDS
 MS = NANOSECONDS // 1000
 CONFIG = replace_values(Config(), {'rate_hz': 50.0, 'scene.timeout_s': 2.0, 'foc.steps': 20})
-
-
-class Recorder:
-    """Replaces the predictor and records its arguments."""
-
-    def __init__(self):
-        self.calls: list[Any] = []
-
-    def __call__(self, config, hand, obstacles, goals, memory, knowledge, deadline, goal_heights):
-        assert not knowledge.library.demonstrations and goal_heights is None
-        assert deadline is NEVER
-        self.calls.append((config, hand, obstacles, goals, memory))
-        label = f'call{len(self.calls)}'
-        return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), label), Tracks(stamp_ns=len(self.calls))
-
-
-@pytest.fixture
-def recorder(monkeypatch):
-    stand_in = Recorder()
-    monkeypatch.setattr(module, 'predict', stand_in)
-    return stand_in
 
 
 def hand(ms, x=0.0, frame='world'):
@@ -65,7 +40,12 @@ def ready(config=CONFIG):
 
 
 @pytest.mark.parametrize(('period_ms', 'expected'), [(1.0, 50), (14.0, 48), (19.9, 50), (30.0, 34)])
-def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder, period_ms, expected):
+def test_the_rate_is_reached_whatever_the_period_of_the_samples(monkeypatch, period_ms, expected):
+    def predict(config, hand, obstacles, goals, memory, knowledge, deadline, goal_heights):
+        assert not knowledge.library.demonstrations and goal_heights is None and deadline is NEVER
+        return Prediction(hand.stamp_ns, hand.frame_id, hand.height, (), None), Tracks()
+
+    monkeypatch.setattr(module, 'predict', predict)
     pipeline, stamps = ready(), []
     for ms in np.arange(0.0, 1000.0, period_ms):
         pipeline.add_hand_sample(hand(ms))
@@ -76,28 +56,6 @@ def test_the_rate_is_reached_whatever_the_period_of_the_samples(recorder, period
             stamps.append(prediction.stamp_ns)
     assert abs(len(stamps) - expected) <= 1
     assert np.diff(stamps).min() >= 10 * MS
-
-
-def test_every_reason_for_no_prediction_is_explained(recorder):
-    pipeline = Pipeline(CONFIG)
-    assert pipeline.not_ready_reason() == 'no hand pose yet'
-    pipeline.add_hand_sample(hand(0.0))
-    assert pipeline.not_ready_reason() == 'no obstacles received yet: publish an empty cloud for an empty scene'
-    assert pipeline.predict() is None
-    assert pipeline.last_refusal == pipeline.not_ready_reason()
-    pipeline.set_obstacles('cloud', make_obstacles(), START - 3100 * MS, 'world')
-    assert pipeline.not_ready_reason() == 'no goal received'
-    pipeline.set_goals(np.zeros((1, 2)), 'world')
-    assert pipeline.not_ready_reason() == 'obstacles are 3.1 s older than the hand pose (scene.timeout_s is 2)'
-    assert pipeline.predict() is None
-    pipeline.set_obstacles('cloud', make_obstacles(), START, 'world')
-    assert pipeline.not_ready_reason() is None
-    assert pipeline.is_due
-    pipeline.set_engaged(False)
-    assert pipeline.not_ready_reason() == 'disengaged'
-    assert pipeline.predict() is None
-    assert pipeline.counts == {'predict_no_obstacles': 1, 'predict_stale': 1, 'predict_disengaged': 1}
-    assert recorder.calls == []
 
 
 def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch):
@@ -190,6 +148,10 @@ def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):
     assert seen(intake) == ('0', 'a/2')
     intake.remove_source('cloud')
     assert seen(intake) == ('a/2',)
+    for name, expected in (('cup', ('cup/0', 'a/2')), ('lamp', ('a/2', 'lamp/0'))):
+        intake.take('collision_objects', collision_object((2, (0.05,), (0.5, 0, 0)), name=name))
+        assert sorted(seen(intake)) == sorted(expected), 'the cup does not come back with the lamp'
+        intake.remove_source('collision_objects')
 
 
 def test_markers_in_another_frame_are_discarded(intake):
@@ -249,33 +211,6 @@ def test_a_publisher_in_a_wrong_frame_does_not_keep_the_right_one_away():
     intake = Intake(Pipeline(replace_values(Config(), {'frame_id': 'world'})))
     found = [intake.take('hand_pose', pose(2 * i, 0.0, 'camera' if i % 2 else 'world')) for i in range(100)]
     assert found.count(A) == 50
-
-
-def predict(bag, config):
-    replayed = Replay(config)
-    with BagReader(bag) as reader:
-        return [each.prediction for each in replayed.steps(reader) if each.prediction is not None], replayed.intake.counts
-
-
-def are_equal(one, other):
-    """Whether predictions are the same to the last bit."""
-    return len(one) == len(other) and all(
-        a.stamp_ns == b.stamp_ns
-        and [c.likelihood for c in a.candidates] == [c.likelihood for c in b.candidates]
-        and all(np.array_equal(c.mean, d.mean) for c, d in zip(a.candidates, b.candidates, strict=True))
-        for a, b in zip(one, other, strict=True)
-    )
-
-
-def test_a_replay_of_a_fast_hand_is_that_of_the_poses_that_are_not_skipped(tmp_path):
-    items = messages(0.2, rate_hz=1000.0)
-    hands = [item for item in items if item[0] == '/hand_pose']
-    dropped = {id(item) for i, item in enumerate(hands) if i % 4}
-    whole, counts = predict(write_bag(tmp_path / 'whole', items), BAG_CONFIG)
-    thinned, none = predict(write_bag(tmp_path / 'thinned', [item for item in items if id(item) not in dropped]), BAG_CONFIG)
-    assert (counts.get('hand_skipped'), none.get('hand_skipped')) == (len(dropped), None)
-    assert whole and are_equal(whole, thinned)
-    assert not are_equal(whole, predict(tmp_path / 'whole', replace_values(BAG_CONFIG, {'estimator.min_interval_s': 0.0}))[0])
 
 
 def test_the_union_of_the_sources_holds_the_latest_row_of_an_id():

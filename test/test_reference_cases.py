@@ -137,7 +137,6 @@ def find_loss(solution):
 
 
 def read_table(scene):
-    """Return the obstacles of a scene, whose vertices are given in the world."""
     vertices = [np.array(each['vertices']) for each in scene['obstacles']]
     centres = [each.mean(axis=0) for each in vertices]
     radii, deviations, names, velocities = (
@@ -152,25 +151,17 @@ def test_classes_are_as_good_as_those_of_an_independent_solver():
     """At most one of all classes has a loss more than 0.05 above its reference; every path passes on the sides of its class."""
     worse, compared = {}, 0
     for scene in json.loads(REFERENCE.read_text('utf-8')):
-        problem = reach(
-            read_table(scene),
-            goal=scene['goal'],
-            steps=scene['steps'],
-            duration=scene['duration_s'],
-            noise=scene['noise_per_step'],
-            eta=scene['eta'],
-            preference=PREFERENCE,
-        )
+        given = {name: scene[name] for name in ('goal', 'steps', 'eta')}
+        given |= {'duration': scene['duration_s'], 'noise': scene['noise_per_step'], 'preference': PREFERENCE}
+        problem = reach(read_table(scene), **given)
         problem = replace(problem, initial_mean=np.array(scene['start']))
         references = {each['label']: each['reference'] for each in scene['classes']}
         candidates = [each for each in find_classes(problem) if each.label in references]
         assert len(candidates) == len(references)
         for candidate, solution in zip(candidates, solve_together(problem, candidates, 'optimal'), strict=True):
             compared += 1
-            sides, reference = (
-                find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories),
-                references[candidate.label],
-            )
+            sides = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
+            reference = references[candidate.label]
             assert all(sides.get(name, side) == side for name, side in candidate.sides)
             losses = [
                 PREFERENCE.compute_loss(effort, min(k + 1e-5, problem.wanted_k), problem.wanted_k)
@@ -195,7 +186,6 @@ def make_scene(seed):
 
 
 def sweep(path, point):
-    """The angle that a path (n, 2) sweeps about a point [rad]."""
     angles = np.unwrap(np.arctan2(*(path - point).T[::-1]))
     return angles[-1] - angles[0]
 

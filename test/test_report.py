@@ -28,8 +28,6 @@ from foc_ros.ros.messages.ranking import find_drawn_curve
 
 
 class Page(HTMLParser):
-    """Parser of a page: its tags with attributes, and its text."""
-
     def __init__(self, file):
         super().__init__()
         self.tags: list[tuple[str, dict[str, str | None]]] = []
@@ -191,24 +189,16 @@ def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path):
     assert 'NaN' not in text and json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
 
 
-def test_no_hand_and_a_folder_that_is_a_file_are_refused(tmp_path):
-    with pytest.raises(InputError, match='hand pose'):
-        write_report(tmp_path / 'report', 'x', build_hand_trajectory([]), [], {})
-    assert not (tmp_path / 'report').exists()
-    (tmp_path / 'report').write_text('mine')
-    with pytest.raises(InputError, match='--report: expected a folder'):
-        report(tmp_path / 'report')
-    assert (tmp_path / 'report').read_text() == 'mine'
-
-
 SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "noise": [0.05, 0.05], "eta": 0.9, "obstacles": []}'
 
 
-@pytest.mark.parametrize('suffix', ['png', 'pdf', 'svg'])
-def test_a_picture_is_replaced_by_the_next_one(tmp_path, suffix):
-    file = tmp_path / f'scene.{suffix}'
-    write_picture(file, prediction(START_NS, np.zeros(2)))
-    check_replaceable('--plot', file)
+def test_pictures_and_reports_are_replaced_by_the_next_ones(tmp_path):
+    for suffix in ('png', 'pdf', 'svg'):
+        write_picture(tmp_path / f'scene.{suffix}', prediction(START_NS, np.zeros(2)))
+        check_replaceable('--plot', tmp_path / f'scene.{suffix}')
+    report(tmp_path)
+    report(tmp_path)
+    write_page(tmp_path, 'index.html', 'x', (), (), None)
 
 
 def test_a_picture_that_something_else_has_made_is_left_alone(tmp_path, capsys):
@@ -221,13 +211,6 @@ def test_a_picture_that_something_else_has_made_is_left_alone(tmp_path, capsys):
     assert (out, err.count('\n')) == ('', 1)
     assert '--plot: expected a new file, or one that foc_ros has made' in err
     assert picture.read_bytes() == before
-
-
-def test_a_report_is_replaced_by_the_next_one(tmp_path):
-    made = samples()
-    for _ in range(2):
-        write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], {})
-    write_page(tmp_path, 'index.html', 'x', (), (), None)
 
 
 @pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png'])

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from browser_helpers import MOVE, check_report, screenshot, show
-from report_samples import START_NS, predictions, samples
+from report_samples import predictions, samples
 
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
@@ -27,11 +27,7 @@ HOSTILE = '</script><img src=x onerror=alert(1)><b>&amp;'
 def report(tmp_path_factory):
     made, directory = samples(2), tmp_path_factory.mktemp('report')
     write_report(
-        directory,
-        HOSTILE,
-        build_hand_trajectory(made),
-        [build_snapshot(each) for each in predictions(made)],
-        {HOSTILE: HOSTILE},
+        directory, HOSTILE, build_hand_trajectory(made), [build_snapshot(each) for each in predictions(made)], {HOSTILE: HOSTILE}
     )
     return directory
 
@@ -75,7 +71,6 @@ return { disc: arguments[0].map((point) => isAt(point, disc)), ring: arguments[0
 
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
 def test_the_page_fits_on_a_phone(browser, report, tmp_path, dark):
-    """The page fits into a width of 360 px; it follows the dark or light mode of the system, and a button changes it."""
     assert show(browser, report / 'index.html', 360, 640, dark) == []
     assert browser.execute_script('return document.documentElement.scrollWidth') == 360
     browser.execute_script("""
@@ -153,25 +148,3 @@ def test_a_click_on_a_chart_leads_to_its_time_and_the_scene_zooms(browser, repor
         return [zoomed, report.scene.scale / before];
     """)
     assert scale == pytest.approx([1.25, 1.0])
-
-
-def test_the_page_opens_on_the_way_where_several_paths_are_likely_and_the_filter_has_setled(browser, tmp_path):
-    """The second of two movements has a moment with four paths; the first predictions of both are not settled."""
-    made = samples(2)
-    snapshots = [build_snapshot(each) for each in predictions(made)]
-    best = next(row for row, each in enumerate(snapshots) if each.stamp_ns > START_NS + 2_300_000_000)
-    for row, snapshot in enumerate(snapshots):
-        shares = (0.3, 0.3, 0.25) if row == best else (0.9, 0.03, 0.02)
-        candidates = tuple(replace(each, likelihood=share) for each, share in zip(snapshot, shares, strict=False))
-        snapshots[row] = replace(snapshot, candidates=candidates)
-    unsettled = next(row for row, each in enumerate(snapshots) if each.stamp_ns > START_NS + 2_250_000_000)
-    wide = tuple(
-        replace(each, likelihood=0.3, solution=each.solution.with_covariance(100.0 * each.covariance))
-        for each in snapshots[unsettled]
-    )
-    snapshots[unsettled] = replace(snapshots[unsettled], candidates=wide)
-    write_report(tmp_path, 'x', build_hand_trajectory(made), snapshots, {})
-    assert show(browser, tmp_path / 'index.html') == []
-    slider = browser.find_element('id', 'time')
-    assert slider.get_attribute('value') == str(best) != str(unsettled)
-    assert browser.find_element('id', 'movement').get_attribute('value') == '1'

@@ -78,14 +78,8 @@ def test_boxes_capsules_and_hulls_are_read():
         {'x': 5, 'y': 6, 'radius': 0.02},
     ]
     obstacles = parse_scene({**SCENE, 'obstacles': given}).obstacles
-    expected = collect_obstacles(
-        [
-            Box((1, 2), (0.4, 0.2), 0.5, name='tray'),
-            Box((3, 4), (0, 0.2), radius=0.01, radius_stddev=0.002),
-            Hull(corners, radius=0.01),
-            Circle((5, 6), radius=0.02),
-        ]
-    )
+    boxes = Box((1, 2), (0.4, 0.2), 0.5, name='tray'), Box((3, 4), (0, 0.2), radius=0.01, radius_stddev=0.002)
+    expected = collect_obstacles([*boxes, Hull(corners, radius=0.01), Circle((5, 6), radius=0.02)])
     for name, values in vars(expected).items():
         np.testing.assert_array_equal(getattr(obstacles, name), values, err_msg=name)
 

@@ -8,6 +8,7 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+from homotopy_scenes import measure_distance
 from reach_helpers import bowed, random_scene, reach, solved
 
 from foc_ros.core.obstacle_table import make_obstacles
@@ -43,17 +44,6 @@ def make_reach(*shapes, **options):
     return reach(collect_obstacles(shapes), goal=GOAL, **{'noise': (0.1, 0.1), 'eta': 0.9, **options})
 
 
-def measure_distance(points, polygon):
-    """Return the distance of points (..., 2) from a convex polygon (v, 2) with its inside, which is at distance 0."""
-    nearest, is_inside = np.full(points.shape[:-1], np.inf), np.full(points.shape[:-1], len(polygon) > 2)
-    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        along, apart = b - a, points - a
-        share = np.clip((apart @ along) / max(along @ along, 1e-300), 0.0, 1.0)
-        nearest = np.minimum(nearest, np.linalg.norm(apart - share[..., None] * along, axis=-1))
-        is_inside &= along[0] * apart[..., 1] - along[1] * apart[..., 0] > 0.0
-    return np.where(is_inside, 0.0, nearest)
-
-
 def count_clear(problem, solution, shape):
     """Return the number of noisy movements that are clear of the true shape at the step where the fewest are.
 
@@ -84,7 +74,6 @@ def test_noisy_movements_stay_clear_of_the_true_shape_as_often_as_promised(name,
 
 
 def same(first, second, moved=lambda path: path, tolerance=1e-6):
-    """The second solution is the first one moved."""
     assert first.status is second.status is Status.SOLVED, (first.message, second.message)
     assert second.effort == pytest.approx(first.effort, rel=tolerance)
     assert np.abs(second.path - moved(first.path)).max() < tolerance
@@ -148,7 +137,6 @@ def draw_shapes(generator):
 
 
 def make_random_scene(kind, seed):
-    """Return obstacles, a goal and a guess."""
     generator = np.random.default_rng(seed)
     if kind == 'circles':
         obstacles, goal, amplitude = random_scene(generator)
@@ -185,7 +173,6 @@ def find_well_posed(kind, strategy):
 
 
 def same_but_for_samples(kind, first, second, moved=lambda path: path, unit=1.0):
-    """The second solution is the first one moved, with an effort in another unit."""
     effort, path = TOLERANCES[kind]
     assert second.status is Status.SOLVED
     assert second.effort == pytest.approx(first.effort * unit, rel=effort)

@@ -16,13 +16,7 @@ from scipy.interpolate import CubicHermiteSpline
 from foc_ros.core.config import FocConfig
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import Edges, find_offset
-from foc_ros.core.obstacles.risk import (
-    RiskBound,
-    compute_safety_factor,
-    eta_of_k,
-    k_of_eta,
-    size_moments,
-)
+from foc_ros.core.obstacles.risk import RiskBound, compute_safety_factor, eta_of_k, size_moments
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Shape, collect_obstacles
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
@@ -195,11 +189,6 @@ def test_nothing_is_below_the_least_safety_factor_that_is_reported(strategy):
         if reported > 0.0 and not reported - 1e-3 * max(reported, 0.01) <= least <= reported + 0.02 * max(reported, 0.1):
             wrong[seed] = (solution.status.value, reported, least)
     assert wrong == {}
-
-
-@given(st.floats(0.0, 0.999))
-def test_eta_and_k_are_inverse(eta):
-    assert eta_of_k(k_of_eta(eta)) == pytest.approx(eta, abs=1e-12)
 
 
 @given(st.floats(0.55, 0.999), st.sampled_from(['cantelli', 'gaussian']), st.integers(1, 20_000))

@@ -138,7 +138,6 @@ OPTIMAL = FocConfig(strategy='optimal')
 
 
 def make_reach(seed, preference=HARD, **rest):
-    """Return a problem among circles, and a guess."""
     obstacles, goal, amplitude = random_scene(np.random.default_rng(seed))
     problem = reach(obstacles, goal=goal, **{'noise': (0.1, 0.1), 'preference': preference, **rest})
     return problem, bowed((0, 0), goal, problem.horizon.steps, amplitude)
@@ -165,7 +164,6 @@ SETTINGS = {name: FocConfig(strategy=name) for name in ('lv', 'hc')}
 
 
 def soft_scenes(count, seed=1):
-    """Return soft problems of three noises with their guesses."""
     generator, made = np.random.default_rng(seed), []
     for number in range(count):
         obstacles, goal, amplitude = random_scene(generator)
@@ -202,7 +200,6 @@ def test_a_cheap_eta_is_met_with_the_same_effort_and_a_compromise_costs_no_more_
 
 
 def dense(seed):
-    """Return a problem that asks for much among many obstacles, and a guess."""
     generator = np.random.default_rng(seed)
     obstacles, goal, amplitude = random_scene(generator)
     noise, eta = generator.uniform(0.05, 0.15), generator.uniform(0.6, 0.95)

@@ -15,46 +15,19 @@ from scipy.spatial.transform import Rotation
 tf2_ros = pytest.importorskip('tf2_ros', reason='optional message package: tf2_ros', exc_type=ImportError)
 
 from message_helpers import SECOND, cloud, obstacle_table, transform  # noqa: E402
-from node_helpers import TYPES, Bench, begin, figures, hand_path  # noqa: E402
+from node_helpers import TYPES, Bench, figures  # noqa: E402
 from rclpy.time import Time  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 
 from foc_ros.ros.transforms import TransformTree, TransformUnavailableError  # noqa: E402
 
 
-def is_followed(ros, bench):
-    """Return a broadcaster whose transforms the node receives."""
-    broadcaster = tf2_ros.TransformBroadcaster(bench.player)
-    ros.spin_until(lambda: broadcaster.pub_tf.get_subscription_count() > 0, 'the listener')
-    return broadcaster
-
-
-def test_no_message_is_refused_whose_transform_arrives_after_it(ros):
-    """A hand and obstacles in the frame of a camera on a moving arm, each sent before the transform for its stamp."""
-    bench = begin(ros, frame_id='world', frames__tolerance_s=10.0)
-    broadcaster, rows = is_followed(ros, bench), obstacle_table([(0.2, 0.02, 0.0, 0.03)])
-    broadcaster.sendTransform(transform(TYPES, 'camera', (0.0, 0.0, 0.0), stamp_ns=10 * SECOND - 1))
-    for i, pose in enumerate(hand_path(40)):
-        pose.header.frame_id = 'camera'
-        stamp_ns = 10 * SECOND + i * SECOND // 100
-        if i % 4 == 0:
-            bench.send('obstacles', cloud(TYPES, rows, stamp_ns, 'camera'))
-        bench.send('hand_pose', pose)
-        ros.spin_until(lambda: 'hand_pose' in bench.node._transforms.roles, 'a message that is held')
-        broadcaster.sendTransform(transform(TYPES, 'camera', (0.0, 0.001 * i, 0.0), stamp_ns=stamp_ns))
-        ros.spin_until(lambda: not bench.node._transforms.roles, 'the transform')
-        assert bench.node.intake.sample.position.tolist() == pytest.approx([pose.pose.position.x, 0.001 * i])
-    status = figures(bench.health())
-    assert (status['hand_pose refused'], status['obstacles refused']) == ('0 of 40', '0 of 11')
-    assert not [name for name in status if 'transform_newest' in name]
-    assert len(bench.wait_for('prediction', 2)) >= 2
-
-
 def test_a_simulation_that_starts_again_forgets_its_transforms(ros):
     """In the second round the camera is elsewhere: the transforms of the first, newer by their stamps, are not used."""
     bench = Bench(ros, outputs=[], frame_id='world', frames__tolerance_s=10.0, use_sim_time=True)
-    broadcaster, clock = is_followed(ros, bench), bench.player.create_publisher(Clock, '/clock', 10)
-    ros.spin_until(lambda: clock.get_subscription_count() > 0, 'the clock')
+    broadcaster, clock = tf2_ros.TransformBroadcaster(bench.player), bench.player.create_publisher(Clock, '/clock', 10)
+    for publisher in (broadcaster.pub_tf, clock):
+        ros.spin_until(lambda publisher=publisher: publisher.get_subscription_count() > 0, 'the listener')
     rows, node_clock = obstacle_table([(0.2, 0.0, 0.0, 0.03)]), bench.node.get_clock()
     for turn in range(2):
         for i in range(20):

@@ -9,17 +9,8 @@ from types import SimpleNamespace
 import ros_required  # noqa: F401
 import numpy as np
 import pytest
-from message_helpers import (
-    SECOND,
-    cloud,
-    marker,
-    marker_array,
-    obstacle_table,
-    pose_array,
-    pose_stamped,
-    transform,
-)
-from node_helpers import GOALS, ROWS, TYPES, Bench, begin, figures
+from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped, transform
+from node_helpers import ROWS, TYPES, Bench, begin, figures
 from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
@@ -65,7 +56,6 @@ def camera(x, stamp_ns=0):
 
 @pytest.fixture
 def tf2(monkeypatch):
-    """Install a substitute for tf2."""
     module = SimpleNamespace(Buffer=Buffer, TransformListener=lambda buffer, node: None, TransformException=TransformException)
     monkeypatch.setitem(sys.modules, 'tf2_ros', module)
 
@@ -130,14 +120,6 @@ def test_what_cannot_be_transformed_is_refused_with_its_reason(ros):
     words = 'fields[size_x]: expected boxes that the transform leaves in the task plane, got a tilt of 1'
     with pytest.raises(MessageError, match=re.escape(words)):
         decode_point_cloud(cloud(TYPES, obstacle_table([row], BOX)), 'xz', lambda _: ('world', turn))
-
-
-def test_without_tf2_other_frames_are_refused(ros, monkeypatch):
-    monkeypatch.setitem(sys.modules, 'tf2_ros', None)
-    bench = begin(ros, 2)
-    bench.wait_for('prediction', 1)
-    bench.deliver('goals', pose_array(TYPES, GOALS, 'camera'))
-    assert "the working frame 'world', got 'camera'" in figures(bench.health())['last refusal']
 
 
 HAND = [pose_stamped(TYPES, (0.0, 0.01 * i, 0.0), 10 * SECOND + i * SECOND // 100, 'camera') for i in range(8)]

@@ -3,8 +3,10 @@
 """Recordings as recorders, converters and accidents leave them: each is read as a whole, or what is missing is named."""
 
 import os
+import re
 import sqlite3
 import warnings
+from functools import partial
 
 import pytest
 import zstandard
@@ -45,8 +47,7 @@ def write_sqlite(file, content=WHOLE, encoding='cdr', rename=str, mode='DELETE')
 
 
 def write_metadata(folder, names, count):
-    text = f'rosbag2_bagfile_information:\n  relative_file_paths: {names}\n  message_count: {count}\n'
-    (folder / 'metadata.yaml').write_text(text)
+    (folder / 'metadata.yaml').write_text(metadata(', '.join(names), count))
 
 
 @pytest.mark.parametrize('share', [1.0, 0.5])
@@ -93,16 +94,11 @@ def test_every_record_of_a_summary_is_optional(tmp_path, options):
 
 @pytest.mark.parametrize(('kind', 'is_folder'), [('.mcap', True), ('.db3', False)])
 def test_files_and_messages_may_be_compressed(tmp_path, kind, is_folder):
-    plain, bag = tmp_path / f'plain{kind}', tmp_path / 'bag'
-    bag.mkdir()
-    if kind == '.mcap':
-        write_mcap(plain, SHORT)
-    else:
-        write_sqlite(plain).close()
-    packed = bag / f'plain{kind}.zstd'
+    plain, packed = write_either(tmp_path / f'plain{kind}'), tmp_path / 'bag' / f'plain{kind}.zstd'
+    packed.parent.mkdir()
     packed.write_bytes(zstandard.compress(plain.read_bytes()))
-    write_metadata(bag, [f'somewhere/plain{kind}'], len(WHOLE))
-    assert read(bag if is_folder else packed) == WHOLE
+    write_metadata(packed.parent, [f'somewhere/plain{kind}'], len(WHOLE))
+    assert read(packed.parent if is_folder else packed) == WHOLE
     packed.write_bytes(packed.read_bytes()[:-40])
     with pytest.raises(RecordingError, match='damaged'):
         read(packed, is_whole=True)
@@ -110,26 +106,24 @@ def test_files_and_messages_may_be_compressed(tmp_path, kind, is_folder):
     assert read(tmp_path / 'single.db3') == WHOLE
 
 
+def metadata(files, count):
+    return f'rosbag2_bagfile_information:\n  relative_file_paths: [{files}]\n  message_count: {count}\n'
+
+
 @pytest.mark.parametrize(
-    ('metadata', 'words'),
+    ('text', 'words'),
     [
         ('', 'not the metadata of a bag, and not used'),
-        ('rosbag2_bagfile_information: {relative_file_paths: [], message_count: 3}', 'it names no file'),
-        ('rosbag2_bagfile_information: {relative_file_paths: [other.db3], message_count: 3}', 'of another bag, and not used'),
-        (
-            'rosbag2_bagfile_information: {relative_file_paths: [one.mcap], message_count: 3}',
-            'metadata.yaml is wrong: it states 3',
-        ),
-        ('rosbag2_bagfile_information: {relative_file_paths: [one.mcap], message_count: 99}', 'states 99 messages'),
-        (
-            'rosbag2_bagfile_information: {relative_file_paths: [one.mcap, two.mcap], message_count: 19}',
-            'two.mcap, which .* missing',
-        ),
+        (metadata('', 3), 'it names no file'),
+        (metadata('other.db3', 3), 'of another bag, and not used'),
+        (metadata('one.mcap', 3), 'metadata.yaml is wrong: it states 3'),
+        (metadata('one.mcap', 99), 'states 99 messages'),
+        (metadata('one.mcap, two.mcap', 19), 'two.mcap, which .* missing'),
     ],
 )
-def test_wrong_metadata_is_named_and_hides_nothing(tmp_path, metadata, words):
+def test_wrong_metadata_is_named_and_hides_nothing(tmp_path, text, words):
     bag = write_bag(tmp_path / 'one', SHORT)
-    (bag / 'metadata.yaml').write_text(metadata)
+    (bag / 'metadata.yaml').write_text(text)
     with pytest.warns(FocWarning, match=words):
         assert read(bag) == WHOLE
 
@@ -150,22 +144,24 @@ def test_a_missing_part_of_a_split_recording_is_named(tmp_path, lost, has_metada
         list(BagRecording('split', tmp_path).items())
 
 
-@pytest.mark.parametrize('name', ['a%20b', 'a?mode=rw', "it's", 'été 手', '-x', 'a\nb'])
-@pytest.mark.parametrize('kind', ['.mcap', '.db3'])
-def test_a_path_opens_the_file_that_it_names(tmp_path, name, kind):
-    (tmp_path / name).mkdir()
-    for other in ('a b', 'a', 'A', 'a%2520b'):
-        (tmp_path / other).mkdir(exist_ok=True)
-        write_sqlite(tmp_path / other / f'{other}.db3', WHOLE[:3]).close() if not (
-            tmp_path / other / f'{other}.db3'
-        ).exists() else None
-    file = tmp_path / name / f'{name}{kind}'
-    file.unlink(missing_ok=True)
-    if kind == '.mcap':
+def write_either(file):
+    """Write an MCAP or an SQLite file."""
+    file.parent.mkdir(exist_ok=True)
+    if file.suffix == '.mcap':
         write_mcap(file, SHORT)
     else:
         write_sqlite(file).close()
-    assert read(file) == WHOLE
+    return file
+
+
+@pytest.mark.parametrize('name', ['a%20b', 'a?mode=rw', "it's", 'été 手', '-x', 'a\nb'])
+@pytest.mark.parametrize('kind', ['.mcap', '.db3'])
+def test_a_path_opens_the_file_that_it_names(tmp_path, name, kind):
+    for other in ('a b', 'a', 'A', 'a%2520b'):
+        (tmp_path / other).mkdir(exist_ok=True)
+        if not (tmp_path / other / f'{other}.db3').exists():  # where the file system does not tell `a` from `A`
+            write_sqlite(tmp_path / other / f'{other}.db3', WHOLE[:3]).close()
+    assert read(write_either(tmp_path / name / f'{name}{kind}')) == WHOLE
 
 
 @pytest.mark.parametrize(('topic', 'wrong'), [('/hand_pose', b''), ('/obstacles', bytes(500)), ('/goals', b'?!' * 40)])
@@ -181,12 +177,12 @@ def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(tm
 SHORT_KINDS = {topic: made.__msgtype__ for topic, _, made in SHORT}
 
 
-def name_by_dds(name):
-    return '::'.join([*name.split('/')[:-1], 'dds_', name.split('/')[-1] + '_'])
+DDS = re.compile(r'(\w+)/msg/(\w+)')
 
 
-@pytest.mark.parametrize('rename', [lambda name: name.replace('/msg/', '/'), lambda name: name.replace('/', '::'), name_by_dds])
-def test_a_type_name_may_be_that_of_older_recorders(tmp_path, rename):
+@pytest.mark.parametrize('form', [r'\1/\2', r'\1::msg::\2', r'\1::msg::dds_::\2_'])
+def test_a_type_name_may_be_that_of_older_recorders(tmp_path, form):
+    rename = partial(DDS.sub, form)
     write_sqlite(tmp_path / 'one.db3', rename=rename).close()
     assert read(tmp_path / 'one.db3') == WHOLE
     renamed = {made.__msgtype__: rename(made.__msgtype__) for _, _, made in SHORT}

@@ -58,7 +58,6 @@ def _covariance(generator: np.random.Generator, stddev: np.ndarray) -> np.ndarra
 
 @lru_cache(maxsize=1)
 def feasible_reaches(count: int, tries: int = 300) -> tuple[VariedReach, ...]:
-    """Return the reaches of the first `count` seeds in which eta is within reach: `optimal` finds a way."""
     found = []
     for seed in range(tries):
         made = varied_reach(seed)

@@ -15,6 +15,10 @@ def squared(number: int) -> int:
     return number**2
 
 
+def process_id(_: None) -> int:
+    return os.getpid()
+
+
 def deadly(number: int) -> int:
     """Kill the worker at 3 and 5, as the kernel does where memory runs out."""
     if number in (3, 5):
@@ -30,19 +34,11 @@ def faulty(number: int) -> int:
     return number
 
 
-class Unloadable:
-    """An argument that can be pickled but not loaded."""
-
-    def __reduce__(self) -> tuple:
-        return (int, ('no number',))
-
-
 def sleepy(seconds: float) -> float:
     time.sleep(seconds)
     return seconds
 
 
 def wait_here(folder: str) -> None:
-    """Leave the process id in a folder, and wait."""
     Path(folder, str(os.getpid())).touch()
     time.sleep(120.0)

@@ -114,7 +114,7 @@ def _run_unordered(function: Callable[[T], R], items: Sequence[T]) -> Iterator[t
     A worker that is killed takes those beside it along. All that may have been at work is then computed again, one after the
     other, so that only the guilty one fails.
     """
-    missing, at_work = list(range(len(items))), 2 * effective_n_jobs()
+    missing, at_work = list(range(len(items))), 2 * effective_n_jobs(None)
     while missing:
         try:
             for found in _compute(function, [(each, items[each]) for each in missing]):
@@ -132,7 +132,7 @@ def _run_unordered(function: Callable[[T], R], items: Sequence[T]) -> Iterator[t
 
 
 def _compute(function: Callable[[T], R], items: Sequence[tuple[int, T]]) -> Iterator[tuple[int, R | Failure, list[str]]]:
-    is_alone, parent = len(items) == 1 and effective_n_jobs() > 1, os.getpid()
+    is_alone, parent = len(items) == 1 and effective_n_jobs(None) > 1, os.getpid()
     # in a process of its own, also alone; arrays are passed as they are, not as files
     parallel = Parallel(2 if is_alone else None, return_as='generator_unordered', batch_size=1, max_nbytes=None)
     with closing(parallel(delayed(call_guarded)(function, *item, parent) for item in items)) as found:

@@ -1,0 +1,280 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Goals that are obstacles, that nobody announced, and that were reached before."""
+
+import numpy as np
+import pytest
+
+import foc_ros
+from foc_ros.core.config import Config
+from foc_ros.core.errors import ParameterError
+from foc_ros.core.goals import find_common_time
+from foc_ros.core.guidance.guide import weigh_candidates
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.obstacles.clearance import measure_clearance
+from foc_ros.core.obstacles.geometry import find_holders
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.predict import predict
+from foc_ros.core.tracks import NO_TRACKS
+from foc_ros.core.types import NANOSECONDS, HandSample, HandState
+from foc_ros.io.bags import TYPESTORE
+from foc_ros.io.json_output import encode_prediction
+from foc_ros.reporting.views import read_snapshot
+from foc_ros.ros.messages.encode_markers import encode_markers
+from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
+from foc_ros.ros.messages.types import RosbagsTypes
+
+BOX = np.array([[-0.03, -0.03], [0.03, -0.03], [0.03, 0.03], [-0.03, 0.03]])
+PLACES = np.array([[0.2, 0.0], [0.4, 0.01]])
+CUPS = make_obstacles(PLACES, 1e-3, ids=('front', 'back'), polygons=[BOX, BOX])
+HAND = HandState(0, np.zeros(6), 1e-6 * np.eye(6))
+
+
+def predict_in(obstacles, goals, **values):
+    return predict(Config().with_values(values), HAND, obstacles, goals, NO_TRACKS)[0]
+
+
+def measure(candidate, obstacle):
+    return measure_clearance(candidate.solution.path, obstacle, candidate.solution.dt)
+
+
+@pytest.mark.parametrize('hand_radius', [0.0, 0.01])
+def test_the_object_of_a_goal_blocks_all_goals_but_its_own(hand_radius):
+    prediction = predict_in(CUPS, PLACES, **{'scene.hand_radius': hand_radius})
+    assert {each.candidate.goal for each in prediction.solved_candidates} == {0, 1}
+    for each in prediction.solved_candidates:
+        np.testing.assert_allclose(each.solution.path[-1], PLACES[each.candidate.goal], atol=1e-6)
+        others = CUPS.take([1 - each.candidate.goal])
+        assert measure(each, others) > hand_radius
+        assert measure(each, CUPS.take([each.candidate.goal])) < 0.0
+    to_back = [each for each in prediction.solved_candidates if each.candidate.goal == 1]
+    assert {each.candidate.sides[0][0] for each in to_back} == {'front'}
+
+
+def test_an_obstacle_is_the_goal_that_the_grown_obstacle_holds():
+    beside = np.array([[0.235, 0.0]])
+    assert find_holders(beside, CUPS).tolist() == [[False, False]]
+    assert find_holders(beside, CUPS.grow(0.01)).tolist() == [[True, False]]
+    assert not [each for each in predict_in(CUPS, beside, **{'scene.hand_radius': 0.01}).candidates if each.candidate.sides]
+
+
+def test_obstacles_decide_on_the_way_and_not_on_the_goal():
+    shares = []
+    for obstacles in (CUPS, make_obstacles(), make_obstacles([[0.1, 0.0], [0.1, 0.07]], 0.03)):
+        found = predict_in(obstacles, PLACES, **{'likelihood.planning_horizon_s': 1000.0})
+        total = [sum(each.likelihood for each in found.candidates if each.candidate.goal == goal) for goal in (0, 1)]
+        shares.append(total[0] / sum(total))
+    assert shares == pytest.approx([shares[0]] * 3, abs=0.02)
+
+
+def test_the_predictor_takes_the_object_of_a_goal():
+    predictor = foc_ros.Predictor(Config().with_values({'budget_s': 0.0}))
+    predictor.set_obstacles([foc_ros.Circle((0.2, 0.0), 0.03, name='cup')])
+    for given, label in ((None, 'goal0:+cup'), ('cup', 'goal0:')):
+        predictor.set_goals([foc_ros.Goal((0.25, 0.001), object=given)])
+        assert label in [each.label for each in predictor.update(0.0 if given is None else 10.0, (0.0, 0.0)).candidates]
+
+
+def test_likelihoods_do_not_depend_on_the_side_on_which_a_path_ends_in_its_goal():
+    goals = np.array([[0.2, 0.1], [0.25, -0.15]])
+    cups = make_obstacles(goals, 1e-3, polygons=[BOX, BOX])
+    found = []
+    for y in (-1e-5, -1e-6, 0.0, 1e-6, 1e-5):
+        hand = HandState(0, np.array([0.0, y, 0.0, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6))
+        prediction = predict(Config(), hand, cups, goals, NO_TRACKS)[0]
+        found.append(sum(each.likelihood for each in prediction.candidates if each.candidate.goal == 1))
+    np.testing.assert_allclose(found, found[0], atol=1e-3)
+
+
+TYPES = RosbagsTypes(TYPESTORE)
+LEFT_GOAL, RIGHT_GOAL, MIDDLE = (0.3, 0.25), (0.3, -0.25), (0.32, 0.0)
+PRIOR = Config().likelihood.other_goal
+
+
+def reach(target, goals, share=0.6, **values):
+    """Return the predictions during a part of a minimum-jerk reach of 1 s to a target."""
+    pipeline = Pipeline(Config().with_values({'foc.steps': 20, **values}), is_timed=False)
+    pipeline.set_obstacles('cloud', make_obstacles(), None, 'world')
+    found = []
+    for tick in range(round(100 * share)):
+        s = max(tick / 100 - 0.05, 0.0)
+        place = np.array(target) * (10 * s**3 - 15 * s**4 + 6 * s**5)
+        pipeline.add_hand_sample(HandSample(round(tick * NANOSECONDS / 100), place, 0.0, 'world'))
+        pipeline.set_goals(np.array(goals), 'world')
+        if tick % 5 == 0:
+            prediction = pipeline.predict()
+            assert prediction is not None
+            followed = sum(each.likelihood for each in prediction.candidates)
+            assert followed + prediction.unknown + prediction.other == pytest.approx(1)
+            found.append(prediction)
+    return found
+
+
+def test_before_the_hand_moves_the_share_is_the_parameter():
+    assert reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL])[0].other == pytest.approx(PRIOR)
+    assert all(each.other == 0.0 for each in reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL], **{'likelihood.other_goal': 0.0}))
+    with pytest.raises(ParameterError, match=r'likelihood\.other_goal: expected a number in \[0, 0\.99\]'):
+        Config().with_values({'likelihood.other_goal': 1.0})
+
+
+def test_the_share_grows_if_the_hand_goes_between_the_goals_and_falls_if_it_goes_to_one():
+    missed, met = reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL]), reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL, MIDDLE])
+    assert missed[-1].other > 2.0 * PRIOR and met[-1].other < PRIOR / 4.0
+    assert max(each.other for each in met) < 1.5 * PRIOR
+
+
+def test_guidance_yields_to_another_goal():
+    alone, beside = weigh_candidates(np.array([0.5])), weigh_candidates(np.array([0.5]), 0.0, 0.5)
+    assert alone == pytest.approx([1.0]) and beside == pytest.approx([0.5])
+
+
+def test_the_share_is_published_and_read_back():
+    prediction = reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL])[-1]
+    table, cloud = encode_likelihoods(prediction, TYPES), encode_prediction_cloud(prediction, 'xy', TYPES)
+    assert table.layout.dim[0].label.endswith(';other')
+    assert np.asarray(table.data).reshape(-1, 4)[:, 0].sum() == pytest.approx(1.0)
+    read = read_snapshot(cloud, table, 'xy', prediction.obstacles, prediction.goal_positions)
+    assert read.other == prediction.other == encode_prediction(prediction)['other']
+    texts = [each.text for each in encode_markers(prediction, 'xy', TYPES).markers]
+    assert any(text.endswith(f'{100 * prediction.other:.0f} % another goal') for text in texts)
+
+
+def shares_of_goals(prediction):
+    goals, shares = zip(*((each.candidate.goal, each.likelihood) for each in prediction.candidates), strict=True)
+    return np.bincount(goals, shares)
+
+
+def test_a_fast_hand_that_slows_down_goes_to_the_near_goal():
+    """A farther goal has more time, so that by the efforts alone it would be the likelier one."""
+    near, far = (0.2, 0.02), (0.6, 0.06)
+    for share in (0.5, 0.6, 0.7):
+        to_near, to_far = (shares_of_goals(reach(target, [near, far], share)[-1]) for target in (near, far))
+        assert to_near[0] > 0.9 and to_far[1] > to_near[1]
+
+
+def test_goals_are_compared_by_the_effort_to_be_there_at_a_common_time():
+    hand = HandState(0, np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
+    goals, times_s = np.array([[0.2, 0.0], [0.4, 0.1]]), [0.8, 1.1]
+    assert find_common_time(hand, goals, times_s) == pytest.approx(0.8)
+    assert find_common_time(hand, goals / 4.0, times_s) == 0.5
+    pipeline = Pipeline(Config().with_values({'foc.steps': 20, 'likelihood.other_goal': 0.0}), is_timed=False)
+    pipeline.set_obstacles('cloud', make_obstacles(), None, 'world')
+    pipeline.set_goals(goals, 'world')
+    pipeline.add_hand_sample(HandSample(0, np.zeros(2), 0.0, 'world'))
+    prediction = pipeline.predict()
+    assert prediction is not None
+    # free paths from rest: the efforts at a common time are as the squares of the distances, and beta is 2
+    by_goal = shares_of_goals(prediction)
+    assert by_goal[0] / by_goal[1] == pytest.approx((0.17 / 0.04) ** 2, rel=0.05)
+
+
+HOME, NEAR, FAR = (0.0, 0.0), (0.2, 0.1), (0.25, -0.15)
+CONFIG = Config().with_values({'foc.steps': 20, 'likelihood.other_goal': 0.0, 'estimator.gap_s': 10.0})
+BETA = CONFIG.likelihood.beta
+EXPECTED = 1.0 / (1.0 + ((0.25**2 + 0.15**2) / (0.2**2 + 0.1**2)) ** BETA)
+"""Probability of the far goal by the distances from `HOME`."""
+HABIT_BOX = np.array([[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]])
+
+
+class Session:
+    """A hand that moves from place to place, rests there, and is asked where it will go next."""
+
+    def __init__(self, goals, names=(), **values):
+        self.pipeline, self.tick, self.place = Pipeline(CONFIG.with_values(values), is_timed=False), 0, np.array(HOME)
+        self.announce(goals, names)
+        self.move(HOME)
+
+    def announce(self, goals, names=()):
+        boxes = {'ids': names, 'polygons': [HABIT_BOX] * len(names)}
+        obstacles = make_obstacles(np.array(goals), 1e-3, **boxes) if names else make_obstacles()
+        self.pipeline.set_obstacles('cloud', obstacles, None, 'world')
+        self.pipeline.set_goals(np.array(goals), 'world')
+
+    def move(self, target):
+        start = self.place
+        for s in np.clip(np.linspace(0.0, 1.6, 96), 0.0, 1.0):
+            self.place = start + (np.array(target) - start) * (10 * s**3 - 15 * s**4 + 6 * s**5)
+            self.pipeline.add_hand_sample(HandSample(round(self.tick * NANOSECONDS / 100), self.place, 0.0, 'world'))
+            self.tick += 1
+
+    def return_home(self):
+        """Let the hand appear at home again, as with a clutch: the way back is no reach."""
+        self.pipeline.set_engaged(False)
+        self.place, self.tick = np.array(HOME), self.tick + 2000
+        self.pipeline.set_engaged(True)
+        self.move(HOME)
+
+    def share(self, goal):
+        self.pipeline.add_hand_sample(HandSample(round(self.tick * NANOSECONDS / 100), self.place, 0.0, 'world'))
+        self.tick += 1
+        prediction = self.pipeline.predict()
+        assert prediction is not None
+        return sum(each.likelihood for each in prediction.candidates if each.candidate.goal == goal)
+
+
+def odds(share):
+    return share / (1.0 - share)
+
+
+@pytest.mark.parametrize('past_goals', [0.0, 1.0, 3.0])
+def test_a_goal_that_was_reached_more_often_than_expected_gets_likelier(past_goals):
+    session = Session([NEAR, FAR], **{'likelihood.past_goals': past_goals})
+    before = session.share(1)
+    assert before == pytest.approx(EXPECTED, rel=0.05)
+    for _ in range(3):
+        session.move(FAR)
+        session.return_home()
+    weights = [(1 + past_goals * reached) / (1 + past_goals * 3 * share) for reached, share in ((0, 1 - EXPECTED), (3, EXPECTED))]
+    # the movement has an onset, a little later than it begins
+    assert odds(session.share(1)) / odds(before) == pytest.approx(weights[1] / weights[0], rel=0.1)
+
+
+def test_habits_follow_the_object_and_not_its_place():
+    session = Session([NEAR, FAR], ('cup', 'jug'))
+    before = session.share(0), session.share(1)
+    for _ in range(3):
+        session.move(FAR)
+        session.return_home()
+    session.announce([FAR, NEAR], ('cup', 'jug'))
+    assert session.share(1) > before[0] > before[1]  # the jug, which is now where the cup was
+    session.announce([FAR, NEAR])
+    assert session.share(1) == pytest.approx(before[0], rel=0.05)  # goals that are no objects are others
+
+
+def test_a_goal_elsewhere_is_another_one():
+    session = Session([NEAR, FAR])
+    before = session.share(1)
+    session.move(FAR)
+    session.return_home()
+    assert session.share(1) > 1.2 * before
+    session.announce([NEAR, (FAR[0] + 0.01, FAR[1])])
+    known = session.share(1)
+    assert known > 1.2 * before
+    session.announce([NEAR, (FAR[0] + 0.04, FAR[1])])
+    assert odds(session.share(1)) < 0.7 * odds(known)
+
+
+def test_a_movement_that_ends_far_from_all_goals_says_nothing_and_a_reset_forgets():
+    session = Session([NEAR, FAR])
+    before = session.share(1)
+    session.move((0.1, -0.06))
+    session.return_home()
+    assert session.share(1) == pytest.approx(before)
+    session.move(FAR)
+    session.return_home()
+    assert session.share(1) > 1.2 * before
+    session.pipeline.reset()
+    session.return_home()
+    assert session.share(1) == pytest.approx(before)
+
+
+def test_reaches_are_expected_to_end_where_the_earlier_ones_did():
+    goals = [NEAR, (NEAR[0], NEAR[1] - 0.05)]
+    session = Session(goals, **{'likelihood.past_goals': 1e-6})
+    for _ in range(6):
+        session.move((NEAR[0], NEAR[1] - 0.02))
+        session.return_home()
+    habits = session.pipeline.learnt.habits
+    np.testing.assert_allclose(habits.find_ends(np.zeros((1, 2))), [[0.0, -0.02 * 6 / 9]], atol=1e-3)
+    ends = np.hypot(*habits.find_ends(np.array(goals)).T)
+    assert odds(session.share(1)) == pytest.approx((ends[0] / ends[1]) ** (2 * BETA), rel=0.01)
