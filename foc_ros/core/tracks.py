@@ -12,12 +12,10 @@ duration T over [a, T], resampled at N steps of (T - a) / N, that begins where t
 An unlikely class keeps it too, as long as the scene stays the same. Each prediction solves one in `TURNS` of these classes: those
 whose solutions are oldest.
 
-Likelihoods change gradually: with p_i of this prediction, l_i before (0 for a new class), and the time h between both,
+Likelihoods change gradually, those of what no candidate has as well: with p_i of this prediction, l_i before (0 for a new class),
+and the time h between both,
 
-    l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`),
-
-with the shares of the goals, and of a goal that nobody announced, as they are now: these follow from the movement of the hand,
-which is smooth, and not from what solver and search have found.
+    l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`).
 """
 
 from __future__ import annotations
@@ -28,7 +26,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .likelihood import divide_among_groups
 from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
@@ -165,14 +162,12 @@ class Tracks(Record):
         if not any(each.way in before for each in taking_part):
             gain = 1.0
         weights = [(1.0 - gain) * before.get(each.way, 0.0) + gain * each.likelihood for each in taking_part]
-        weights = share_among_goals(weights, taking_part)
-        unknown = (1.0 - gain) * self.rest.unknown + gain * rest.unknown
+        unknown, other = ((1.0 - gain) * old + gain * now for old, now in zip(self.rest, rest, strict=True))
         unknown = unknown if unknown >= 1e-6 else 0.0
-        total = sum(weights) + unknown
-        factor = (1.0 - rest.other) / total if total else 1.0
+        factor = 1.0 / (sum(weights) + unknown + other)
         ranked = [replace(each, likelihood=factor * weight) for each, weight in zip(taking_part, weights, strict=True)]
         ranked.sort(key=lambda each: (-each.likelihood, each.label))
-        return ranked + [each for each in predicted if not each.has_likelihood], Rest(factor * unknown, rest.other)
+        return ranked + [each for each in predicted if not each.has_likelihood], Rest(factor * unknown, factor * other)
 
     def choose_most_likely(self, predicted: Sequence[PredictedCandidate]) -> PredictedCandidate | None:
         """Return the most likely of ranked candidates; the one of before stays until another leads by more than `LEAD`."""
@@ -211,17 +206,6 @@ class Tracks(Record):
 
 
 NO_TRACKS = Tracks()
-
-
-def share_among_goals(weights: Sequence[float], candidates: Sequence[PredictedCandidate]) -> list[float]:
-    """Return weights with the same sum, of which each goal has the share that it has of the likelihoods of its candidates."""
-    goal = np.array([each.candidate.goal for each in candidates], dtype=np.intp)
-    if len(np.unique(goal)) < 2:
-        return list(weights)
-    now = np.bincount(goal, [each.likelihood for each in candidates]).astype(float)
-    totals = now * (sum(weights) / (float(now.sum()) or 1.0))
-    shared: list[float] = divide_among_groups(np.array(weights), goal, totals).tolist()
-    return shared
 
 
 def count_shared(before: Candidate, now: Candidate) -> int | None:
