@@ -142,17 +142,14 @@ class Tracks(Record):
         unlikely.sort(key=lambda each: (each.solved_ns, each.number))
         return {each.number for each in unlikely[math.ceil(len(unlikely) / TURNS) :]}
 
-    def find_absent(self, candidates: Sequence[Candidate], matched: Sequence[Track], stamp_ns: int) -> list[Track]:
-        """Return the tracks with a solution of the last `HOLD_S` that are no candidates now, under any name."""
+    def find_absent(self, candidates: Sequence[Candidate], matched: Sequence[Track], stamp_ns: int) -> tuple[Track, ...]:
+        """Return the tracks that were seen in the last `HOLD_S` and are no candidates now, under any name."""
         numbers = {each.number for each in matched}
-        return [
+        return tuple(
             each
-            for each in (*self.followed, *self.absent)
-            if each.number not in numbers
-            and stamp_ns - each.solved_ns > 0
-            and each.is_solved_within(stamp_ns, HOLD_S)
-            and all(count_shared(each.candidate, other) is None for other in candidates)
-        ]
+            for each in self._find_recent(stamp_ns)
+            if each.number not in numbers and all(count_shared(each.candidate, other) is None for other in candidates)
+        )
 
     def smooth(self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int) -> tuple[list[PredictedCandidate], Rest]:
         """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and what none has likewise."""
@@ -184,8 +181,8 @@ class Tracks(Record):
         matched: Sequence[Track],
         solved: Sequence[PredictedCandidate],
         stamp_ns: int,
-    ) -> tuple[tuple[Track, ...], tuple[Track, ...]]:
-        """Return the tracks after a prediction: of its candidates, with new solutions where there are, and those not seen.
+    ) -> tuple[Track, ...]:
+        """Return the tracks of the candidates after a prediction, with new solutions where there are.
 
         predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found, or
         with the rest of what it had found before.
@@ -197,8 +194,7 @@ class Tracks(Record):
             is_new = found.has_likelihood and not found.age_s
             newest = (found.solution, stamp_ns) if is_new else (track.solution, track.solved_ns)
             present.append(replace(seen, solution=newest[0], solved_ns=newest[1], has_failed=not found.has_likelihood))
-        numbers = {each.number for each in matched}
-        return tuple(present), tuple(each for each in self._find_recent(stamp_ns) if each.number not in numbers)
+        return tuple(present)
 
     def _find_recent(self, stamp_ns: int) -> list[Track]:
         """Return the tracks that were seen in the last `HOLD_S` before a stamp [ns]."""

@@ -60,7 +60,7 @@ class Search:
     next_goal : int
         Row of the first goal that the deadline left out, at which the next search should begin; 0 if there was time for all.
     unfollowed : tuple[Candidate, ...]
-        Classes that were seen and are no candidates, with taut guesses. One that passes the obstacles as a candidate to another
+        Classes that were seen and are no candidates, with taut guesses. One that passes its obstacles as a candidate to another
         goal does is left out where its own goal has a candidate: its way and its goal are followed.
     """
 
@@ -130,7 +130,7 @@ def search(
     chosen = ranking.choose(count)
     candidates = scene.make_candidates(chosen, duration_s, steps)
     ways, reached = {each.way for each in chosen}, {each.goal for each in chosen}
-    seen = {each.label: each for each in ranking.seen if each.goal not in reached or not goes_along(each.way, ways)}
+    seen = {each.label: each for each in ranking.seen if each.goal not in reached or not any(each.way <= way for way in ways)}
     unfollowed = scene.make_candidates(tuple(seen.values()), duration_s, steps)
     return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal, unfollowed)
 
