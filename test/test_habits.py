@@ -30,6 +30,7 @@ class Session:
         obstacles = make_obstacles(np.array(goals), 1e-3, ids=names, polygons=[BOX] * len(goals)) if names else make_obstacles()
         self.pipeline.set_obstacles('cloud', obstacles, None, 'world')
         self.pipeline.set_goals(np.array(goals), 'world')
+        self.tick += 100  # a second, in which the likelihoods follow
 
     def move(self, target):
         start = self.place

@@ -16,6 +16,8 @@ Likelihoods change gradually, those of what no candidate has as well: with p_i o
 and the time h between both,
 
     l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`).
+
+With a new goal all of them are those of this prediction: that nothing was known of it does not make it unlikely.
 """
 
 from __future__ import annotations
@@ -153,10 +155,11 @@ class Tracks(Record):
 
     def smooth(self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int) -> tuple[list[PredictedCandidate], Rest]:
         """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and what none has likewise."""
-        before = {each.number: each.likelihood for each in (*self.followed, *self.absent)}
+        known = (*self.followed, *self.absent)
+        before, goals = {each.number: each.likelihood for each in known}, {each.candidate.goal for each in known}
         taking_part = [each for each in predicted if each.has_likelihood]
         gain = -math.expm1(-self.measure_time(stamp_ns) / SMOOTHING_S)
-        if not any(each.way in before for each in taking_part):
+        if not any(each.way in before for each in taking_part) or any(each.candidate.goal not in goals for each in taking_part):
             gain = 1.0
         weights = [(1.0 - gain) * before.get(each.way, 0.0) + gain * each.likelihood for each in taking_part]
         unknown, other = ((1.0 - gain) * old + gain * now for old, now in zip(self.rest, rest, strict=True))
