@@ -3,11 +3,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure how steady predictions are from tick to tick, on recordings at 100 Hz, with measurement noise.
 
-    python scripts/flicker.py [DATA ...] [--strategy NAME ...] [--noise M ...] [--set NAME=VALUE ...]
+    python scripts/flicker.py [DATA ...] [--strategy NAME ...] [--noise M ...] [--set NAME=VALUE ...] [--most N]
 
 DATA: bags, or folders as `foc_ros evaluate` reads them; by default the packaged recording, and D3IL and HLP where they are beside
-the checkout. Positions come at 100 Hz by cubic interpolation, and predictions at 50 Hz. Ticks across a change of the scene are
-left out.
+the checkout. Of a folder with more than N recordings, N are used. Positions come at 100 Hz by cubic interpolation, and
+predictions at 50 Hz. Ticks across a change of the scene are left out.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ DEMO = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap'
 RATE_HZ = 100.0
 STRATEGIES, NOISE_M = ('lv', 'hc', 'optimal'), (0.0, 0.0005, 0.001)
 TYPES = RosbagsTypes(TYPESTORE)
-CHANGE = 0.1
+CHANGE = 0.15
 """Change of a likelihood from one tick to the next that counts."""
-SHORT_TICKS, LONGEST_S = 10, 0.05
+SHORT_TICKS, LONGEST_S = 5, 0.05
 """Absences of fewer ticks count. Ticks farther apart than LONGEST_S are not compared."""
 FINE = 100
 """Points for each step of a path, less than 0.2 mm apart, from which distances are measured."""
@@ -55,7 +55,6 @@ class Steadiness:
     a class, shorter than SHORT_TICKS; sideways: move of each mean path [m].
     """
 
-    seconds: float = 0.0
     ticks: int = 0
     changed: int = 0
     absences: int = 0
@@ -64,11 +63,17 @@ class Steadiness:
     def summarise(self) -> list[str]:
         """Return the cells under HEAD."""
         percentile, largest = (1e3 * float(np.percentile(self.sideways or [0.0], each)) for each in (95.0, 100.0))
-        changed, absences = 100 * self.changed / max(self.ticks, 1), 60.0 * self.absences / max(self.seconds, 1e-9)
-        return [str(self.ticks), f'{changed:.2f}', f'{absences:.1f}', f'{percentile:.1f}', f'{largest:.1f}']
+        changed = f'{1e3 * self.changed / max(self.ticks, 1):.2f}'
+        return [str(self.ticks), changed, str(self.absences), f'{percentile:.1f}', f'{largest:.1f}']
 
 
-HEAD = 'ticks', 'changed > 0.1 [%]', 'short absences [1/min]', 'sideways 95 % [mm]', 'largest [mm]'
+HEAD = (
+    'ticks',
+    f'changes above {CHANGE:g} [1 in 1,000]',
+    f'absences under {SHORT_TICKS} ticks',
+    'sideways 95 % [mm]',
+    'largest [mm]',
+)
 
 
 def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> None:
@@ -82,7 +87,6 @@ def measure_steadiness(predictions: Iterable[Prediction], total: Steadiness) -> 
             seen = {}
         else:
             total.ticks += 1
-            total.seconds += now.t - before.t
             total.absences += sum(1 < tick - seen.get(way, -SHORT_TICKS) <= SHORT_TICKS for way in found)
             shares = [{way: each.likelihood for way, each in table.items()} for table in (last, found)]
             total.changed += any(abs(shares[0].get(way, 0.0) - shares[1].get(way, 0.0)) > CHANGE for way in last | found)
@@ -138,6 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('data', nargs='*', type=Path, help='bags or folders')
     parser.add_argument('--set', action='append', default=[], metavar='NAME=VALUE', help='a parameter')
     parser.add_argument('--strategy', nargs='+', default=STRATEGIES, metavar='NAME')
+    parser.add_argument('--most', type=int, default=16, metavar='N', help='recordings of a folder, evenly chosen (default: 16)')
     parser.add_argument('--noise', nargs='+', type=float, default=NOISE_M, metavar='M', help='standard deviations [m]')
     chosen = parser.parse_args(arguments)
     config = Config().with_values({name: yaml.safe_load(text) for name, _, text in (each.partition('=') for each in chosen.set)})
@@ -145,7 +150,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(format_table(('data', 'strategy', 'noise [mm]', *HEAD), ()), flush=True)
     paths = chosen.data or [DEMO, *(SHARED / name for name in ('d3il_avoiding', 'hlp_reaching') if (SHARED / name).exists())]
     for path, strategy, noise in product(paths, chosen.strategy, chosen.noise):
-        measured = measure(list(find_recordings(path).values()), strategy, noise, config)
+        found = list(find_recordings(path).values())
+        every = max(len(found) // chosen.most, 1)
+        measured = measure(found[::every][: chosen.most], strategy, noise, config)
         row = path.stem, f'`{strategy}`', f'{1e3 * noise:g}', *measured.summarise()
         print(format_table(row, ()).partition('\n')[0], flush=True)
 

@@ -9,7 +9,7 @@ import foc_ros
 from foc_ros.core.config import Config
 from foc_ros.core.errors import ParameterError
 from foc_ros.core.goals import find_common_time
-from foc_ros.core.guidance.guide import weigh_candidates
+from foc_ros.core.guidance.guide import combine, weigh_candidates
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.obstacles.geometry import find_holders
@@ -124,8 +124,10 @@ def test_the_share_grows_if_the_hand_goes_between_the_goals_and_falls_if_it_goes
 
 
 def test_guidance_yields_to_another_goal():
-    alone, beside = weigh_candidates(np.array([0.5])), weigh_candidates(np.array([0.5]), 0.0, 0.5)
-    assert alone == pytest.approx([1.0]) and beside == pytest.approx([0.5])
+    pull, shares, still = np.array([[0.0, 2.0]]), ((1.0, 0.0), (0.7, 0.3), (0.3, 0.7)), np.zeros(2)
+    weights = [weigh_candidates(np.array([known]), pull, still, other=other) for known, other in shares]
+    sizes = [combine(each, pull, np.zeros(1, dtype=bool))[0][1] for each in weights]
+    assert sizes[0] > 2.0 * sizes[1] > 0.0 and sizes[2] == 0.0
 
 
 def test_the_share_is_published_and_read_back():
@@ -189,6 +191,7 @@ class Session:
         obstacles = make_obstacles(np.array(goals), 1e-3, **boxes) if names else make_obstacles()
         self.pipeline.set_obstacles('cloud', obstacles, None, 'world')
         self.pipeline.set_goals(np.array(goals), 'world')
+        self.tick += 100  # a second, in which the likelihoods follow
 
     def move(self, target):
         start = self.place

@@ -12,11 +12,13 @@ from prediction_samples import outcome
 import foc_ros
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.guidance.guide import (
+    DOUBT,
+    EVIDENCE,
     GuidanceInput,
     GuidanceState,
     combine,
     guide,
-    yield_to_hand,
+    weigh_candidates,
 )
 from foc_ros.core.guidance.paths import (
     POSITION_STDDEV,
@@ -30,6 +32,8 @@ ROUND = make_obstacles([(0.1, 0.0)], [0.03])
 SETTINGS = GuidanceConfig(k_max=100.0, clearance=0.0)
 PERIOD = 0.005
 """Of the updates [s]."""
+SURE = (1.0 - DOUBT) / (1.0 + DOUBT)
+"""Share of the force of a certain candidate at rest."""
 
 
 def prediction(*outcomes, **changes):
@@ -61,38 +65,54 @@ def test_the_stiffness_is_linear_in_the_precision_between_its_bounds(stddev, sha
     assert stiffness[0] == pytest.approx(share * 100.0 * np.eye(2), abs=1e-3)
 
 
-def test_forces_that_agree_add_up_and_those_that_cancel_vanish():
+def test_a_force_is_the_mean_of_those_that_help_times_its_expected_benefit():
     none = np.zeros(2, dtype=bool)
-    force, agreement = combine(np.array([0.7, 0.3]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
-    assert (force[0], agreement) == (pytest.approx(1.3), 1.0)
-    force, agreement = combine(np.array([0.5, 0.5]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
-    assert (force.tolist(), agreement) == ([0.0, 0.0], 0.0)
+    force, agreement = combine(np.array([0.6, 0.4]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
+    assert (force[0], agreement) == (pytest.approx(1.4), pytest.approx(1.0))
+    force, agreement = combine(np.array([0.6, 0.2]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
+    assert (force[0], agreement) == (pytest.approx(0.6 * 1.25), pytest.approx(0.6)), 'nobody knows for 0.2'
+    for opposing in (0.5, 0.4):
+        force, _ = combine(np.array([0.5, opposing]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
+        assert force.tolist() == [0.0, 0.0], 'it helps with a probability of one half at most'
     force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
-    assert (force[1], agreement) == (pytest.approx(0.25), pytest.approx(0.5))
+    assert (force[1], agreement) == (pytest.approx(0.5 / 0.75 * 0.5), pytest.approx(0.5))
     force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]), np.array([False, True]))
-    assert (force[1], agreement) == (pytest.approx(0.75 * 0.75), pytest.approx(0.75))
+    assert (force[1], agreement) == (pytest.approx(0.5), pytest.approx(0.5))
+    assert combine(np.array([0.75, 0.25]), np.zeros((2, 2)), none)[1] == 1.0, 'none pulls'
 
 
-@pytest.mark.parametrize(('across', 'share'), [(0.0, 1.0), (0.5, 1.0), (-0.2, 0.6), (-0.5, 0.0), (-3.0, 0.0)])
-def test_a_force_yields_to_a_hand_that_accelerates_against_it(across, share):
-    force = yield_to_hand(np.array([0.0, 2.0]), np.array([5.0, across]), 0.5)
-    assert force == pytest.approx([0.0, 2.0 * share])
-    assert yield_to_hand(np.array([0.0, 2.0]), np.array([0.0, across]), 0.0).tolist() == [0.0, 2.0]
+@pytest.mark.parametrize(('across', 'odds'), [(0.0, 3.0), (EVIDENCE, 3.0 * np.e**2), (-EVIDENCE, 3.0 / np.e**2)])
+def test_the_acceleration_of_the_hand_tells_which_candidate_it_follows(across, odds):
+    forces = np.array([[0.0, 2.0], [0.0, -0.1]])
+    weights = weigh_candidates(np.array([0.6, 0.2]), forces, np.array([5.0, across]), 0.1, 0.1)
+    assert weights[0] / weights[1] == pytest.approx(odds)
+    nobody = (0.2 + DOUBT) / 0.6 * np.exp(-across / EVIDENCE)
+    assert 1.0 - weights.sum() == pytest.approx(nobody * weights[0])
+
+
+def test_a_force_yields_to_a_hand_that_accelerates_against_it():
+    pull, certain = np.array([[0.0, 2.0]]), np.array([1.0])
+    sizes = [
+        combine(weigh_candidates(certain, pull, np.array([0.0, across])), pull, np.zeros(1, dtype=bool))[0][1]
+        for across in (1e6, 1.0, 0.0, -1.0, -2.5, -1e6)
+    ]
+    assert sizes[0] == pytest.approx(2.0) and (np.diff(sizes) < 0.0).tolist() == [True, True, True, True, False]
+    assert sizes[2] == pytest.approx(2.0 * SURE) and sizes[4:] == [0.0, 0.0]
 
 
 def test_a_hand_beside_its_only_path_is_drawn_to_it():
     output = guide_hand(Config(guidance=SETTINGS), prediction(straight(), stamp_ns=0), (0.1, 0.01), (0.0, 0.0))
-    assert output.force == pytest.approx([0.0, -1.0], abs=1e-6)
+    assert output.force == pytest.approx([0.0, -SURE], abs=1e-6)
     assert output.reference == pytest.approx([0.1, 0.0], abs=1e-6)
-    assert output.agreement == 1.0
+    assert output.agreement == pytest.approx(SURE)
 
 
 def test_the_mode_trajectory_keeps_the_force_along_the_path():
     newest = prediction(straight(), stamp_ns=0)
     config = {mode: Config(guidance=replace(SETTINGS, mode=mode, lookahead_s=0.1)) for mode in ('path', 'trajectory')}
     forces = {mode: guide_hand(each, newest, (-0.01, 0.01), (0.001, 0.0)).force for mode, each in config.items()}
-    assert forces['path'] == pytest.approx([0.0, -1.0], abs=1e-6)
-    assert forces['trajectory'][0] > 0.9
+    assert forces['path'] == pytest.approx([0.0, -SURE], abs=1e-6)
+    assert forces['trajectory'][0] > 0.9 * SURE
 
 
 def test_in_mode_path_the_force_neither_drives_nor_brakes_a_moving_hand():
@@ -123,7 +143,7 @@ def test_the_look_ahead_damps_movement_across_the_path():
     newest, velocity = prediction(straight(), stamp_ns=0), (0.0, 0.05)
     settings = replace(SETTINGS, mode='trajectory', lookahead_s=0.1)
     output = guide_hand(Config(guidance=settings), newest, (0.0, 0.0), velocity)
-    assert output.force[1] == pytest.approx(-0.1 * 100.0 * 0.05, abs=1e-6)
+    assert output.force[1] == pytest.approx(-0.1 * SURE * 100.0 * 0.05, abs=1e-6)
     none = guide_hand(Config(guidance=replace(settings, lookahead_s=0.0)), newest, (0.0, 0.0), velocity)
     assert none.force == pytest.approx([0.0, 0.0], abs=1e-6)
 

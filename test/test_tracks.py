@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, one_obstacle
 
-from foc_ros.core.config import Config, FocConfig, replace_values
+from foc_ros.core.classes import search
+from foc_ros.core.config import Config, FocConfig, HomotopyConfig, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.hand.kalman import update
 from foc_ros.core.obstacle_table import make_obstacles
@@ -50,6 +51,22 @@ def test_a_candidate_continues_the_track_of_its_class_under_any_name(now, before
     assert [each.number for each in tracks.match([now], STEP_NS)] == [before]
 
 
+@pytest.mark.parametrize('most', [6, 7, 8])
+def test_no_class_is_gone_for_a_moment_while_obstacles_are_passed_on_the_way_to_one_goal_before_the_other(most):
+    goals, tracks, last = np.array([[0.3, 0.1], [0.3, -0.1]]), NO_TRACKS, dict[int, int]()
+    obstacles = make_obstacles([[0.05, -0.03], [0.15, 0.05], [0.15, -0.05], [0.22, 0.0]], 0.015, 0.001)
+    for tick in range(60):
+        hand, config = np.array([0.002 * tick, 0.0, 0.2, 0.0, 0.0, 0.0]), HomotopyConfig(max_candidates=most)
+        candidates = search(hand, goals, obstacles, config, [1.0, 1.0], 10, tracks.candidates).candidates
+        matched = tracks.match(candidates, STEP_NS * tick)
+        found = [Track(track.number, each, STEP_NS * tick) for track, each in zip(matched, candidates, strict=True)]
+        numbers = {each.number for each in found}
+        assert all(last.get(number, tick - 1) == tick - 1 for number in numbers)
+        last |= dict.fromkeys(numbers, tick)
+        absent = tuple(each for each in (*tracks.followed, *tracks.absent) if each.number not in numbers)
+        tracks = Tracks(tuple(found), absent, next_number=max(last) + 1)
+
+
 def predict_at(tick, y, tracks, config=CONFIG, goals=GOALS, radius=0.02):
     stamp_ns = STEP_NS * tick
     hand = HandState(stamp_ns, MOVING, np.zeros((6, 6)), onset_ns=stamp_ns, onset_position=np.zeros(2))
@@ -72,6 +89,21 @@ def test_likelihoods_follow_a_filter_of_the_stated_time_constant():
         for label, share in found.items():
             assert share == pytest.approx(rest * first[label] + (1.0 - rest) * after[label], abs=5e-3)
             assert abs(first[label] - after[label]) > 0.05, 'the scene is no test'
+
+
+def test_the_shares_of_goals_follow_the_same_filter():
+    goals, none = np.array([[0.2, 0.1], [0.2, -0.1]]), make_obstacles()
+
+    def turn_to(tick, y, tracks):
+        mean, stamp_ns = np.array([0.05, 0.0, 0.3, y, 0.0, 0.0]), STEP_NS * tick
+        hand = HandState(stamp_ns, mean, np.zeros((6, 6)), onset_ns=stamp_ns - STEP_NS, onset_position=np.zeros(2))
+        prediction, following = predict(CONFIG, hand, none, goals, tracks)
+        return np.array([*[each.likelihood for each in prediction.goals], prediction.unknown, prediction.other]), following
+
+    left, tracks = turn_to(0, 0.1, NO_TRACKS)
+    right, gain = turn_to(1, -0.1, NO_TRACKS)[0], 1.0 - np.exp(-0.02 / SMOOTHING_S)
+    assert left[0] - right[0] > 0.3, 'the hand is no test'
+    assert turn_to(1, -0.1, tracks)[0] == pytest.approx((1.0 - gain) * left + gain * right, abs=5e-3)
 
 
 def reaching(x, tracks):

@@ -131,7 +131,8 @@ def predict(
         other=rest.other,
     )
     following = Tracks(
-        *known.follow(predicted, matched, solved, stamp_ns),
+        known.follow(predicted, matched, solved, stamp_ns),
+        absent,
         stamp_ns,
         goals,
         obstacles,
@@ -238,7 +239,9 @@ def _hold_answer(solved: PredictedCandidate, track: Track, hand: HandState) -> P
 
 
 def _hold_absent(track: Track, hand: HandState) -> PredictedCandidate | None:
-    """Return the rest of the last answer of a class that is no candidate any more."""
+    """Return the rest of the last answer of a class that is no candidate any more, if it is young enough."""
+    if not track.is_solved_within(hand.stamp_ns, HOLD_S):
+        return None
     return _hold_track(track, track.candidate, hand, 'the class is not followed any more')
 
 

@@ -33,8 +33,8 @@ REMOVED = {
     'guidance.precision_low': 'it is 100 1/m^2',
     'guidance.precision_high': 'it is 2500 1/m^2',
     'guidance.position_stddev': 'it is 2 mm',
-    'guidance.sharpness': 'it is 3',
-    'guidance.yield_acceleration': 'it is 0.6 m/s^2',
+    'guidance.sharpness': 'a force has the size of its expected benefit',
+    'guidance.yield_acceleration': 'the acceleration of the hand is evidence of what the operator wants',
 }
 """By dotted name, a sentence that goes on after `it was removed: `."""
 

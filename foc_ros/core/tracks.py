@@ -12,12 +12,12 @@ duration T over [a, T], resampled at N steps of (T - a) / N, that begins where t
 An unlikely class keeps it too, as long as the scene stays the same. Each prediction solves one in `TURNS` of these classes: those
 whose solutions are oldest.
 
-Likelihoods change gradually: with p_i of this prediction, l_i before (0 for a new class), and the time h between both,
+Likelihoods change gradually, those of what no candidate has as well: with p_i of this prediction, l_i before (0 for a new class),
+and the time h between both,
 
-    l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`),
+    l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`).
 
-with the shares of the goals, and of a goal that nobody announced, as they are now: these follow from the movement of the hand,
-which is smooth, and not from what solver and search have found.
+With a new goal all of them are those of this prediction: that nothing was known of it does not make it unlikely.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .likelihood import divide_among_groups
 from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
@@ -145,34 +144,30 @@ class Tracks(Record):
         unlikely.sort(key=lambda each: (each.solved_ns, each.number))
         return {each.number for each in unlikely[math.ceil(len(unlikely) / TURNS) :]}
 
-    def find_absent(self, candidates: Sequence[Candidate], matched: Sequence[Track], stamp_ns: int) -> list[Track]:
-        """Return the tracks with a solution of the last `HOLD_S` that are no candidates now, under any name."""
+    def find_absent(self, candidates: Sequence[Candidate], matched: Sequence[Track], stamp_ns: int) -> tuple[Track, ...]:
+        """Return the tracks that were seen in the last `HOLD_S` and are no candidates now, under any name."""
         numbers = {each.number for each in matched}
-        return [
+        return tuple(
             each
-            for each in (*self.followed, *self.absent)
-            if each.number not in numbers
-            and stamp_ns - each.solved_ns > 0
-            and each.is_solved_within(stamp_ns, HOLD_S)
-            and all(count_shared(each.candidate, other) is None for other in candidates)
-        ]
+            for each in self._find_recent(stamp_ns)
+            if each.number not in numbers and all(count_shared(each.candidate, other) is None for other in candidates)
+        )
 
     def smooth(self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int) -> tuple[list[PredictedCandidate], Rest]:
         """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and what none has likewise."""
-        before = {each.number: each.likelihood for each in (*self.followed, *self.absent)}
+        known = (*self.followed, *self.absent)
+        before, goals = {each.number: each.likelihood for each in known}, {each.candidate.goal for each in known}
         taking_part = [each for each in predicted if each.has_likelihood]
         gain = -math.expm1(-self.measure_time(stamp_ns) / SMOOTHING_S)
-        if not any(each.way in before for each in taking_part):
+        if not any(each.way in before for each in taking_part) or any(each.candidate.goal not in goals for each in taking_part):
             gain = 1.0
         weights = [(1.0 - gain) * before.get(each.way, 0.0) + gain * each.likelihood for each in taking_part]
-        weights = share_among_goals(weights, taking_part)
-        unknown = (1.0 - gain) * self.rest.unknown + gain * rest.unknown
+        unknown, other = ((1.0 - gain) * old + gain * now for old, now in zip(self.rest, rest, strict=True))
         unknown = unknown if unknown >= 1e-6 else 0.0
-        total = sum(weights) + unknown
-        factor = (1.0 - rest.other) / total if total else 1.0
+        factor = 1.0 / (sum(weights) + unknown + other)
         ranked = [replace(each, likelihood=factor * weight) for each, weight in zip(taking_part, weights, strict=True)]
         ranked.sort(key=lambda each: (-each.likelihood, each.label))
-        return ranked + [each for each in predicted if not each.has_likelihood], Rest(factor * unknown, rest.other)
+        return ranked + [each for each in predicted if not each.has_likelihood], Rest(factor * unknown, factor * other)
 
     def choose_most_likely(self, predicted: Sequence[PredictedCandidate]) -> PredictedCandidate | None:
         """Return the most likely of ranked candidates; the one of before stays until another leads by more than `LEAD`."""
@@ -189,8 +184,8 @@ class Tracks(Record):
         matched: Sequence[Track],
         solved: Sequence[PredictedCandidate],
         stamp_ns: int,
-    ) -> tuple[tuple[Track, ...], tuple[Track, ...]]:
-        """Return the tracks after a prediction: of its candidates, with new solutions where there are, and those not seen.
+    ) -> tuple[Track, ...]:
+        """Return the tracks of the candidates after a prediction, with new solutions where there are.
 
         predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found, or
         with the rest of what it had found before.
@@ -202,8 +197,7 @@ class Tracks(Record):
             is_new = found.has_likelihood and not found.age_s
             newest = (found.solution, stamp_ns) if is_new else (track.solution, track.solved_ns)
             present.append(replace(seen, solution=newest[0], solved_ns=newest[1], has_failed=not found.has_likelihood))
-        numbers = {each.number for each in matched}
-        return tuple(present), tuple(each for each in self._find_recent(stamp_ns) if each.number not in numbers)
+        return tuple(present)
 
     def _find_recent(self, stamp_ns: int) -> list[Track]:
         """Return the tracks that were seen in the last `HOLD_S` before a stamp [ns]."""
@@ -211,17 +205,6 @@ class Tracks(Record):
 
 
 NO_TRACKS = Tracks()
-
-
-def share_among_goals(weights: Sequence[float], candidates: Sequence[PredictedCandidate]) -> list[float]:
-    """Return weights with the same sum, of which each goal has the share that it has of the likelihoods of its candidates."""
-    goal = np.array([each.candidate.goal for each in candidates], dtype=np.intp)
-    if len(np.unique(goal)) < 2:
-        return list(weights)
-    now = np.bincount(goal, [each.likelihood for each in candidates]).astype(float)
-    totals = now * (sum(weights) / (float(now.sum()) or 1.0))
-    shared: list[float] = divide_among_groups(np.array(weights), goal, totals).tolist()
-    return shared
 
 
 def count_shared(before: Candidate, now: Candidate) -> int | None:

@@ -28,6 +28,8 @@ STATES, STATES_PER_CANDIDATE = 1000, 300
 """Number of states that the search for one goal may look at; a few dozen are enough for four candidates."""
 OFF_HAND = 1e-9
 """A goal that lies on the hand is moved away by this much [m]."""
+Way = frozenset[tuple[str, int]]
+"""LEFT or RIGHT by the id of an obstacle."""
 
 
 class PathClass(NamedTuple):
@@ -45,9 +47,9 @@ class PathClass(NamedTuple):
     known: Candidate | None = None
 
     @property
-    def course(self) -> str:
-        """The label without the goal."""
-        return self.label.partition(':')[2]
+    def way(self) -> Way:
+        """The obstacles in the name with their sides."""
+        return frozenset(self.sides)
 
     @property
     def named(self) -> set[str]:

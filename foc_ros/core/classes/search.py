@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import time
 from bisect import insort
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import merge
 from itertools import chain
@@ -19,10 +20,10 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.solution import Candidate
 from foc_ros.core.types import Array
 
-from .scene import PathClass, SearchScene
+from .scene import PathClass, SearchScene, Way
 
 REPEAT = 1.5
-"""A class that passes all obstacles as a class to another goal does ranks as if it were this times as long: it adds little."""
+"""A class that passes the obstacles as a class to another goal does ranks as if it were this times as long: it adds little."""
 MOST_UNFOLLOWED = 8
 """Number of classes besides the candidates that are looked for, to know what is not followed."""
 STAY = 0.95
@@ -59,7 +60,7 @@ class Search:
     next_goal : int
         Row of the first goal that the deadline left out, at which the next search should begin; 0 if there was time for all.
     unfollowed : tuple[Candidate, ...]
-        Classes that were seen and are no candidates, with taut guesses. One that passes all obstacles as a candidate to another
+        Classes that were seen and are no candidates, with taut guesses. One that passes its obstacles as a candidate to another
         goal does is left out where its own goal has a candidate: its way and its goal are followed.
     """
 
@@ -123,13 +124,13 @@ def search(
     if not len(goals):
         return Search(())
     scene = SearchScene(hand_mean, goals, obstacles, config, previous, turn.objects)
-    ranking = _Ranking(scene, {each.label for each in previous}, config.max_detour, turn.deadline)
+    ranking = _Ranking(scene, previous, config.max_detour, turn.deadline)
     next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < turn.first_goal, goal)))
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
     chosen = ranking.choose(count)
     candidates = scene.make_candidates(chosen, duration_s, steps)
-    courses, reached = {each.course for each in chosen}, {each.goal for each in chosen}
-    seen = {each.label: each for each in ranking.seen if each.course not in courses or each.goal not in reached}
+    ways, reached = {each.way for each in chosen}, {each.goal for each in chosen}
+    seen = {each.label: each for each in ranking.seen if each.goal not in reached or not any(each.way <= way for way in ways)}
     unfollowed = scene.make_candidates(tuple(seen.values()), duration_s, steps)
     return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal, unfollowed)
 
@@ -137,14 +138,17 @@ def search(
 class _Ranking:
     """Finds and ranks classes to all goals.
 
-    A class ranks by its key, which is multiplied by STAY if it was followed in the previous prediction (labels), and by REPEAT if
-    it passes all obstacles as the shortest class to another goal does, or one that ranks before it. One that is more than
-    max_detour times as long as the shortest one to its goal is not chosen. seen: classes that were found, among them all that are
-    not chosen.
+    A class ranks by its key, which is multiplied by STAY if it was followed in the previous prediction, under any name, and by
+    REPEAT if it passes the obstacles as the shortest class to another goal does, or one that ranks before it. One that is more
+    than max_detour times as long as the shortest one to its goal is not chosen. seen: classes that were found, among them all
+    that are not chosen.
     """
 
-    def __init__(self, scene: SearchScene, followed: Collection[str], max_detour: float, deadline: Deadline) -> None:
-        self._scene, self._followed, self._max_detour, self._deadline = scene, followed, max_detour, deadline
+    def __init__(self, scene: SearchScene, previous: Sequence[Candidate], max_detour: float, deadline: Deadline) -> None:
+        self._scene, self._max_detour, self._deadline = scene, max_detour, deadline
+        self._followed, self._ways = {each.label for each in previous}, defaultdict[int, set[Way]](set)
+        for each in previous:
+            self._ways[each.goal].add(frozenset(each.sides))
         self._bests: list[PathClass] = []
         self._shortest: list[PathClass] = []
         self._others: list[Iterable[PathClass]] = []
@@ -203,12 +207,13 @@ class _Ranking:
         If the time ends, known classes of the previous prediction take the place of those that were not found again.
         """
         bests = sorted(self._bests, key=self._rank)[:count]
-        goal_of = {each.course: each.goal for each in sorted(self._shortest, reverse=True)}
+        before = [(each.goal, each.way) for each in self._shortest]
         chosen, labels, room = list[tuple[float, str, PathClass]](), {each.label for each in bests}, count - len(bests)
 
         def add(found: PathClass) -> None:
-            factor = REPEAT if goal_of.setdefault(found.course, found.goal) != found.goal else 1.0
+            factor = REPEAT if goes_along(found.way, [way for goal, way in before if goal != found.goal]) else 1.0
             insort(chosen, (factor * self._rank(found)[0], found.label, found))
+            before.append((found.goal, found.way))
             labels.add(found.label)
 
         is_late = room > 0 and self._deadline.has_passed
@@ -241,4 +246,9 @@ class _Ranking:
         return found
 
     def _rank(self, found: PathClass) -> tuple[float, str]:
-        return found.key * (STAY if found.label in self._followed else 1.0), found.label
+        return found.key * (STAY if goes_along(found.way, self._ways[found.goal]) else 1.0), found.label
+
+
+def goes_along(way: Way, others: Iterable[Way]) -> bool:
+    """Tell whether a class passes the obstacles as another one does: one name is the other with obstacles left out."""
+    return any(way <= other or other <= way for other in others)

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One update of guidance: references, stiffness, agreement, margins, limits and tank, in this order.
 
-The force is the sum of the candidates' forces, weakened by their disagreement, by that of the hand, and by
-what is unknown.
+The force is the mean of what the candidates ask for, times its expected benefit to the operator.
 """
 
 from __future__ import annotations
@@ -48,8 +47,10 @@ from .paths import (
     transfer_progress,
 )
 
-SHARPNESS = 3.0
-"""Exponent of the likelihoods as weights: the larger, the more the likeliest candidate leads."""
+DOUBT = 0.25
+"""Odds that no candidate says what the operator wants: a certain candidate at rest has 0.6 of its force."""
+EVIDENCE = 1.5
+"""Acceleration of the hand that makes a candidate e times as likely whose force has its direction [m/s^2]."""
 LATE_PERIODS = 2.0
 """Longest time between two updates for which the tank is guaranteed, in periods of `guidance.rate_hz`."""
 
@@ -250,15 +251,15 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
     errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
     shares = () if followed.prediction is None else (followed.prediction.unknown, followed.prediction.other)
-    weights = weigh_candidates(paths.likelihoods, *shares)
-    force, agreement = combine(weights, (stiffness @ errors[..., None])[..., 0], find_crossing(need, errors))
-    force = yield_to_hand(force, given.acceleration, 0.6)
+    forces = (stiffness @ errors[..., None])[..., 0]
+    weights = weigh_candidates(paths.likelihoods, forces, given.acceleration, *shares)
+    force, agreement = combine(weights, forces, find_crossing(need, errors))
     places = paths.locate(np.maximum(ahead, progress + 0.02))  # a heading points at least 20 mm ahead
     lines = paths.interpolate(paths.points, places) - given.position
-    heading = weights @ normalize(lines)
+    heading = paths.likelihoods @ normalize(lines)
     return _Demand(
         turn_along(seen, weights @ errors, force),
-        need.share * agreement * np.einsum('c,cab->ab', weights, stiffness),
+        need.share * agreement * np.einsum('c,cab->ab', paths.likelihoods, stiffness),
         agreement,
         settings.authority * min(float(np.hypot(*heading)), 1.0),
         turn_along(seen, weights @ lines, normalize(heading)),
@@ -283,45 +284,38 @@ def _find_bound(settings: GuidanceConfig, seen: SeenMargins, energy: float, forc
     return max(min(find_largest_force(settings), by_tank, slew * (distance - NEAR_M) / speed), 0.0)
 
 
-def weigh_candidates(likelihoods: Array, unknown: float = 0.0, other: float = 0.0) -> Array:
-    """Return the weights w_i (c,) of candidates with likelihoods p_i, where a share u is unknown, and o that of another goal.
+def weigh_candidates(likelihoods: Array, forces: Array, acceleration: Array, unknown: float = 0.0, other: float = 0.0) -> Array:
+    """Return the probability w_i (c,) that candidate i says what the operator wants, given the acceleration of the hand.
 
-    Both take part without a force of their own, so that the force of the others does not grow by them. With the exponent g of
-    `SHARPNESS`,
+    Who wants another way pushes to it before the likelihoods p_i say so. Of the direction n_i of its force (c, 2) [N], and with
+    the acceleration a (2,) [m/s^2],
 
-        w_i = p_i^g / (sum_i p_i^g + u^g + o^g).
+        w_i ~ p_i exp(a . n_i / A),
+
+    where A is `EVIDENCE`. What is left of one is the probability that none says it, which has the weight u + o + D: the share u
+    that is unknown, the share o of another goal, and the doubt D, `DOUBT`.
     """
-    powers = likelihoods**SHARPNESS
-    total = float(powers.sum()) + unknown**SHARPNESS + other**SHARPNESS
-    weights: Array = powers / total if total > 0.0 else np.zeros(len(powers))
-    return weights
+    logs = np.clip(normalize(forces) @ acceleration / EVIDENCE, -50.0, 50.0)  # beyond, a candidate has all or nothing
+    weights = likelihoods * np.exp(logs)
+    probabilities: Array = weights / (float(weights.sum()) + unknown + other + DOUBT)
+    return probabilities
 
 
 def combine(weights: Array, forces: Array, is_idle: NDArray[np.bool_]) -> tuple[Array, float]:
-    """Return f = a sum_i w_i b_i f_i (2,) [N] and the agreement a in [0, 1] of forces (c, 2) [N] with weights w_i (c,).
+    """Return the force f (2,) [N] and the agreement a in [0, 1] of forces f_i (c, 2) [N] with probabilities w_i (c,).
 
-        a = |sum_i w_i b_i f_i| / sum_i w_i |f_i|
+    The direction is that of s = sum_i w_i b_i f_i: candidates that are idle (c,) give no force, b_i = 0, and b_i = 1 otherwise. A
+    force there helps with the probability P of the candidates that pull to this side, and opposes the operator with 1 - P. It is
+    their mean times its expected benefit, and vanishes where that is not positive:
 
-    Candidates that are idle (c,) give no force, b_i = 0, and count in the agreement as others do; b_i = 1 otherwise. The
-    agreement is 1 where all likely candidates pull the same way or none pulls, and 0 where they cancel.
+        f = a s / P,   a = max(P - (1 - P), 0),   P = sum of w_i over b_i f_i . s > 0.
+
+    Where none pulls, a is 1.
     """
-    total = weights @ np.where(is_idle[:, None], 0.0, forces)
-    separate = float(weights @ np.hypot(forces[:, 0], forces[:, 1]))
-    agreement = min(float(np.hypot(*total)) / separate, 1.0) if separate > 0.0 else 1.0
-    return agreement * total, agreement
-
-
-def yield_to_hand(force: Array, acceleration: Array, strongest: float) -> Array:
-    """Return a force (2,) [N] that falls as the hand accelerates against it, and is zero from an acceleration A on.
-
-        f <- f clip(1 + f . a / (|f| A), 0, 1)
-
-    A hand that accelerates against a force of guidance is pushed by its operator, and more strongly than by guidance, whatever
-    its mass is. The operator wants another way, which the likelihoods will say later.
-
-    acceleration: a (2,), of the hand [m/s^2]; strongest: A [m/s^2], 0 for a force that does not fall.
-    """
-    size = float(np.hypot(*force))
-    if not strongest or not size:
-        return force
-    return force * min(max(1.0 + float(force @ acceleration) / (size * strongest), 0.0), 1.0)
+    pulls = np.where(is_idle[:, None], 0.0, forces)
+    total = weights @ pulls
+    if not total.any():
+        return total, float(not pulls.any())
+    helping = float(weights[pulls @ total > 0.0].sum())
+    agreement = max(2.0 * helping - 1.0, 0.0)
+    return agreement / helping * total, agreement
