@@ -20,7 +20,8 @@ from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.ocp import monte_carlo as sampling
 from foc_ros.core.ocp.problem import Problem
 from foc_ros.core.prediction import PredictedCandidate
-from foc_ros.core.reach import ReachingScene, build_scene_problems, solve_scene
+from foc_ros.core.reach import build_scene_problems, solve_scene
+from foc_ros.core.scene import ReachingScene
 from foc_ros.core.solution import Candidate, Goal
 from foc_ros.core.support import GoalTable, check_array, check_config, check_number, check_vector, collect_goals, find_shape
 from foc_ros.core.types import HandState

@@ -19,8 +19,9 @@ from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacle
 from foc_ros.core.ocp.solve import solve_problem, solve_problems
 from foc_ros.core.ocp.solver import LARGEST_TOLERANCE
 from foc_ros.core.ocp.start import cold_start
-from foc_ros.core.reach import ReachingScene, build_scene_problems, solve_scene
+from foc_ros.core.reach import build_scene_problems, solve_scene
 from foc_ros.core.safety_preference import SafetyPreference
+from foc_ros.core.scene import ReachingScene
 from foc_ros.core.solution import Status
 from foc_ros.core.types import HandState
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from foc_ros.core.ocp.monte_carlo import monte_carlo
 from foc_ros.core.prediction import Prediction
-from foc_ros.core.reach import ReachingScene, build_scene_problems, solve_scene
+from foc_ros.core.reach import build_scene_problems, solve_scene
+from foc_ros.core.scene import ReachingScene
 from foc_ros.io.json_output import encode_candidate, encode_goals, encode_solution
 
 COLUMNS = {

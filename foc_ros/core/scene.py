@@ -9,8 +9,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .config import Config
+from .errors import SceneError
 from .obstacle_table import Obstacles, make_obstacles
-from .types import NANOSECONDS, Array, Record
+from .obstacles.geometry import measure_offsets
+from .types import NANOSECONDS, Array, HandState, Record
 
 
 @dataclass(frozen=True)
@@ -85,3 +88,46 @@ class Scene(Record):
             relation = 'older' if age > 0.0 else 'newer'
             return 'stale', f'obstacles are {abs(age):.3g} s {relation} than the hand pose (scene.timeout_s is {timeout_s:g})'
         return None
+
+
+@dataclass(frozen=True, eq=False)
+class ReachingScene(Record):
+    """One reaching problem.
+
+    hand: where it starts; goals (g, 2) [m]; obstacles; noise (2,): c per step, None for the parameters' noise scaled to the step;
+    guess (N + 1, 2) [m]: path in the only class to be solved, None to search the classes; config: parameters, of which
+    `duration.fixed_s` is the duration; goal_names, goal_objects (g,): what answers call the goals, and the id of the
+    obstacle that each is, or none.
+    """
+
+    hand: HandState
+    goals: Array
+    obstacles: Obstacles
+    noise: Array | None
+    guess: Array | None
+    config: Config
+    goal_names: tuple[str, ...] = ()
+    goal_objects: tuple[str | None, ...] = ()
+
+    @property
+    def avoided(self) -> Obstacles:
+        """The obstacles that the centre of the hand has to avoid: those of the scene, larger by the radius of the hand."""
+        return self.obstacles.grow(self.config.scene.hand_radius)
+
+    @property
+    def duration_s(self) -> float:
+        """Duration of the movement [s]."""
+        return self.config.duration.fixed_s
+
+    def check(self) -> None:
+        """Raise SceneError if the start lies inside the mean boundary of an obstacle, or the object of a goal is no obstacle."""
+        start, obstacles = self.hand.mean[:2], self.avoided
+        distances = measure_offsets(start, obstacles)[1][0]
+        for row in np.flatnonzero(distances < obstacles.radius)[:1]:
+            core = 'centre' if obstacles.corners[row] == 1 else 'polygon'
+            found = f'{start.tolist()}, {max(round(distances[row], 9), 0.0):.4g} m from its {core}'
+            words = f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m'
+            raise SceneError('start', words, found)
+        for row, name in enumerate(self.goal_objects):
+            if name is not None and name not in obstacles.ids:
+                raise SceneError(f'goals[{row}].object', 'the id of an obstacle', repr(name))

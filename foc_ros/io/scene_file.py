@@ -21,7 +21,7 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, join_errors
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, Shape, collect_obstacles
-from foc_ros.core.reach import ReachingScene
+from foc_ros.core.scene import ReachingScene
 from foc_ros.core.solution import Goal
 from foc_ros.core.support import FARTHEST, GoalTable, collect_goals
 from foc_ros.core.types import HandState
