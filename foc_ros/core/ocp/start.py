@@ -122,6 +122,6 @@ def follow(problem: Problem, times: Array, places: Array, weight: float, control
     free = interpolate_position(problem.free, horizon.dt, times * horizon.dt)
     rows = np.concatenate((rows / length[:, None], horizon.position_response.at(times).reshape(-1, len(control))))
     missing = np.concatenate((targets / length, (places - free).ravel())) - rows @ control
-    softness = np.concatenate((np.full(len(length), JITTER), np.full(2 * len(times), weight)))
-    followed: Array = control + rows.T @ np.linalg.solve(rows @ rows.T + np.diag(softness), missing)
+    may_miss = np.concatenate((np.full(len(length), JITTER), np.full(2 * len(times), weight)))
+    followed: Array = control + rows.T @ np.linalg.solve(rows @ rows.T + np.diag(may_miss), missing)
     return followed
