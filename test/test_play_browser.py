@@ -297,6 +297,8 @@ def test_the_page_fits_on_a_phone(browser, library, dark):
 def test_a_finger_moves_the_hand_and_drags_obstacles_and_goals_on_a_phone(browser, library):
     visit(browser, library, *PHONE)
     click(browser, 'restore')
+    first = 'Math.hypot(play.view.scene.obstacles[0].x - 0.14, play.view.scene.obstacles[0].y - 0.015) < 2e-3'
+    wait_for(browser, first, 'the first scene')
 
     def drag(*points):
         for row, point in enumerate(points):
