@@ -225,7 +225,7 @@ def noise() -> Figure:
             for movement in roll_out(solution, 30):
                 paths.plot(*(movement + up).T, color=colour, linewidth=0.5, alpha=0.35)
             paths.plot(*(solution.path + up).T, color=colour, linewidth=2.2)
-            for row in range(5, STEPS + 1, 5):
+            for row in range(3, len(solution.path), 3):
                 ellipse = draw.make_stddev_ellipse(solution.path[row] + up, solution.covariance[row, :2, :2])
                 ellipse.set(facecolor='none', edgecolor=colour, linewidth=0.9, alpha=0.8, zorder=3)
                 paths.add_patch(ellipse)
