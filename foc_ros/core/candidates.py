@@ -12,7 +12,7 @@ import numpy as np
 
 from .classes import find_path_sides
 from .classes.rows import find_decisions, tabulate_sides
-from .classes.sides import compute_branch_times
+from .classes.sides import compute_branch_times, measure_passages
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
 from .likelihood import BETWEEN_OPERATORS, ClassGoals, compute_likelihoods, compute_lookahead_share
@@ -242,11 +242,12 @@ def rank_candidates(
     taken = [each for each in candidates if each.has_likelihood]
     time_s = min((float(each.solution.times[-1]) for each in taken), default=0.0)
     looks_ahead = compute_lookahead_share(time_s, config, planning_spread) > 0.0
-    branch_times = compute_branch_times(taken, obstacles) if looks_ahead and config.lookahead_s > 0.0 else None
+    passages = measure_passages([each.solution for each in taken], obstacles) if looks_ahead or config.weaving > 0.0 else None
+    branch_times = compute_branch_times(passages) if passages is not None and looks_ahead and config.lookahead_s > 0.0 else None
     costs, shortfalls = (np.array(each) for each in ([c.cost for c in taken], [c.solution.safety_shortfall for c in taken]))
     decisions, goal = None, np.array([each.candidate.goal for each in taken], dtype=np.intp)
-    if len(taken) > 1 and (looks_ahead or config.weaving > 0.0):
-        decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
+    if len(taken) > 1 and passages is not None:
+        decisions = find_decisions(tabulate_sides(passages), goal, obstacles, hand, goals)
     among = ClassGoals(goal, weights) if len(goals) > 1 else None
     shares = compute_likelihoods(costs, config, branch_times, shortfalls, decisions, time_s, planning_spread, among)
     ranked = [replace(each, likelihood=share) for each, share in zip(taken, shares.tolist(), strict=True)]

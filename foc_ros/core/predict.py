@@ -233,21 +233,20 @@ def _solve(
 
 def _hold_answer(solved: PredictedCandidate, track: Track, hand: HandState) -> PredictedCandidate:
     """Return the rest of the last answer of a class that could not be solved, if it is young enough."""
-    if solved.has_likelihood or track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):
+    if solved.has_likelihood:
         return solved
     return _hold_track(track, solved.candidate, hand, solved.solution.message) or solved
 
 
 def _hold_absent(track: Track, hand: HandState) -> PredictedCandidate | None:
     """Return the rest of the last answer of a class that is no candidate any more, if it is young enough."""
-    if not track.is_solved_within(hand.stamp_ns, HOLD_S):
-        return None
     return _hold_track(track, track.candidate, hand, 'the class is not followed any more')
 
 
 def _hold_track(track: Track, candidate: Candidate, hand: HandState, reason: str) -> PredictedCandidate | None:
-    """Return what remains of the solution of a track, under the name of a candidate; None if nothing remains."""
-    assert track.solution is not None
+    """Return what remains of the solution of a track, under the name of a candidate; None if it is too old or nothing remains."""
+    if track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):
+        return None
     age_s = (hand.stamp_ns - track.solved_ns) / NANOSECONDS
     rest = take_rest(track.solution, age_s, hand.mean[:2], reason)
     if rest is None:

@@ -20,7 +20,7 @@ from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording, group_by_operator
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows, tabulate_sides
-from foc_ros.core.classes.sides import BranchTimes, compute_branch_times
+from foc_ros.core.classes.sides import BranchTimes, compute_branch_times, measure_passages
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, RecordingError, warn
 from foc_ros.core.hand.duration import is_passing
@@ -203,7 +203,8 @@ def _tabulate_candidates(
     predicted, passing = prediction.candidates, is_passing(config.duration)
     solutions = [each.solution for each in predicted]
     has_likelihood = np.array([each.has_likelihood for each in predicted])
-    sides = tabulate_sides(solutions, obstacles)
+    passages = measure_passages(solutions, obstacles)
+    sides = tabulate_sides(passages)
     for row, each in zip(sides, predicted, strict=True):  # those of the label where a candidate could not be solved
         known = {} if each.has_likelihood else dict(each.candidate.sides)
         row[:] = [known.get(identity, side) for identity, side in zip(obstacles.ids, row, strict=True)]
@@ -231,7 +232,7 @@ def _tabulate_candidates(
         duration_sensitivity=np.array(
             [interpolate_steps(compute_duration_sensitivity(each, passing)[:, :2], each.dt) for each in solutions]
         ),
-        branch_times=compute_branch_times(predicted, obstacles),
+        branch_times=compute_branch_times(passages),
         decisions=find_decisions(sides[has_likelihood], goal[has_likelihood], grown, hand, goals),
     )
 

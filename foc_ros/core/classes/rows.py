@@ -14,18 +14,16 @@ gaps of this row. A row within which the goal of the class lies, or beyond it, i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import find_offset, tabulate_edges
-from foc_ros.core.solution import LEFT, RIGHT, Solution
+from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import Array, HandState
 
-from .sides import find_offsets, sweep
+from .sides import Passages
 
 Rows = NDArray[np.int64]
 WALL = -1
@@ -90,13 +88,9 @@ class Decisions(NamedTuple):
     next_row: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
 
 
-def tabulate_sides(solutions: Sequence[Solution], obstacles: Obstacles) -> NDArray[np.int8]:
-    """Return LEFT or RIGHT, (k, n): the side on which the mean path of each solution passes each obstacle; 0 if it ends in it."""
-    if not solutions:
-        return np.zeros((0, len(obstacles)), dtype=np.int8)
-    offset, edges = find_offsets(solutions, obstacles)[1], tabulate_edges(obstacles.vertices, obstacles.corners)
-    is_end = find_offset(offset[:, -1, :, 0], offset[:, -1, :, 1], edges).distance < obstacles.radius
-    return np.where(is_end, 0, np.where(sweep(offset) < 0.0, LEFT, RIGHT)).astype(np.int8)
+def tabulate_sides(passages: Passages) -> NDArray[np.int8]:
+    """Return LEFT or RIGHT, (k, n): the side on which each path passes each obstacle; 0 if it ends in it."""
+    return np.where(passages.is_passed, np.where(passages.swept < 0.0, LEFT, RIGHT), 0).astype(np.int8)
 
 
 def find_decisions(

@@ -18,7 +18,6 @@ from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import TURN, find_offset, tabulate_edges
 from foc_ros.core.obstacles.risk import centre_trajectories
-from foc_ros.core.prediction import PredictedCandidate
 from foc_ros.core.solution import LEFT, RIGHT, Solution
 from foc_ros.core.types import Array, Record
 
@@ -141,32 +140,47 @@ class BranchTimes(Record):
         return BranchTimes(self.after_s[np.ix_(rows, rows)], self.path_class[rows])
 
 
-def compute_branch_times(outcomes: Sequence[PredictedCandidate], obstacles: Obstacles) -> BranchTimes:
-    """Compute when the mean paths of candidates separate; obstacles: where they are now.
+@dataclass(frozen=True, eq=False)
+class Passages(Record):
+    """How the mean paths of k solutions pass n obstacles.
+
+    dt (k,): steps [s]; swept (k, n): angles that the paths sweep about the centres [rad]; distance (k, N + 1, n): from the
+    polygons at the steps [m]; is_passed (k, n): false for an obstacle in which a path ends, and which it passes on no side.
+    """
+
+    dt: Array
+    swept: Array
+    distance: Array
+    is_passed: NDArray[np.bool_]
+
+
+def measure_passages(solutions: Sequence[Solution], obstacles: Obstacles) -> Passages:
+    """Return how the mean paths of solutions with equally many steps pass obstacles, which move from where they are now."""
+    if not solutions:
+        none = np.zeros((0, len(obstacles)))
+        return Passages(np.zeros(0), none, none[:, None], none > 0.0)
+    path, dt = np.stack([each.path for each in solutions]), np.array([each.dt for each in solutions])
+    drift = dt[:, None, None, None] * obstacles.velocity
+    offset = path[:, :, None] - centre_trajectories(obstacles.centre, drift, path.shape[1] - 1)
+    edges = tabulate_edges(obstacles.vertices, obstacles.corners)
+    distance = find_offset(offset[..., 0], offset[..., 1], edges).distance
+    return Passages(dt, sweep(offset), distance, distance[:, -1] >= obstacles.radius)
+
+
+def compute_branch_times(passages: Passages) -> BranchTimes:
+    """Compute when the mean paths of candidates separate.
 
     Two paths from one hand pass an obstacle on different sides if the angles that they sweep about it differ by more than half a
     turn. They separate at the first such obstacle, when the first of the two is nearest to it. A parabola through three
-    steps gives this time, so that it does not jump. A path passes an obstacle in which it ends on neither side.
+    steps gives this time, so that it does not jump.
     """
-    if not outcomes:
+    if not len(passages.dt):
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
-    dt, offset = find_offsets([each.solution for each in outcomes], obstacles)
-    swept, edges = sweep(offset), tabulate_edges(obstacles.vertices, obstacles.corners)
-    distance = find_offset(offset[..., 0], offset[..., 1], edges).distance
-    passing_s, passes = dt[:, None] * _find_minima(distance), distance[:, -1] >= obstacles.radius
-    is_opposite = (np.abs(swept[:, None] - swept) > np.pi) & passes[:, None] & passes
+    swept, is_passed = passages.swept, passages.is_passed
+    passing_s = passages.dt[:, None] * _find_minima(passages.distance)
+    is_opposite = (np.abs(swept[:, None] - swept) > np.pi) & is_passed[:, None] & is_passed
     after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)
     return BranchTimes(after_s, np.isinf(after_s).argmax(axis=1))
-
-
-def find_offsets(solutions: Sequence[Solution], obstacles: Obstacles) -> tuple[Array, Array]:
-    """Return the steps dt (k,) [s] of one or more solutions, and offsets (k, N + 1, n, 2) [m] at their equally many steps.
-
-    Offsets are those of the mean path from the centre of each obstacle, which moves from where it is now.
-    """
-    path, dt = np.stack([each.path for each in solutions]), np.array([each.dt for each in solutions])
-    drift = dt[:, None, None, None] * obstacles.velocity
-    return dt, path[:, :, None] - centre_trajectories(obstacles.centre, drift, path.shape[1] - 1)
 
 
 def _find_minima(distance: Array) -> Array:

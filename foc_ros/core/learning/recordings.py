@@ -50,6 +50,7 @@ from numpy.typing import NDArray
 from foc_ros.core.classes import find_path_sides
 from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_demonstration
 from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
+from foc_ros.core.classes.sides import measure_passages
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.obstacles.risk import centre_trajectories
@@ -171,7 +172,8 @@ def pool_recordings(
     if not len(evidence.row):
         return list(candidates)
     goal = np.array([each.candidate.goal for each in taken], dtype=np.intp)
-    decisions = find_decisions(tabulate_sides([each.solution for each in taken], obstacles), goal, obstacles, hand, goals)
+    sides = tabulate_sides(measure_passages([each.solution for each in taken], obstacles))
+    decisions = find_decisions(sides, goal, obstacles, hand, goals)
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
     of_ways = evidence.weight * library.shows_ways[evidence.row]
     counts, on_ways = (np.array([each[is_same].sum() for is_same, _ in agreements]) for each in (evidence.weight, of_ways))
