@@ -31,7 +31,7 @@ import numpy as np
 from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
-from .solution import Candidate, Solution
+from .solution import Candidate, Solution, agrees
 from .types import NANOSECONDS, Array, Record, Rest, as_readonly
 
 HOLD_S = 0.2
@@ -209,10 +209,9 @@ NO_TRACKS = Tracks()
 
 def count_shared(before: Candidate, now: Candidate) -> int | None:
     """Return how many sides two candidates share, None if they are different classes: no name is the other with less in it."""
-    fewer, more = sorted((before.sides, now.sides), key=len)
-    if before.goal != now.goal or not set(fewer) <= set(more):
+    if before.goal != now.goal or not agrees(frozenset(before.sides), frozenset(now.sides)):
         return None
-    return len(fewer)
+    return min(len(before.sides), len(now.sides))
 
 
 def take_rest(solution: Solution, age_s: float, position: Array, reason: str) -> Solution | None:

@@ -15,7 +15,7 @@ from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.solution import LEFT, RIGHT, Candidate
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Way
 from foc_ros.core.types import Array, as_readonly
 
 from .graph import Graph, Lines, Rows, build_graph
@@ -28,8 +28,6 @@ STATES, STATES_PER_CANDIDATE = 1000, 300
 """Number of states that the search for one goal may look at; a few dozen are enough for four candidates."""
 OFF_HAND = 1e-9
 """A goal that lies on the hand is moved away by this much [m]."""
-Way = frozenset[tuple[str, int]]
-"""LEFT or RIGHT by the id of an obstacle."""
 
 
 class PathClass(NamedTuple):

@@ -17,10 +17,10 @@ from foc_ros.core.config import MOST_CANDIDATES, HomotopyConfig
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.solution import Candidate
+from foc_ros.core.solution import Candidate, Way, agrees
 from foc_ros.core.types import Array
 
-from .scene import PathClass, SearchScene, Way
+from .scene import PathClass, SearchScene
 
 REPEAT = 1.5
 """A class that passes the obstacles as a class to another goal does ranks as if it were this times as long: it adds little."""
@@ -211,7 +211,8 @@ class _Ranking:
         chosen, labels, room = list[tuple[float, str, PathClass]](), {each.label for each in bests}, count - len(bests)
 
         def add(found: PathClass) -> None:
-            factor = REPEAT if goes_along(found.way, [way for goal, way in before if goal != found.goal]) else 1.0
+            is_repeated = any(goal != found.goal and agrees(found.way, way) for goal, way in before)
+            factor = REPEAT if is_repeated else 1.0
             insort(chosen, (factor * self._rank(found)[0], found.label, found))
             before.append((found.goal, found.way))
             labels.add(found.label)
@@ -246,9 +247,5 @@ class _Ranking:
         return found
 
     def _rank(self, found: PathClass) -> tuple[float, str]:
-        return found.key * (STAY if goes_along(found.way, self._ways[found.goal]) else 1.0), found.label
-
-
-def goes_along(way: Way, others: Iterable[Way]) -> bool:
-    """Tell whether a class passes the obstacles as another one does: one name is the other with obstacles left out."""
-    return any(way <= other or other <= way for other in others)
+        is_followed = any(agrees(found.way, way) for way in self._ways[found.goal])
+        return found.key * (STAY if is_followed else 1.0), found.label

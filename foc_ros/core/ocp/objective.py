@@ -49,17 +49,15 @@ def tabulate_cost(problem: Problem) -> Cost:
     gain, dt = problem.horizon.gain, problem.horizon.dt
     fixed = (problem.preference.fixed_cost / problem.preference.dt + COST_FLOOR / dt) * gain**2
     rows, targets, softness = problem.goal_rows
-    is_fixed, rows = softness == 0.0, rows / gain
-    length = np.sqrt((rows[is_fixed] ** 2).sum(axis=1))
+    is_soft = softness > 0.0
     return Cost(
         1.0 + problem.weighted_variance,
         problem.summed_variance,
         fixed,
-        rows[is_fixed] / length[:, None],
-        targets[is_fixed] / length,
-        rows[~is_fixed],
-        targets[~is_fixed],
-        0.5 * gain**2 / softness[~is_fixed],
+        *problem.fixed_goal,
+        rows[is_soft] / gain,
+        targets[is_soft],
+        0.5 * gain**2 / softness[is_soft],
     )
 
 

@@ -178,6 +178,14 @@ class Problem(Record):
             np.concatenate((softness, np.tile(0.5 / self.stage_weights[stage], steps - 1))),
         )
 
+    @cached_property
+    def fixed_goal(self) -> tuple[Array, Array]:
+        """Rows (e, 2N) of unit length and targets (e,) that the goal fixes, for controls in units of `Horizon.gain`."""
+        rows, targets, softness = self.goal_rows
+        is_fixed, rows = softness == 0.0, rows / self.horizon.gain
+        length = np.sqrt((rows[is_fixed] ** 2).sum(axis=1))
+        return rows[is_fixed] / length[:, None], targets[is_fixed] / length
+
     def states(self, control: Array) -> Array:
         """Return the mean state of a stacked control (2N,) at steps 0..N, (N + 1, n)."""
         moved = self.free.copy()

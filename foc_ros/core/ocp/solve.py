@@ -161,9 +161,7 @@ def _expect(problem: Problem, effort: float, shortfall: float, gain: float) -> t
 
     The effort does not fall below that of a movement without obstacles.
     """
-    rows, targets, softness = problem.goal_rows
-    scale = np.sqrt((rows**2).sum(axis=1))[softness == 0.0]
-    free = np.linalg.lstsq(rows[softness == 0.0] / scale[:, None], targets[softness == 0.0] / scale, rcond=None)[0]
+    free = np.linalg.lstsq(*problem.fixed_goal, rcond=None)[0] / problem.horizon.gain
     least, preference = float(free @ free), problem.preference
     if preference.is_hard or preference.beta == 0.0:
         return max(effort * math.exp(-gain), min(least, effort)), 0.0

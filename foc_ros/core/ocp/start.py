@@ -116,12 +116,10 @@ def follow(problem: Problem, times: Array, places: Array, weight: float, control
     """
     horizon = problem.horizon
     control = np.zeros(2 * horizon.steps) if control is None else control
-    rows, targets, softness = problem.goal_rows
-    rows, targets = rows[softness == 0.0] / horizon.gain, targets[softness == 0.0]
-    length = np.sqrt((rows**2).sum(axis=1))
+    goal, targets = problem.fixed_goal
     free = interpolate_position(problem.free, horizon.dt, times * horizon.dt)
-    rows = np.concatenate((rows / length[:, None], horizon.position_response.at(times).reshape(-1, len(control))))
-    missing = np.concatenate((targets / length, (places - free).ravel())) - rows @ control
-    may_miss = np.concatenate((np.full(len(length), JITTER), np.full(2 * len(times), weight)))
+    rows = np.concatenate((goal, horizon.position_response.at(times).reshape(-1, len(control))))
+    missing = np.concatenate((targets, (places - free).ravel())) - rows @ control
+    may_miss = np.concatenate((np.full(len(goal), JITTER), np.full(2 * len(times), weight)))
     followed: Array = control + rows.T @ np.linalg.solve(rows @ rows.T + np.diag(may_miss), missing)
     return followed
