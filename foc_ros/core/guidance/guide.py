@@ -48,9 +48,9 @@ from .paths import (
 )
 
 DOUBT = 0.25
-"""Odds that no candidate says what the operator wants: a certain candidate at rest has 0.6 of its force."""
+"""Weight of the case that the operator wants none of the candidates: a certain candidate has 0.6 of its force at rest."""
 EVIDENCE = 1.5
-"""Acceleration of the hand that makes a candidate e times as likely whose force has its direction [m/s^2]."""
+"""Acceleration of the hand along the force of a candidate that makes this candidate e times as likely [m/s^2]."""
 LATE_PERIODS = 2.0
 """Longest time between two updates for which the tank is guaranteed, in periods of `guidance.rate_hz`."""
 
@@ -285,15 +285,15 @@ def _find_bound(settings: GuidanceConfig, seen: SeenMargins, energy: float, forc
 
 
 def weigh_candidates(likelihoods: Array, forces: Array, acceleration: Array, unknown: float = 0.0, other: float = 0.0) -> Array:
-    """Return the probability w_i (c,) that candidate i says what the operator wants, given the acceleration of the hand.
+    """Return the probability w_i (c,) that the operator wants candidate i, given the acceleration of the hand.
 
-    Who wants another way pushes to it before the likelihoods p_i say so. Of the direction n_i of its force (c, 2) [N], and with
-    the acceleration a (2,) [m/s^2],
+    An operator who wants another way accelerates towards it before the likelihoods p_i follow. With the direction n_i of the
+    force of candidate i (c, 2) [N], and the acceleration a (2,) [m/s^2],
 
         w_i ~ p_i exp(a . n_i / A),
 
-    where A is `EVIDENCE`. What is left of one is the probability that none says it, which has the weight u + o + D: the share u
-    that is unknown, the share o of another goal, and the doubt D, `DOUBT`.
+    where A is `EVIDENCE`. The rest is the probability that the operator wants none of them, a case that has the weight u + o + D:
+    the share u that is unknown, the share o of another goal, and D, which is `DOUBT`.
     """
     logs = np.clip(normalize(forces) @ acceleration / EVIDENCE, -50.0, 50.0)  # beyond, a candidate has all or nothing
     weights = likelihoods * np.exp(logs)

@@ -25,8 +25,8 @@ BESIDE = 0.6
 These rows hold the mean where it is then, so that a contact slides by about as much in an iteration.
 """
 APART = 0.25
-"""Least time from other rows of the same obstacle of one where it held the mean off, and of one where a path would leap over it
-[steps]: along a side there may be two, but more of them keep contacts from sliding."""
+"""Least time between other rows of an obstacle and one that is added, for a contact of the last QP or for a place over which a
+path would leap [steps]. Along a side there may be two contacts; more rows keep them from sliding."""
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5

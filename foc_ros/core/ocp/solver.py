@@ -38,8 +38,8 @@ ROUGH_GAIN = 1e-3
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
 LAST_GAIN = 1e-4
-"""Gain that may be left when a problem counts as solved, by what its last whole step has missed, and gain of a failed step that
-rounding hides."""
+"""Gain, as a logarithm of cost, that may remain when a problem counts as solved. A step that fails although its QP promised less
+fails by rounding."""
 CLOSE = 3e-5
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
 UNLIKELY, SMALL_PART = 6.0, 0.02

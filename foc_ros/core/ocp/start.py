@@ -17,8 +17,8 @@ from .margin import Indices
 from .problem import Problem
 
 HELD = 3e-3
-"""Distance from the places where an earlier solution passed its contacts that costs as much as a change of the control by its
-whole length, relative to the scene."""
+"""Distance from the places where an earlier solution touched obstacles, relative to the scene, that counts as much as a change of
+the control by its own size."""
 JITTER = 1e-13
 """Softness of the goal: its rows, of unit length, may depend on each other."""
 
@@ -57,8 +57,8 @@ def cold_start(guess: Array) -> Start:
 def warm_start(previous: Solution, problem: Problem) -> Start:
     """Start at an earlier solution, resampled at the new steps so that both end at the same time.
 
-    Before the earlier solution begins, the hand is where it began; after it ends, the hand rests at its goal. The control is
-    changed as little as it has to be so that the hand, from where it is now, passes the contacts as the earlier solution did.
+    Before the earlier solution begins, the hand is where it began; after it ends, the hand rests at its goal. From where
+    the hand is now, the least change of the control leads it to the places where the earlier solution touched obstacles.
     """
     steps, dt, gain = problem.horizon.steps, problem.horizon.dt, problem.horizon.gain
     elapsed_s = previous.dt * len(previous.control) - dt * steps
