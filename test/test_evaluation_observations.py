@@ -30,8 +30,8 @@ GOALS = [(0.32, 0.05), (0.32, -0.05)]
 
 
 @pytest.fixture(autouse=True)
-def without_a_filter(monkeypatch):
-    monkeypatch.setattr(tracks, 'SMOOTHING_S', 1e-9)
+def without_limited_changes(monkeypatch):
+    monkeypatch.setattr(tracks, 'FULL_CHANGE_S', 1e-9)
 
 
 @pytest.fixture(scope='module')

@@ -105,8 +105,9 @@ def predict(
         other = find_other_share(scene.hand, ends, scene.durations_s, prior, spread_m)
         rest = Rest((1.0 - other) * unknown, other)
     known_share = 1.0 - sum(rest)
-    smooth, rest = known.smooth([replace(each, likelihood=known_share * each.likelihood) for each in pooled], rest, stamp_ns)
-    predicted, best = scene.heights.add_to(smooth), known.choose_most_likely(smooth)
+    shared = [replace(each, likelihood=known_share * each.likelihood) for each in pooled]
+    limited, rest = known.limit_changes(shared, rest, stamp_ns)
+    predicted, best = scene.heights.add_to(limited), known.choose_most_likely(limited)
     counts = {
         'merged': len(answered) - len(ranked),
         'culled': len(scene.blocking) - len(scene.near),

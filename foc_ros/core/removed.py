@@ -20,7 +20,7 @@ REMOVED = {
     'likelihood.heading_bias': 'reaches that bend are learnt as recordings: experience.learning',
     'likelihood.adaptation': 'nothing is learnt from choices any more',
     'likelihood.hold_s': 'it is 0.2 s',
-    'likelihood.smoothing_s': 'it is 0.1 s',
+    'likelihood.smoothing_s': 'a likelihood changes by one in 0.15 s at most',
     'likelihood.margin': 'it is 0.05',
     'experience.prior_count': RECORDINGS,
     'experience.prior_count_beyond': RECORDINGS,

@@ -12,12 +12,13 @@ duration T over [a, T], resampled at N steps of (T - a) / N, that begins where t
 An unlikely class keeps it too, as long as the scene stays the same. Each prediction solves one in `TURNS` of these classes: those
 whose solutions are oldest.
 
-Likelihoods change gradually, those of what no candidate has as well: with p_i of this prediction, l_i before (0 for a new class),
-and the time h between both,
+No likelihood changes at once from one extreme to the other, that of what no candidate has neither: with p_i of this prediction,
+l_i before (0 for a new class), and the time h between both,
 
-    l_i <- ((1 - g) l_i + g p_i) / sum,   g = 1 - exp(-h / `SMOOTHING_S`).
+    l_i <- ((1 - g) l_i + g p_i) / sum,   g = min(1, h / (`FULL_CHANGE_S` max_i |p_i - l_i|)).
 
-With a new goal all of them are those of this prediction: that nothing was known of it does not make it unlikely.
+Small changes are not delayed. With a new goal all likelihoods are those of this prediction: that nothing was known of it does not
+make it unlikely.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ predictions, within which a solver or a search that missed a class finds it agai
 SELDOM, TURNS, REST_S = 0.02, 5, 0.1
 """A class is solved in one of TURNS predictions if its likelihood is less than the part SELDOM of the largest one. No class waits
 for more than REST_S [s]."""
-SMOOTHING_S = 0.1
-"""Time constant of the filter of the likelihoods [s]: half the time in which people react to what they see."""
-LEAD = 0.05
+FULL_CHANGE_S = 0.15
+"""Shortest time in which a likelihood changes by one [s]: less than people take to react to what they see."""
+LEAD = 0.15
 """Lead in likelihood that another class needs to become the most likely one: equal ones do not swap by noise."""
 MOVED_M = 0.01
 """A goal that moves by more than this between two predictions is another goal, and an obstacle is another obstacle [m]."""
@@ -153,17 +154,21 @@ class Tracks(Record):
             if each.number not in numbers and all(count_shared(each.candidate, other) is None for other in candidates)
         )
 
-    def smooth(self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int) -> tuple[list[PredictedCandidate], Rest]:
-        """Return candidates with numbers and likelihoods p_i with the likelihoods l_i, ranked, and what none has likewise."""
+    def limit_changes(
+        self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int
+    ) -> tuple[list[PredictedCandidate], Rest]:
+        """Return candidates with likelihoods p_i with the likelihoods l_i, ranked, and what no candidate has likewise."""
         known = (*self.followed, *self.absent)
         before, goals = {each.number: each.likelihood for each in known}, {each.candidate.goal for each in known}
         taking_part = [each for each in predicted if each.has_likelihood]
-        gain = -math.expm1(-self.measure_time(stamp_ns) / SMOOTHING_S)
-        if not any(each.way in before for each in taking_part) or any(each.candidate.goal not in goals for each in taking_part):
-            gain = 1.0
-        weights = [(1.0 - gain) * before.get(each.way, 0.0) + gain * each.likelihood for each in taking_part]
-        unknown, other = ((1.0 - gain) * old + gain * now for old, now in zip(self.rest, rest, strict=True))
-        unknown = unknown if unknown >= 1e-6 else 0.0
+        old = np.array([*(before.get(each.way, 0.0) for each in taking_part), *self.rest])
+        change = np.array([*(each.likelihood for each in taking_part), *rest]) - old
+        largest, allowed = float(abs(change).max()), self.measure_time(stamp_ns) / FULL_CHANGE_S
+        is_new = all(each.way not in before for each in taking_part) or any(
+            each.candidate.goal not in goals for each in taking_part
+        )
+        gain = 1.0 if is_new or largest <= allowed else allowed / largest
+        *weights, unknown, other = (old + gain * change).tolist()
         factor = 1.0 / (sum(weights) + unknown + other)
         ranked = [replace(each, likelihood=factor * weight) for each, weight in zip(taking_part, weights, strict=True)]
         ranked.sort(key=lambda each: (-each.likelihood, each.label))
