@@ -33,17 +33,17 @@ PAGE, EXAMPLES = ROOT / 'doc' / 'people.md', ROOT / 'doc' / 'examples'
 D3IL, HLP, PICKS = 'd3il_avoiding', 'hlp_reaching', 'hlp_picks'
 RARE = Config().with_values({'rate_hz': 4.0})
 HAND = Config().with_values({'scene.hand_radius': 0.0125, 'rate_hz': 4.0})
-UNLEARNT = {f'{each}.adaptation': 'none' for each in ('duration', 'covariance')}
+UNLEARNT = {'duration.adaptation': 'none', 'covariance.adaptation': 'none', 'experience.learning': 'none'}
 SETTINGS = {
     (D3IL, 'defaults, nothing learnt'): RARE.with_values(UNLEARNT),
-    (D3IL, 'defaults, pace learnt'): RARE.with_values({'covariance.adaptation': 'none'}),
+    (D3IL, 'defaults, pace learnt'): RARE.with_values(UNLEARNT | {'duration.adaptation': 'online'}),
     (D3IL, 'defaults'): RARE,
     (D3IL, 'thumb_stick.yaml'): load_parameter_file(EXAMPLES / 'thumb_stick.yaml').with_values({'rate_hz': 4.0}),
     (HLP, 'defaults, nothing learnt'): HAND.with_values(UNLEARNT),
     (HLP, 'defaults'): HAND,
     (HLP, 'free_hand.yaml'): load_parameter_file(EXAMPLES / 'free_hand.yaml').with_values({'rate_hz': 4.0}),
 }
-PICK = Config().with_values({'rate_hz': 4.0})
+PICK = Config().with_values({'rate_hz': 10.0})
 GOAL_SETTINGS = {'defaults, past goals not counted': PICK.with_values({'likelihood.past_goals': 0.0}), 'defaults': PICK}
 OTHER_SCORES = {'area_under_curve_half_way': 2, 'calibration_error': 3, 'loss': 3}
 """Scores of the share of another goal, with their digits."""

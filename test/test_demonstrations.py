@@ -19,7 +19,7 @@ from foc_ros.core.classes.library import STEP_S, GuessTiming, recall_demonstrati
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
 from foc_ros.core.learning.learnt import Knowledge
-from foc_ros.core.learning.recordings import NO_LIBRARY, PRIOR_COUNT, make_library
+from foc_ros.core.learning.recordings import NO_LIBRARY, PRIOR_COUNT, PRIOR_COUNT_GOAL, make_library
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predict import predict
@@ -161,6 +161,27 @@ def test_likelihoods_are_those_of_a_dirichlet_distribution():
         if each.has_likelihood:
             expected = (prior * each.likelihood + count * (label in taken)) / (prior + count)
             assert after[label].likelihood == pytest.approx(expected, abs=1e-9)
+
+
+def test_recordings_tell_goals_apart_by_where_they_led_and_not_by_how_many_there_are():
+    """A hand moves like all recordings to one of two goals, and like none to the other."""
+    goals, none = np.array([[0.3, 0.1], [0.3, -0.1]]), make_obstacles()
+    share = np.linspace(0.0, 1.0, 65)[:, None]
+    there, elsewhere = (record_demonstration('world', share * goal, none, move(share * goal)) for goal in goals)
+    moving = replace(HAND, mean=np.array([*there.states[20], 0.0, 0.0]), onset_ns=0)
+
+    def find_odds(recordings, hand):
+        library = Knowledge(make_library((), recordings))
+        first, second = (each.likelihood for each in predict(CONFIG, hand, none, goals, NO_TRACKS, library)[0].goals)
+        return first / second
+
+    for hand in (HAND, moving):
+        for one_sided in ([], [there] * 9):
+            assert find_odds(one_sided, hand) == pytest.approx(find_odds([], hand)), 'of the other goal nothing is known'
+    assert find_odds([there] * 9 + [elsewhere], HAND) == pytest.approx(find_odds([], HAND), rel=1e-3), 'all began here'
+    known = find_odds([there] * 3 + [elsewhere] * 2, moving) / find_odds([], moving)
+    prior, near = PRIOR_COUNT_GOAL, 3 / 5
+    assert known == pytest.approx((prior * near + 3) / (prior + 3) / (prior * near / (prior + 2)), rel=0.02)
 
 
 MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)

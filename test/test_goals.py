@@ -171,7 +171,9 @@ def test_goals_are_compared_by_the_effort_to_be_there_at_a_common_time():
 
 
 HOME, NEAR, FAR = (0.0, 0.0), (0.2, 0.1), (0.25, -0.15)
-CONFIG = Config().with_values({'foc.steps': 20, 'likelihood.other_goal': 0.0, 'estimator.gap_s': 10.0})
+CONFIG = Config().with_values(
+    {'foc.steps': 20, 'likelihood.other_goal': 0.0, 'estimator.gap_s': 10.0, 'experience.learning': 'none'}
+)
 BETA = CONFIG.likelihood.beta
 EXPECTED = 1.0 / (1.0 + ((0.25**2 + 0.15**2) / (0.2**2 + 0.1**2)) ** BETA)
 """Probability of the far goal by the distances from `HOME`."""

@@ -168,7 +168,7 @@ class ExperienceConfig(Group):
     """Use of recordings as evidence: those in the class library (`homotopy.library`), and those that are learnt."""
 
     learning: str = param(
-        'none',
+        'goals',
         'what movements that end at a goal say of later ones in the running program: nothing; paths and goals; also ways',
         choices=('none', 'goals', ONLINE),
     )

@@ -6,34 +6,41 @@ A recording r counts by how near its states come to the position p [m] and the v
 
     w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `POSITION_STDDEV`,  b = `VELOCITY_STDDEV`.
 
-From the state m of this maximum on, it passes obstacles on the sides of a class i towards the goal at its end. With G the classes
-that take the same gap in the next row, or lead to the same goal where no row is ahead, W those of the same way through all rows,
-n_i = sum of the w_r of class i, and n_G and n_W = sums of the n_i, the likelihoods p_i of the model are means of three Dirichlet
-distributions: of the gap, of the way beyond it, and of the goal. They count as n_0 = `PRIOR_COUNT` recordings for the gap and for
-the goal, and as n_1 = `PRIOR_COUNT_BEYOND` for the way; the recordings are observations:
+Of the N_g recordings that end at goal g, n_g = sum of their w_r are where the hand is now. The likelihoods of the goals change as
+these shares differ from that of all recordings, q = sum_g n_g / sum_g N_g, which counts as n_2 = `PRIOR_COUNT_GOAL` recordings of
+each goal:
+
+    p_i <- p_i (n_2 q + n_g) / (n_2 + N_g) / sum,   g the goal of class i.
+
+How often a goal was reached does not matter here (`habits`), and of a goal without recordings nothing is known.
+
+From the state m of the maximum on, a recording passes obstacles on the sides of some classes. With G the classes that take the
+same gap in the next row, W those of the same way through all rows, and n_G and n_W = sums of the w_r of recordings that lead to
+the goal of such a class too, the likelihoods of gaps and ways are means of Dirichlet distributions. Their counts are n_0 =
+`PRIOR_COUNT` for the gap, and n_1 = `PRIOR_COUNT_BEYOND` for the way beyond it; the recordings are observations:
 
     p_G <- (n_0 p_G + n_G) / (n_0 + sum n),    p_W <- p_G (n_1 p_W / p_G + n_W) / (n_1 + n_G),
-    p_i <- p_W (n_0 p_i / p_W + n_i) / (n_0 + n_W),
 
-with the p_G and p_W of the model in the fractions p_W / p_G and p_i / p_W.
+with the p_G and p_W of the model in the fraction p_W / p_G.
 
 The path of a class is pooled with the recordings that take its gap in the next row, each up to where it passes an obstacle on
 another side than the class. If this path leaves the class or enters an obstacle, only the recordings of the class count, and if
 that one does so too, the path stays that of the plan. Effort and eta are always those of the plan. Without recordings near the
 hand, all is the model. Recordings of the running program change the likelihoods of goals and the paths only, unless
-`experience.learning` is `online`: people vary their ways between obstacles more than where they go.
+`experience.learning` is `online`: people vary their ways between obstacles more than their paths.
 
 **Pooled paths.**
 The recordings e that pass the next row as a candidate does, displaced so that they begin at the hand, are at a time t from now at
 x_e with weights w_e, which fade out over the FADE_S before a recording ends or parts from the class. With P the covariance of the
-position of the hand and b = `VELOCITY_STDDEV`, by which their velocities differ from that of the hand,
+position of the hand, b = `VELOCITY_STDDEV`, by which their velocities differ from that of the hand, and the covariance S of the
+plan, which tells as much of their spread as n_0 recordings,
 
-    n = sum w_e,   r = sum w_e x_e / n,   R = sum w_e (x_e - r) (x_e - r)' / n + P + (b t / 2)^2 I.
+    n = sum w_e,   r = sum w_e x_e / n,   R = (n_0 S + sum w_e (x_e - r) (x_e - r)') / (n_0 + n) + P + (b t / 2)^2 I.
 
 The position of a plan with mean m and covariance S becomes the logarithmic opinion pool (Genest and Zidek 1986,
-doi:10.1214/ss/1177013825) of both normal distributions, in which the plan counts as n_0 recordings:
+doi:10.1214/ss/1177013825) of both normal distributions, in which the plan counts as n_3 = `PRIOR_COUNT_PATH` recordings:
 
-    S' = ((1 - a) S^-1 + a R^-1)^-1,   m' = S' ((1 - a) S^-1 m + a R^-1 r),   a = n / (n + n_0).
+    S' = ((1 - a) S^-1 + a R^-1)^-1,   m' = S' ((1 - a) S^-1 m + a R^-1 r),   a = n / (n + n_3).
 
 From the time on at which less than half of the weight is left, m' - m decreases linearly to zero at the end of the plan.
 Velocity and acceleration change by the derivatives of m' - m. Given the position, their distribution remains that of the plan.
@@ -62,9 +69,12 @@ MOST_NEAR = 64
 """Number of recordings, the nearest ones, that count in one prediction: its time is bounded whatever the size of the library."""
 POSITION_STDDEV, VELOCITY_STDDEV = 0.02, 0.03
 """Distance [m] and difference of velocities [m/s] at which a recording counts less."""
-PRIOR_COUNT, PRIOR_COUNT_BEYOND, PRIOR_COUNT_PATH = 1.0, 30.0, 0.3
-"""Numbers of recordings as which the model counts: for the gap in the next row and for the goal; for the way beyond it; for the
-path to it. Operators vary more in far choices than their recordings say, and less in their paths than plans do."""
+PRIOR_COUNT, PRIOR_COUNT_BEYOND, PRIOR_COUNT_PATH, PRIOR_COUNT_GOAL = 1.0, 30.0, 0.3, 2.0
+"""Numbers of recordings as which the model counts: for the gap in the next row, and for the spread of paths; for the way beyond
+this row; for the path itself; for the goal. Operators vary more in far choices than their recordings say, and less in their
+paths than plans do."""
+LEAST_WEIGHT = 1e-3
+"""Weight of a recording below which it is not near."""
 FADE_S = 0.25
 """Time over which the weight of a recording falls to zero before its end [s]."""
 EXACT = 1e-12
@@ -76,16 +86,23 @@ class Library(Record):
     """The class library.
 
     demonstrations: one of each class, to recall; recordings: those with states, r of them; states (r, m, 4): x, y, vx, vy [m,
-    m/s], infinite beyond the end of each; ends (r,): the last state of each; scene (r,): equal numbers for recordings in the same
-    scene; shows_ways (r,): whether a recording is evidence of ways between obstacles, or only of goals and paths.
+    m/s], infinite beyond the end of each; ends (r,): the last state of each; goals (r, 2): where they lead [m]; scene (r,): equal
+    numbers for recordings in the same scene; shows_ways (r,): whether a recording is evidence of ways between obstacles, or only
+    of goals and paths.
     """
 
     demonstrations: tuple[Demonstration, ...]
     recordings: tuple[Demonstration, ...]
     states: Array
     ends: NDArray[np.intp]
+    goals: Array
     scene: tuple[int, ...]
     shows_ways: NDArray[np.bool_]
+
+    def find_here(self, frame_id: str, obstacles: Obstacles) -> NDArray[np.bool_]:
+        """Tell which recordings (r,) are of this scene: their obstacles are where they were."""
+        is_here = {scene: each.matches(frame_id, obstacles) for scene, each in zip(self.scene, self.recordings, strict=True)}
+        return np.array([is_here[scene] for scene in self.scene], dtype=np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +111,7 @@ class Evidence(Record):
 
     weight (e,); row (e,) in the library; state (e,), the nearest one; sides (e, n): LEFT or RIGHT, on which each passes the
     obstacles from there on, 0 for an obstacle that it does not know; passing_s (e, n): the time until then [s]; is_at_goal (e,
-    g): whether it ends at a goal.
+    g): whether it ends at a goal; recorded (g,): how many recordings of this scene end at each goal, near the hand or not.
     """
 
     weight: Array
@@ -103,6 +120,7 @@ class Evidence(Record):
     sides: NDArray[np.int8]
     passing_s: Array
     is_at_goal: NDArray[np.bool_]
+    recorded: NDArray[np.intp]
 
 
 def make_library(given: Sequence[Demonstration], learnt: Sequence[Demonstration] = ()) -> Library:
@@ -118,10 +136,11 @@ def make_library(given: Sequence[Demonstration], learnt: Sequence[Demonstration]
     for row, table in enumerate(tables):
         states[row, : len(table)] = table
     ends = np.array([len(table) - 1 for table in tables], dtype=np.intp)
+    goals = np.array([each.path[-1] for each in recordings]).reshape(-1, 2)
     numbers = dict[tuple[object, ...], int]()
     scene = tuple(numbers.setdefault((each.frame_id, each.ids, each.centre.tobytes()), len(numbers)) for each in recordings)
     shows_ways = np.arange(len(recordings)) < sum(each.states is not None for each in given)
-    return Library(tuple(distinct), recordings, states, ends, scene, shows_ways)
+    return Library(tuple(distinct), recordings, states, ends, goals, scene, shows_ways)
 
 
 NO_LIBRARY = make_library(())
@@ -133,25 +152,21 @@ def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals
     apart = (((library.states - hand.mean[:4]) / scale) ** 2).sum(axis=2)
     state = apart.argmin(axis=1)
     weight = np.exp(-0.5 * apart[np.arange(len(apart)), state])
-    rows, is_same = list[int](), dict[int, bool]()
-    for row in np.argsort(-weight, kind='stable').tolist():
-        if weight[row] < 1e-3 or len(rows) == MOST_NEAR:
-            break
-        scene = library.scene[row]
-        if scene not in is_same:
-            is_same[scene] = library.recordings[row].matches(hand.frame_id, obstacles)
-        if is_same[scene]:
-            rows.append(row)
+    is_near, is_here = weight >= LEAST_WEIGHT, np.zeros(len(weight), dtype=np.bool_)
+    if is_near.any():
+        is_here = library.find_here(hand.frame_id, obstacles)
+    rows = np.argsort(-weight, kind='stable')
+    rows = rows[(is_near & is_here)[rows]][:MOST_NEAR]
     sides, passing_s = np.zeros((len(rows), len(obstacles)), dtype=np.int8), np.zeros((len(rows), len(obstacles)))
     column = {name: number for number, name in enumerate(obstacles.ids)}
-    for number, row in enumerate(rows):
+    for number, row in enumerate(rows.tolist()):
         recording = library.recordings[row]
         columns = [column[name] for name in recording.ids]
         sides[number, columns] = recording.rest_sides[state[row]]
         passing_s[number, columns] = STEP_S * (recording.passing - state[row])
-    ends = np.array([library.recordings[row].path[-1] for row in rows]).reshape(-1, 1, 2)
-    is_at_goal = np.hypot(*(ends - goals).transpose(2, 0, 1)) <= NEAR
-    return Evidence(weight[rows], np.array(rows, dtype=np.intp), state[rows], sides, passing_s, is_at_goal)
+    is_at_goal = np.hypot(*(library.goals[:, None] - goals).transpose(2, 0, 1)) <= NEAR
+    recorded = is_at_goal[is_here].sum(axis=0)
+    return Evidence(weight[rows], rows, state[rows], sides, passing_s, is_at_goal[rows], recorded)
 
 
 def pool_recordings(
@@ -176,8 +191,9 @@ def pool_recordings(
     decisions = find_decisions(sides, goal, obstacles, hand, goals)
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
     of_ways = evidence.weight * library.shows_ways[evidence.row]
-    counts, on_ways = (np.array([each[is_same].sum() for is_same, _ in agreements]) for each in (evidence.weight, of_ways))
-    likelihoods = update_likelihoods(np.array([each.likelihood for each in taken]), counts, on_ways, decisions)
+    on_ways = np.array([of_ways[is_same].sum() for is_same, _ in agreements])
+    likelihoods = update_ways(np.array([each.likelihood for each in taken]), on_ways, decisions) * compare_goals(evidence)[goal]
+    likelihoods /= likelihoods.sum()
     pooled = []
     for each, share, (is_same, until_s) in zip(taken, likelihoods.tolist(), agreements, strict=True):
         paths, weights = follow_recordings(library, evidence, until_s, hand, each.times)
@@ -185,7 +201,7 @@ def pool_recordings(
         for is_used in (until_s > 0.0, is_same):
             if not is_used.any():
                 break
-            found = pool_path(each.solution, paths[is_used], weights[is_used], *uncertainty, PRIOR_COUNT_PATH)
+            found = pool_path(each.solution, paths[is_used], weights[is_used], *uncertainty)
             if stays_in_class(each, found, obstacles):
                 solution = found
                 break
@@ -232,16 +248,26 @@ def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand
     return paths, evidence.weight[:, None] * np.clip((left_s[:, None] - times) / FADE_S, 0.0, 1.0)
 
 
-def update_likelihoods(likelihoods: Array, counts: Array, on_ways: Array, decisions: Decisions) -> Array:
-    """Return likelihoods (k,) that counts (k,) change: of the gaps, of the ways in each gap, and of the goals in each way.
+def compare_goals(evidence: Evidence) -> Array:
+    """Return the factors (g,) on the likelihoods of goals by which recordings change them."""
+    near = evidence.weight @ evidence.is_at_goal
+    whole = max(int(evidence.recorded.sum()), 1)
+    factors: Array = (PRIOR_COUNT_GOAL * near.sum() / whole + near) / (PRIOR_COUNT_GOAL + evidence.recorded)
+    return factors if factors.any() else np.ones(len(factors))
 
-    on_ways (k,): counts of the recordings that show ways; where no row is ahead, gaps are goals, for which all count.
+
+def update_ways(likelihoods: Array, counts: Array, decisions: Decisions) -> Array:
+    """Return likelihoods (k,) that counts (k,) of recordings change: of the gaps, and of the ways in each gap.
+
+    Where no row is ahead, there are none.
     """
-    whole, each = np.zeros(len(counts), dtype=np.intp), np.arange(len(counts))
+    if not len(decisions.next_row) or not counts.any():
+        return likelihoods
+    whole, each, none = np.zeros(len(counts), dtype=np.intp), np.arange(len(counts)), np.zeros(len(counts))
     levels = (
-        (whole, decisions.next_gap, PRIOR_COUNT, on_ways if len(decisions.next_row) else counts),
-        (decisions.next_gap, decisions.way, PRIOR_COUNT_BEYOND, on_ways),
-        (decisions.way, each, PRIOR_COUNT, counts),
+        (whole, decisions.next_gap, PRIOR_COUNT, counts),
+        (decisions.next_gap, decisions.way, PRIOR_COUNT_BEYOND, counts),
+        (decisions.way, each, 1.0, none),
     )
     pooled = np.ones(len(counts))
     for group, part, prior_count, seen in levels:
@@ -250,13 +276,10 @@ def update_likelihoods(likelihoods: Array, counts: Array, on_ways: Array, decisi
         even = 1.0 / np.bincount(group[np.unique(part, return_index=True)[1]])[group]
         share = np.divide(of_part, of_group, out=even, where=of_group > 0.0)
         pooled *= (prior_count * share + in_part) / (prior_count + in_group)
-    pooled /= pooled.sum()
     return pooled
 
 
-def pool_path(
-    solution: Solution, paths: Array, weights: Array, position_covariance: Array, drift: float, prior_count: float
-) -> Solution:
+def pool_path(solution: Solution, paths: Array, weights: Array, position_covariance: Array, drift: float) -> Solution:
     """Return a solution with the mean and the covariance that recordings change; effort, costs and eta stay those of the plan.
 
     Parameters
@@ -269,18 +292,16 @@ def pool_path(
         That of the hand now (2, 2) [m^2].
     drift
         The b / 2 by which a recording departs from the hand [m/s].
-    prior_count
-        The number n_0 of recordings as which the plan counts.
     """
     times, count = solution.times, weights.sum(axis=0)
     covered = int(np.flatnonzero(count >= 0.5 * count[0])[-1])
     shares = np.divide(weights, count, out=np.zeros_like(weights), where=count > 0.0)
-    centre = np.einsum('em,emi->mi', shares, paths)
+    centre, position = np.einsum('em,emi->mi', shares, paths), solution.covariance[:, :2, :2] + EXACT * np.eye(2)
     offset = paths - centre
-    spread = np.einsum('em,emi,emj->mij', shares, offset, offset) + position_covariance
-    spread += ((drift * times) ** 2 + EXACT)[:, None, None] * np.eye(2)
-    position = solution.covariance[:, :2, :2] + EXACT * np.eye(2)
-    share = (count / (count + prior_count))[:, None, None]
+    spread = PRIOR_COUNT * position + np.einsum('em,emi,emj->mij', weights, offset, offset)
+    spread = spread / (PRIOR_COUNT + count)[:, None, None] + position_covariance
+    spread += ((drift * times) ** 2)[:, None, None] * np.eye(2)
+    share = (count / (count + PRIOR_COUNT_PATH))[:, None, None]
     precision, recorded_precision = np.linalg.inv(position), np.linalg.inv(spread)
     pooled = np.linalg.inv((1.0 - share) * precision + share * recorded_precision)
     pooled[0] = position[0]
