@@ -260,7 +260,8 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
     assert main(['fit', str(data), '--output', str(output), '--workers', '1', *options]) == (0 if is_written else 2)
     assert output.exists() == is_written
     assert asked == ([] if answer is None else [f'Write {output} all the same? [y/N] '])
-    error = capsys.readouterr().err
+    shown, error = capsys.readouterr()
+    assert 'error of positions 0.5 s ahead [mm]' in shown and ('Run the node' in shown) == is_written
     assert (f'{output} is not written; --allow positions writes it all the same' in error) != is_written
     assert answer is not None or (worse in error and error.count('become worse') == 1)
 
