@@ -47,7 +47,8 @@ def detect_boxes(t: float) -> dict[str, tuple[float, float, float, float, float]
 
 
 # %%
-# The hand rests during the first 0.3 s and then begins to move. The cart crosses its path in the meantime.
+# The hand rests during the first 0.3 s and then begins to move. The cart crosses its path in the meantime. Obstacles are drawn
+# where they are at that time: a path may cross the place of the cart, which has moved on by then.
 
 # without a time limit the answers do not depend on the machine
 tracker, predictor = BoxTracker(), foc_ros.Predictor(foc_ros.Config(budget_s=0.0))

@@ -26,22 +26,23 @@ predictor.set_obstacles([foc_ros.Circle((0.15, 0.0), radius=0.03, name='cup')])
 
 times = np.arange(0.0, 1.2, 1 / RATE_HZ)
 positions = np.column_stack([SPEED * times, np.full(len(times), 0.035)])
-outputs, prediction = [], None
+outputs, predictions = [], []
 for tick, (t, position) in enumerate(zip(times, positions, strict=True)):
     if tick % 8 == 0:
-        prediction = predictor.update(t, position)
-    outputs.append(guidance.update(t, position, (SPEED, 0.0), prediction))
+        predictions.append(predictor.update(t, position))
+    outputs.append(guidance.update(t, position, (SPEED, 0.0), predictions[-1]))
 forces = np.array([output.force for output in outputs])
 
 # %%
-# The left plot shows the force along the path, the right one its size and the agreement of the candidates.
+# The left plot shows the prediction after a quarter of a second, and the force along the whole path; the right one the size of
+# the force and the agreement of the candidates.
 
 figure, (scene, graph) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(1.5, 1), layout='constrained')
-prediction.plot(scene)
-scene.plot(*positions.T, color='black', linewidth=1)
-scene.quiver(
-    *positions[::6].T, *forces[::6].T, angles='xy', scale_units='xy', scale=60.0, width=0.004, color='tab:green', zorder=6
-)
+predictions[6].plot(scene)
+(line,) = scene.plot(*positions.T, color='black', linewidth=1, label='path of the hand')
+look = {'angles': 'xy', 'scale_units': 'xy', 'scale': 60.0, 'width': 0.004, 'color': 'tab:green', 'zorder': 6}
+arrows = scene.quiver(*positions[::6].T, *forces[::6].T, label='force', **look)
+scene.legend(handles=[line, arrows], loc='lower right')
 graph.plot(times, np.hypot(*forces.T), label='force [N]')
 graph.plot(times, [output.agreement for output in outputs], label='agreement')
 graph.set(xlabel='time [s]')

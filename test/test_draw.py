@@ -69,6 +69,17 @@ def test_a_scene_holds_every_obstacle_goal_and_candidate():
         assert any(np.array_equal(line, points) for line in drawn)
 
 
+def test_paths_below_one_percent_have_one_line_in_the_legend_and_no_letter():
+    made = prediction(START_NS, NOWHERE)
+    first, second, *rest = made.candidates
+    for likelihoods, words in (((0.989, 0.006), '1 more path below 1 %'), ((0.004, 0.006), '2 more paths, each below 1 %')):
+        changed = [replace(each, likelihood=share) for each, share in zip((first, second), likelihoods, strict=True)]
+        axes = axes_of(replace(made, candidates=(*changed, *rest)))
+        assert legend_of(axes).count(words) == 1 and ' 0 %' not in legend_of(axes)
+        letters = {text.get_text() for text in axes.texts} & set('ABC')
+        assert letters == ({'A'} if likelihoods[0] > 0.01 else set())
+
+
 def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it():
     made = prediction(START_NS, NOWHERE)  # its third candidate leads through `post`, the last one could not be solved
     axes = axes_of(made)

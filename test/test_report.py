@@ -23,7 +23,7 @@ from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
 from foc_ros.reporting.figures import write_picture
 from foc_ros.reporting.page import write_page
 from foc_ros.reporting.report import describe_late, write_report
-from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot, choose_moment
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
 
@@ -46,6 +46,16 @@ class Page(HTMLParser):
 
     def handle_data(self, data):
         self.text += data
+
+
+def test_the_page_opens_at_a_moment_whose_paths_are_finished():
+    made = [prediction(START_NS + row * 10**8, np.zeros(2), 0.8) for row in range(3)]
+    (first, second, *rest) = prediction(made[0].stamp_ns, np.zeros(2), 0.45).candidates
+    unfinished = [replace(each, solution=replace(each.solution, status=Status.DEADLINE)) for each in (first, second)]
+    made[1] = replace(made[1], candidates=(*unfinished, *rest))
+    assert choose_moment(made, START_NS - 10**8, START_NS + 4 * 10**8) in (0, 2)
+    made[1] = replace(made[1], candidates=(first, second, *rest))
+    assert choose_moment(made, START_NS - 10**8, START_NS + 4 * 10**8) == 1
 
 
 def report(directory, reaches=1, title='A title'):

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json as json_format
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,8 @@ def fit(data: Data, /, *, output: Path, allow: options.Allowed = (), study: Stud
     for loss in losses:
         print(f'foc_ros fit: {loss}', file=sys.stderr)
     if losses and 'positions' not in allow and not options.confirm(f'Write {output} all the same?'):
+        answer['output'] = None
+        replace(study, report=None).show(answer, fitting.make_tables(answer), fitting.make_sentences(answer), FIT_PAGE)
         print(f'foc_ros fit: {output} is not written; --allow positions writes it all the same', file=sys.stderr)
         return 2
     write_parameter_file('--output', output, found.config)

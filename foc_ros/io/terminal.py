@@ -20,7 +20,7 @@ from rich.table import Table
 T = TypeVar('T')
 COLUMNS = 80
 """Width of a terminal, into which all tables fit [characters]."""
-QUIET_S = 10.0
+QUIET_S = 3.0
 """Time after which a progress is printed, where there is no terminal [s]."""
 
 
@@ -58,12 +58,14 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str
     """
     cells = [[*each] for each in rows]
     first, *widths = [max(map(_measure, column)) for column in zip(columns, *cells, strict=True)]
+    is_folded = True
     gap = int(first + sum(each + 2 for each in widths) <= COLUMNS)  # between two columns, beside 1
     if not gap:
         longest_word = max((len(word) for row in (columns, *cells) for word in row[0].split()), default=0)
         widths[-1:] = [min(each, 12) for each in widths[-1:]]
         is_enough = longest_word + sum(each + 1 for each in widths) <= COLUMNS
-        first = min(longest_word if is_enough else first, 32)
+        widest, first = first, min(longest_word if is_enough else first, 32)
+        is_folded = widest > first
     parts, left = [[0]], COLUMNS - first
     for number, width in enumerate(widths, 1):
         if width + gap >= left and len(parts[-1]) > 1:
@@ -75,7 +77,7 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str
         heading = title if part is parts[0] else ''
         table = Table(title=heading, title_justify='left', box=SIMPLE_HEAD, show_edge=False, padding=(0, gap, 0, 0))
         for number in part:
-            table.add_column(columns[number], no_wrap=0 < number < len(columns) - 1, overflow='fold')
+            table.add_column(columns[number], no_wrap=is_folded <= number < len(columns) - 1, overflow='fold')
         for row in cells:
             table.add_row(*(row[number] for number in part))
         _Console(width=COLUMNS, markup=False, emoji=False).print(table)

@@ -80,6 +80,7 @@ class Jobs:
         self.operator: Path | None = None
         self._say, self._note_fitted = say, note_fitted
         self._job: asyncio.Task[None] | None = None
+        self._began_s = 0.0
 
     def begin(self, name: str) -> None:
         """Begin a job by its name; raises InputError where it is impossible."""
@@ -91,8 +92,14 @@ class Jobs:
             raise InputError('job', 'a session with trials without guidance', name)
         if name == 'compare' and self.operator is None:
             raise InputError('job', 'a fit before', name)
+        self._began_s = monotonic()
         self._say('job', name=name, state='running', text='working', seconds=0.0)
         self._job = asyncio.ensure_future(self._run(name, self.recording))
+
+    @property
+    def seconds(self) -> float:
+        """Time since the last job began [s]."""
+        return round(monotonic() - self._began_s, 1)
 
     def cancel(self) -> None:
         """End the job that runs."""
@@ -100,10 +107,8 @@ class Jobs:
             self._job.cancel()
 
     async def _run(self, name: str, recording: Recording) -> None:
-        began = monotonic()
-
         def say(state: str, text: str, **values: Any) -> None:
-            self._say('job', name=name, state=state, text=text, seconds=round(monotonic() - began, 1), **values)
+            self._say('job', name=name, state=state, text=text, seconds=self.seconds, **values)
 
         try:
             work = {'report': self._write_report, 'fit': self._fit, 'compare': self._compare}[name]

@@ -81,7 +81,7 @@ class Session:
         self._say_scene()
         self._say_task()
         for message in list(self._kept.values()):
-            page(message)
+            page(message | {'seconds': self._jobs.seconds} if message.get('state') == 'running' else message)
 
     def close_page(self, page: Send) -> None:
         """Stop serving a page, unless another one has taken its place."""

@@ -26,7 +26,7 @@ from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
 from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
 
-from .views import COLOURS, LIKELY, SLOTS, HandTrajectory, describe_ghost, list_unsolved
+from .views import COLOURS, LIKELY, NOTED, SLOTS, HandTrajectory, describe_ghost, list_unsolved
 
 try:
     import matplotlib as mpl
@@ -187,20 +187,26 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
     Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
-    has its total uncertainty, too. Ghosts have their reasons beside them.
+    has its total uncertainty, too. Ghosts have their reasons beside them. The legend has one line for all below NOTED.
     """
     goals, lost = len(snapshot.goal_positions), list_unsolved(snapshot)
     ghosts = [(find_drawn_curve(each), describe_in_legend(each, goals), *describe_ghost(snapshot, each)) for each in lost]
-    for rank, each in reversed(list(enumerate(snapshot.candidates_with_likelihood))):
-        letter, curve = get_letter(slots.get(each.label)), find_drawn_curve(each)
-        reason, place = describe_ghost(snapshot, each)
+    shown = [(each, *describe_ghost(snapshot, each)) for each in snapshot.candidates_with_likelihood]
+    count = sum(each.likelihood < NOTED and not reason for each, reason, _ in shown)
+    more = f'{count} more path{"s, each" if count > 1 else ""} below {100 * NOTED:.0f} %'
+    for rank, (each, reason, place) in reversed(list(enumerate(shown))):
+        slot = slots.get(each.label) if each.likelihood >= NOTED else None
+        letter, curve = get_letter(slot), find_drawn_curve(each)
         if reason:
             ghosts.append((curve, describe_in_legend(each, goals, letter, reason), reason, place))
         else:
-            style = get_candidate_style(slots.get(each.label), each.likelihood, not each.is_solved)
+            style = get_candidate_style(slot, each.likelihood, not each.is_solved)
+            if each.likelihood < NOTED:
+                style |= {'linewidth': 0.7, 'alpha': 0.7}  # thinner than the hand later
             if rank == 0 or each.likelihood >= LIKELY:
                 _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
-            axes.plot(*curve.T, zorder=3, label=describe_in_legend(each, goals, letter), **style)
+            label = describe_in_legend(each, goals, letter) if each.likelihood >= NOTED else more
+            axes.plot(*curve.T, zorder=3, label=label, **style)
             path = each.solution.path
             draw_tag(axes, path[int((0.45 + 0.12 * (rank % 3)) * (len(path) - 1))], letter, style['color'])
     entered: set[str] = set()

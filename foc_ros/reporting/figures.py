@@ -21,7 +21,7 @@ from foc_ros.core.types import Array
 
 from . import draw
 from .draw import Bounds, Figure, Span, compute_bounds, open_figure
-from .views import HandTrajectory, build_snapshot
+from .views import NOTED, HandTrajectory, build_snapshot
 
 WIDTH_IN = 6.4
 SIZE_PT, COLUMNS = 8.0, 70
@@ -129,8 +129,9 @@ def _get_height(bounds: Bounds, snapshot: Prediction | None = None) -> float:
 
 def measure_legend(snapshot: Prediction) -> float:
     """Return the height of the legend of a scene that is as wide as a page [in], with its signs except those of a moving hand."""
-    signs = 6 + any(not each.is_solved for each in snapshot.candidates_with_likelihood)
-    texts = [fill(draw.describe_in_legend(each, len(snapshot.goal_positions)), COLUMNS) for each in snapshot]
+    signs = 7 + any(not each.is_solved for each in snapshot.candidates_with_likelihood)
+    own = [each for each in snapshot if not each.has_likelihood or each.likelihood >= NOTED]
+    texts = [fill(draw.describe_in_legend(each, len(snapshot.goal_positions)), COLUMNS) for each in own]
     lines = sum(1 + text.count('\n') for text in texts) + -(-signs // 2)
     return lines * LINE * SIZE_PT / 72.0 + 0.05
 
@@ -152,7 +153,7 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     shares = {label: float(label.partition('%')[0][1:].strip().replace('-', '-1')) for label in named if '%  ' in label}
     candidates = sorted(shares, key=lambda label: (-shares[label], label))
-    if any(isinstance(named[label], Line2D) and named[label].get_linestyle() == ':' for label in candidates):
+    if any(line.get_linestyle() == ':' for line in axes.lines):
         named['dotted: not known to avoid as surely as wanted'] = Line2D([], [], color='0.35', linestyle=':', linewidth=2.0)
     signs = [label for label in named if label not in candidates]
     texts = [fill(label, columns, subsequent_indent=' ' * 10) for label in candidates]

@@ -197,7 +197,7 @@ def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
     axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
     for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
         set_format('{x:g}')
-    axes.tick_params(axis='x', which='minor', labelsize=7)
+    axes.tick_params(axis='x', which='minor', labelsize=7, rotation=90)
 
 
 def write_simulation(

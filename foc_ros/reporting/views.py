@@ -114,8 +114,9 @@ def is_late(snapshot: Prediction) -> bool:
 
 
 def count_likely_paths(snapshot: Prediction) -> float:
-    """Return the number of likely paths, without ghosts: exp of the entropy of the likelihoods that are at least LIKELY."""
-    likely = [each for each in snapshot if each.likelihood >= LIKELY and not describe_ghost(snapshot, each)[0]]
+    """Return the number of likely paths, without estimates and ghosts: exp of the entropy of likelihoods of at least LIKELY."""
+    likely = [each for each in snapshot if each.likelihood >= LIKELY and not each.is_estimated]
+    likely = [each for each in likely if not describe_ghost(snapshot, each)[0]]
     shares = np.array([each.likelihood for each in likely])
     shares = shares / max(shares.sum(), LIKELY)
     return float(np.exp(-(shares * np.log(shares)).sum())) if len(shares) else 0.0

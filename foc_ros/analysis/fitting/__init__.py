@@ -4,7 +4,8 @@
 
 What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings (Efron 1979,
 doi:10.1214/aos/1176344552) and the cross-validation are exact. A parameter that the recordings do not determine keeps its given
-value: where its profile, the best log-likelihood over all other parameters, is flat, or best at the end of what was tried.
+value: where its profile, the best log-likelihood over all other parameters, is flat, hardly better than at the given value, or
+best at the end of what was tried.
 """
 
 from __future__ import annotations
@@ -144,14 +145,15 @@ class SettingTable:
         """
         total, columns, undetermined = np.nansum(self.values, axis=0), np.arange(len(self.settings)), dict[str, str]()
         while True:
-            found = [(*self._examine(name, total, columns), name) for name in given if name not in undetermined]
+            left = [name for name in given if name not in undetermined]
+            found = [(*self._examine(name, given[name], total, columns), name) for name in left]
             doubted = min((each for each in found if each[1]), default=None)
             if doubted is None:
                 return columns, undetermined
             _, undetermined[doubted[2]], name = doubted
             columns = np.array([each for each in columns if self.settings[each][name] == given[name]])
 
-    def _examine(self, name: str, total: Array, columns: NDArray[np.intp]) -> tuple[float, str]:
+    def _examine(self, name: str, given: float, total: Array, columns: NDArray[np.intp]) -> tuple[float, str]:
         """Return how much the profile of a parameter varies [nat], and why it is undetermined, empty if it is determined."""
         profile: dict[float, float] = {}
         for column in columns.tolist():
@@ -166,6 +168,8 @@ class SettingTable:
         bound = BOUNDS[name]
         if best in (least, most) and best not in (bound.low, bound.high):
             return variation, f'{best:.3g}, the end of the values tried, explains the recordings best'
+        if best != given and profile[best] - profile.get(given, -math.inf) < FLAT_NAT:
+            return variation, f'it explains the recordings within {FLAT_NAT:g} nat of the best value tried, {best:.3g}'
         return variation, ''
 
     def estimate(self, given: Setting, how: str) -> tuple[Findings, NDArray[np.intp]]:

@@ -202,14 +202,14 @@ def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[
     """Return the finalists, in the given order, with their scores as of `compare_settings`, and all scores of the first round."""
     names = sample_names(list(replays.recordings))
     left, count = list(settings), FIRST
-    first_scores = scores = replays.score(left, names[:count], f'{kind} {len(left)}')
+    first_scores = scores = replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}')
     while count < len(names) and len(left) > 1:
         is_behind = find_behind(scores, PLAINLY_WORSE)
         kept = {index for index in rank(scores)[: max(-(-len(left) // 2), 4)] if not is_behind[index]}
         if left[0] == settings[0] and not is_behind[0]:
             kept.add(0)
         left, count = [left[index] for index in sorted(kept)], 2 * count
-        scores = replays.score(left, names[:count], f'{kind} {len(left)}')
+        scores = replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}')
     return left, scores, first_scores
 
 
