@@ -8,9 +8,9 @@ A recording r counts by how near its states come to the position p [m] and the v
 
 Of the N_g recordings that end at goal g, n_g = sum of their w_r are where the hand is now. The likelihoods of the goals change as
 these shares differ from that of all recordings, q = sum_g n_g / sum_g N_g, which counts as n_2 = `PRIOR_COUNT_GOAL` recordings of
-each goal:
+each goal. With W all classes, or those of the same way through all rows if a row is ahead,
 
-    p_i <- p_i (n_2 q + n_g) / (n_2 + N_g) / sum,   g the goal of class i.
+    p_i <- p_W p_i f_i / sum_W p_j f_j,   f_i = (n_2 q + n_g) / (n_2 + N_g),   g the goal of class i.
 
 How often a goal was reached does not matter here (`habits`), and of a goal without recordings nothing is known.
 
@@ -58,6 +58,7 @@ from foc_ros.core.classes import find_path_sides
 from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_demonstration
 from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
 from foc_ros.core.classes.sides import measure_passages
+from foc_ros.core.likelihood import divide_among_groups
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.obstacles.risk import centre_trajectories
@@ -192,8 +193,9 @@ def pool_recordings(
     agreements = [compare_with_class(each.candidate, evidence, obstacles, decisions.next_row) for each in taken]
     of_ways = evidence.weight * library.shows_ways[evidence.row]
     on_ways = np.array([of_ways[is_same].sum() for is_same, _ in agreements])
-    likelihoods = update_ways(np.array([each.likelihood for each in taken]), on_ways, decisions) * compare_goals(evidence)[goal]
-    likelihoods /= likelihoods.sum()
+    likelihoods = update_ways(np.array([each.likelihood for each in taken]), on_ways, decisions)
+    group = decisions.way if len(decisions.next_row) else np.zeros_like(goal)
+    likelihoods = divide_among_groups(likelihoods * compare_goals(evidence)[goal], group, np.bincount(group, likelihoods))
     pooled = []
     for each, share, (is_same, until_s) in zip(taken, likelihoods.tolist(), agreements, strict=True):
         paths, weights = follow_recordings(library, evidence, until_s, hand, each.times)
