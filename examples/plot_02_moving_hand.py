@@ -39,13 +39,14 @@ predictions = [predictor.update(t, position) for t, position in zip(times, posit
 # The left plot shows the prediction after 0.3 s with the path of the hand until then. The right plot shows the likelihood of
 # every goal: the sum over the candidates that lead to it.
 
-figure, (scene, shares) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(1.5, 1), layout='constrained')
+figure, (scene, shares) = plt.subplots(1, 2, figsize=(11, 5.5), layout='constrained')
 shown = predictions[round(0.3 * RATE_HZ)]
 shown.plot(scene)
-scene.plot(*np.array(positions[: round(0.3 * RATE_HZ) + 1]).T, color='black', linewidth=2)
-for goal in range(len(GOALS)):
-    likelihoods = [sum(each.likelihood for each in p.candidates if each.candidate.goal == goal) for p in predictions]
-    shares.plot(times, likelihoods, label=f'goal{goal}')
+(line,) = scene.plot(*np.array(positions[: round(0.3 * RATE_HZ) + 1]).T, color='black', linewidth=2, label='path of the hand')
+scene.set_xlim(left=-0.01)
+scene.legend(handles=[line])
+for row, goal in enumerate(shown.goals):
+    shares.plot(times, [prediction.goals[row].likelihood for prediction in predictions], label=goal.name)
 shares.set(xlabel='time [s]', ylabel='likelihood', ylim=(0.0, 1.0))
 shares.legend()
 plt.show()
