@@ -78,6 +78,7 @@ class Session:
             coupling=max(self._standard.guidance.k_max, 1.0),
         )
         self._say_settings()
+        self._send_scene()  # so that the first status does not miss obstacles
         self._say_scene()
         self._say_task()
         for message in list(self._kept.values()):
