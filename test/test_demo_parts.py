@@ -24,6 +24,7 @@ from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.reporting.live_text import show_live
@@ -106,10 +107,24 @@ def test_without_a_terminal_a_line_is_printed_each_second():
 
 def test_on_a_terminal_a_table_is_shown():
     text = shown(filled(), True, np.array([0.2]))
-    for part in ('likelihood', 'cost', 'eta', 'goal0: right of 1', '56 %', 'goal1: left of 1, right of post', '0.90', 'x 1.15'):
+    for part in ('likely', 'cost', 'eta', 'A goal0: right of 1', '56 %', 'C goal1: left of 1, right of post', '0.90', 'x 1.15'):
         assert part in text
+    assert 'AAAA' in text and 'BBBB' in text and '▒1▒' in text, 'paths have letters, and the obstacle has its number'
     assert '█' in text
     assert '…' not in text and '...  ' not in text
+
+
+def test_names_that_differ_at_their_end_alone_are_told_apart_on_a_terminal():
+    made = make(0)
+    names = ('right of 1, right of 2, left of 3, right of 4', 'right of 1, right of 2, left of 3, left of 4')
+    sides = [tuple((name[-1], LEFT if 'left' in name else RIGHT) for name in words.split(', ')) for words in names]
+    changed = [
+        replace(each, candidate=replace(each.candidate, sides=one)) for each, one in zip(made.candidates, sides, strict=False)
+    ]
+    recorder = filled()
+    recorder.snapshots[-1] = replace(build_snapshot(made), candidates=tuple(changed))
+    text = shown(recorder, True, np.array([0.2]))
+    assert all(f'goal0: {words}' in text for words in names)
 
 
 @pytest.mark.parametrize('terminal', [False, True])

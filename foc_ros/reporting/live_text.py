@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from string import ascii_uppercase
 
 import numpy as np
 from rich.bar import Bar
@@ -26,7 +27,7 @@ from .draw import Bounds, compute_bounds
 WIDTH, HEIGHT = 72, 13
 """Size of the drawing [characters]; with the table it fits into 24 lines."""
 OBSTACLE, GOAL, HAND = '▒', '*', '@'
-LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   1 2 3 candidates, most likely first'
+LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   A B C candidates, most likely first'
 ROWS = 4
 """Rows of the table: the default number of candidates, so that its height stays the same."""
 Show = Callable[[float, Prediction, str, Array], None]
@@ -68,13 +69,14 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
 def _make_table(snapshot: Prediction, title: str) -> Table:
     table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
     table.caption = '* not known to keep the wanted eta: compromised, or estimated'
-    for name, width in (('candidate', 46), ('likelihood', 10), ('', 5), ('cost', 6), ('eta', 5)):
+    for name, width in (('candidate', 54), ('', 4), ('likely', 6), ('cost', 6), ('eta', 5)):
         table.add_column(name, width=width, no_wrap=True, justify='right' if width < 10 else 'left')
     shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
-    for each, ratio in list(zip(shown, compute_cost_ratios(shown), strict=True))[:ROWS]:
+    for letter, each, ratio in zip(ascii_uppercase[:ROWS], shown, compute_cost_ratios(shown), strict=False):
         bar = Bar(1.0, 0.0, each.likelihood, color='bright_blue')
         eta = f'{each.eta:.2f}' + '*' * (not each.is_solved)
-        table.add_row(escape(describe_candidate(each, goals)), bar, f'{100 * each.likelihood:.0f} %', f'x {ratio:.3g}', eta)
+        words = escape(f'{letter} {describe_candidate(each, goals)}')
+        table.add_row(words, bar, f'{100 * each.likelihood:.0f} %', f'x {ratio:.3g}', eta)
     for row in range(len(shown), ROWS):
         table.add_row('' if row else 'no solved candidate')
     return table
@@ -90,10 +92,12 @@ def draw_scene(snapshot: Prediction, hand: Array, bounds: Bounds) -> str:
         is_inside = (measure_offsets(points, snapshot.obstacles)[1] <= snapshot.obstacles.radius).any(axis=1)
         cells[is_inside.reshape(cells.shape)] = OBSTACLE
     drawn: list[tuple[Array, str]] = [(hand[None], HAND), (snapshot.goal_positions, GOAL)]
-    for number, each in enumerate(snapshot.candidates_with_likelihood[:9], 1):
+    obstacles = snapshot.obstacles
+    drawn += [(obstacles.centre[[row]], name) for row, name in enumerate(obstacles.ids) if len(name) == 1]
+    for letter, each in zip(ascii_uppercase[:9], snapshot.candidates_with_likelihood, strict=False):
         curve = find_drawn_curve(each)
         rows = np.linspace(0.0, len(curve) - 1.0, 4 * WIDTH)  # so many points that a line has no gaps
-        drawn.append((np.column_stack([np.interp(rows, np.arange(len(curve)), axis) for axis in curve.T]), f'{number}'))
+        drawn.append((np.column_stack([np.interp(rows, np.arange(len(curve)), axis) for axis in curve.T]), letter))
     for points, mark in reversed(drawn):
         column = np.rint((points[:, 0] - left) / (right - left) * (WIDTH - 1)).astype(int)
         row = np.rint((top - points[:, 1]) / (top - bottom) * (HEIGHT - 1)).astype(int)
