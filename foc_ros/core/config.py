@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from .errors import ParameterError, join_errors
 from .parameter import Group, Parameter, check_fields, check_value, param
@@ -272,6 +272,13 @@ class Config:
     scene: SceneConfig = field(default_factory=SceneConfig)
     frames: FramesConfig = field(default_factory=FramesConfig)
     guidance: GuidanceConfig = field(default_factory=GuidanceConfig)
+
+    if TYPE_CHECKING:  # a group may be given as a mapping, which the types of the fields do not say
+
+        def __init__(
+            self, *, rate_hz: float = ..., budget_s: float = ..., plane: str = ..., frame_id: str = ...,
+            predict_height: bool = ..., **groups: Group | Mapping[str, object],
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         """Take a mapping as a group of these values; raise ParameterError for anything that is no value of its parameter."""

@@ -51,7 +51,7 @@ async def run_command(note: Note, *arguments: str | Path) -> str:
             os.setpriority(os.PRIO_PROCESS, process.pid, 10)
         output = asyncio.ensure_future(process.stdout.read())
         async for line in process.stderr:
-            if text := line.decode(errors='replace').strip():
+            if text := line.decode(errors='replace').strip().removeprefix(f'foc_ros {arguments[0]}: '):
                 lines.append(text)
                 note(text)
         await process.wait()
