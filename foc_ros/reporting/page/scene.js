@@ -134,7 +134,8 @@ class Scene {
   // Draws a candidate: slot, likelihood, path [m], motor and total: ellipses [x, y, half axes, angle]; ghost: why it is none, or '', and
   // ghost_at: the share of the path at which that is. place: share of the path for its letter, or words that are of no such place.
   candidate({ slot, likelihood, path, motor, total, compromised, ghost, ghost_at: ghostAt, text }, alpha = 1, place = 0.6) {
-    const [colour, width] = [colourOf(slot), ghost ? 6 : 1.5 + 4.5 * (likelihood ?? 0)];
+    const [wide, least] = (likelihood ?? 1) < NOTED ? [2, 0.8] : [6, 1.5];
+    const [colour, width] = [colourOf(slot), ghost ? wide : least + 4.5 * (likelihood ?? 0)];
     const middle = path[Math.round((path.length - 1) * (ghostAt ?? place))];
     this.paths.push({ points: path, text, width, kind: ghost ? 'ghost' : 'path' });
     if (ghost) {
