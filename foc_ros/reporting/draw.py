@@ -190,7 +190,7 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     has its total uncertainty, too. Ghosts have their reasons beside them. The legend has one line for all below NOTED.
     """
     goals, lost = len(snapshot.goal_positions), list_unsolved(snapshot)
-    ghosts = [(find_drawn_curve(each), describe_in_legend(each, goals), *describe_ghost(snapshot, each)) for each in lost]
+    ghosts = [(find_drawn_curve(each), describe_in_legend(each, goals), *describe_ghost(snapshot, each), 4.0) for each in lost]
     shown = [(each, *describe_ghost(snapshot, each)) for each in snapshot.candidates_with_likelihood]
     count = sum(each.likelihood < NOTED and not reason for each, reason, _ in shown)
     more = f'{count} more path{"s, each" if count > 1 else ""} below {100 * NOTED:.0f} %'
@@ -198,7 +198,8 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
         slot = slots.get(each.label) if each.likelihood >= NOTED else None
         letter, curve = get_letter(slot), find_drawn_curve(each)
         if reason:
-            ghosts.append((curve, describe_in_legend(each, goals, letter, reason), reason, place))
+            width = 4.0 if each.likelihood >= NOTED else 1.5
+            ghosts.append((curve, describe_in_legend(each, goals, letter, reason), reason, place, width))
         else:
             style = get_candidate_style(slot, each.likelihood, not each.is_solved)
             if each.likelihood < NOTED:
@@ -210,8 +211,8 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
             path = each.solution.path
             draw_tag(axes, path[int((0.45 + 0.12 * (rank % 3)) * (len(path) - 1))], letter, style['color'])
     entered: set[str] = set()
-    for number, (curve, label, reason, place) in enumerate(ghosts):
-        axes.plot(*curve.T, color=GHOST_COLOUR, linewidth=4.0, alpha=0.3, solid_capstyle='round', zorder=2, label=label)
+    for number, (curve, label, reason, place, width) in enumerate(ghosts):
+        axes.plot(*curve.T, color=GHOST_COLOUR, linewidth=width, alpha=0.3, solid_capstyle='round', zorder=2, label=label)
         share = 0.5 + 0.15 * (number % 3) if place is None else place
         if reason and reason not in entered:  # those of one obstacle would cover each other
             look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
