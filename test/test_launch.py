@@ -210,7 +210,8 @@ def test_foxglove_shows_topics_of_the_node_in_its_panels():
     assert {'/foc/prediction', '/foc/path', '/foc/markers', '/hand_pose', '/goals'} <= set(scene['topics']) <= set(TOPICS)
     assert scene['topics']['/foc/prediction']['colorField'] == 'likelihood'
     assert TOPICS[scene['publish']['poseTopic']] == 'geometry_msgs/msg/PoseStamped'
-    assert layout['configById']['DiagnosticSummary!foc']['topicToRender'] == '/diagnostics'
+    tables = [panel['topicToRender'] for name, panel in layout['configById'].items() if name.startswith('Diagnostic')]
+    assert tables == ['/foc/likelihoods_by_name', '/diagnostics']
 
 
 def test_what_foxglove_draws_has_the_size_of_a_reach():
@@ -247,6 +248,9 @@ def test_the_plots_of_foxglove_find_the_likelihoods_of_goals_and_paths():
     expected = {goal.name: [goal.likelihood] for goal in prediction.goals} | {'unknown': [prediction.unknown]}
     expected |= {f'path {rank}': [each.likelihood] for rank, each in enumerate(order_candidates(prediction))}
     assert len(prediction.goals) == 2 and len(expected) >= 7 and prediction.unknown > 0.0
+    table = read_layout()['configById']['DiagnosticStatusPanel!classes']
+    shown = [each for each in made['likelihoods_by_name'].status if each.name == table['selectedName']]
+    assert [(each.hardware_id, each.values[0].key) for each in shown] == [(table['selectedHardwareId'], prediction.most_likely)]
     plots = [panel for name, panel in read_layout()['configById'].items() if name.startswith('Plot!')]
     lines = [line for panel in plots for line in panel['paths']]
     assert {line['label'] for line in lines} == {*(f'goal{i}' for i in range(4)), *(f'path {i}' for i in range(4)), 'unknown'}

@@ -117,7 +117,7 @@ class _MarkerEncoder:
             words = describe_candidate(outcome, len(self.prediction.goal_positions))
             words = outcome.label if len(words) > MOST_LETTERS else words
             place = points[round((0.45 + 0.12 * (index % 3)) * (len(points) - 1))]  # labels of neighbours stand apart
-            yield self._encode_text('label', index, _write_label(share, words, notes), place, colour)
+            yield self._encode_text('label', index, _write_label(share, words, notes), place, colour, 1.0)
 
     def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
         """Yield ellipses of one standard deviation about the mean, spread over the path."""
@@ -139,9 +139,9 @@ class _MarkerEncoder:
     def encode_names(self) -> Iterator[Any]:
         """Yield the names of several goals, and those of the obstacles that the labels of paths name."""
         goals, near = self.prediction.goals, self.prediction.obstacles
-        for row, place in enumerate(self._lift(self.prediction.goal_positions - [0.0, 2.0 * TEXT_HEIGHT])):
+        for row, place in enumerate(self._lift(self.prediction.goal_positions)):
             if len(goals) > 1:
-                yield self._encode_text('goal', row, goals[row].name, place, GREY)
+                yield self._encode_text('goal', row, goals[row].name, place, GREY, 2.0)
         named = {name for each in self.prediction.candidates if _is_labelled(each) for name, _ in each.candidate.sides}
         for row, place in enumerate(self._lift(near.centre)):
             if near.ids[row] in named:
@@ -150,10 +150,10 @@ class _MarkerEncoder:
     def encode_legend(self) -> Iterator[Any]:
         """Yield the legend of the ellipses, below the hand, if any are drawn, and the shares that no candidate has."""
         for outcome in self.prediction.candidates_with_likelihood[:1]:
-            (place,) = self._lift(outcome.solution.path[:1] - [0.0, 0.05])
+            (place,) = self._lift(outcome.solution.path[:1])
             shares = (self.prediction.unknown, 'unknown'), (self.prediction.other, 'another goal')
             text = '\n'.join([LEGEND, *(f'{100 * share:.0f} % {name}' for share, name in shares if share > 0.0)])
-            yield self._encode_text('legend', 0, text, place, GREY)
+            yield self._encode_text('legend', 0, text, place, GREY, 3.0)
 
     def encode_obstacles(self) -> Iterator[Any]:
         near = self.prediction.obstacles
@@ -180,8 +180,13 @@ class _MarkerEncoder:
             name, row, TRIANGLES, colour, centre=self._raise((0.0, 0.0, 0.0), above), points=[*map(self._encode_point, corners)]
         )
 
-    def _encode_text(self, name: str, identity: int, text: str, place: Sequence[float], colour: Colour) -> Any:
-        return self.encode(name, identity, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), self._raise(place, TALL), text=text)
+    def _encode_text(
+        self, name: str, identity: int, text: str, point: Sequence[float], colour: Colour, below: float = 0.0
+    ) -> Any:
+        """Return a text at a point, in front of the obstacles; below: by how many lines its first one is below the point."""
+        down = TEXT_HEIGHT * (below + text.count('\n') / 2) if below else 0.0  # viewers centre a text at its place
+        place = self._raise(point, TALL, down)
+        return self.encode(name, identity, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
 
     def encode(
         self,
@@ -205,9 +210,9 @@ class _MarkerEncoder:
         """Return positions in the plane (m, 2) as points in space, at the height of the hand."""
         return cast('list[list[float]]', lift(positions, self.prediction.height, self.plane).tolist())
 
-    def _raise(self, point: Sequence[float], above: float) -> Sequence[float]:
-        """Return a point in space moved towards a viewer [m], who sees the second axis of the plane to the left of the first."""
-        (shift,) = lift(np.zeros((1, 2)), -above if self.plane == 'xz' else above, self.plane)
+    def _raise(self, point: Sequence[float], above: float, down: float = 0.0) -> list[float]:
+        """Return a point in space moved towards a viewer, who sees the first axis of the plane to the right, and down [m]."""
+        (shift,) = lift(np.array([[0.0, -down]]), -above if self.plane == 'xz' else above, self.plane)
         return cast('list[float]', (point + shift).tolist())
 
     def _lift_curve(self, curve: Array, outcome: PredictedCandidate, rows: Any = slice(None)) -> list[list[float]]:
