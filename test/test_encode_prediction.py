@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from message_helpers import both_kinds, message_types, read_columns
-from prediction_samples import DT, STEPS, outcome, prediction, three_ways
+from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
 from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import FocError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Circle, collect_obstacles
-from foc_ros.core.solution import Status
+from foc_ros.core.solution import Candidate, Status
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_goal_likelihoods, encode_outputs
 from foc_ros.ros.messages.plane import lift, project
 
@@ -23,6 +23,8 @@ BAGS = message_types('rosbags')
 NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz', 'candidate', 'likelihood']
 PAIRS = NAMES[7:13]
 NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS), 'goal', 'way', 'status']
+
+PATH = np.linspace([0.0, 0.0], [0.3, 0.0], STEPS + 1)
 
 
 def made(name, of, types=BAGS, plane='xy'):
@@ -139,15 +141,16 @@ def test_markers_show_every_candidate_and_obstacle(types):
     for each in markers[1:]:
         assert (each.header.stamp.sec, each.header.frame_id, each.lifetime.sec) == (5, 'world', 1)
         by_name.setdefault(each.ns, []).append(each)
-    assert sorted(by_name) == ['label', 'legend', 'motor_noise', 'obstacle', 'obstacle_deviation', 'path', 'total_uncertainty']
+    names = ['label', 'legend', 'motor_noise', 'obstacle', 'obstacle_deviation', 'obstacle_name', 'path', 'total_uncertainty']
+    assert sorted(by_name) == names
     assert all(len({each.id for each in group}) == len(group) for group in by_name.values())
     assert len(by_name['motor_noise']) == 2 * len(by_name['total_uncertainty']), (
         'the total uncertainty is that of the most likely path'
     )
-    assert [each.text for each in by_name['label']] == [
-        'goal0:+l1 (left of 1) 70 %',
-        'goal0:-l1 (right of 1) 30 %',
-        f'goal0:+l2 (left of 1) infeasible: as wanted; remedy: {Status.INFEASIBLE.remedy}',
+    assert [each.text.replace('\n', ' ') for each in by_name['label']] == [
+        '70 %, left of 1',
+        '30 %, right of 1',
+        f'- %, left of 1, infeasible: as wanted; remedy: {Status.INFEASIBLE.remedy}',
     ]
     grey = by_name['path'][2].color
     assert grey.r == grey.g == grey.b
@@ -165,9 +168,32 @@ def test_a_compromised_candidate_takes_part_and_says_so():
     assert table['status'][:: STEPS + 1].tolist() == [2, 3] and table['compromised'].all()
     assert made('likelihoods', ways).layout.dim[0].label == 'a;b'
     texts = [each.text for each in made('markers', ways).markers if each.ns == 'label']
-    assert texts[1].endswith('30 %, compromised: eta 0.620')
+    assert texts[1] == '30 %, left of 1,\ncompromised: eta 0.620'
     unlikely = made('markers', prediction(outcome('a', 0.995), outcome('b', 0.005))).markers
     assert [sum(each.ns == name for each in unlikely) for name in ('path', 'label')] == [2, 1]
+
+
+@pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])
+def test_what_the_labels_name_is_named_where_it_is(plane):
+    two = outcome('goal0:+l1', 0.7), replace(outcome('goal1:-l2', 0.3, -0.1), candidate=Candidate('goal1:-l2', 1, (), PATH, 0.3))
+    goals = np.array([[0.3, 0.0], [0.3, 0.1]])
+    markers = made('markers', prediction(*two, goal_positions=goals), plane=plane).markers
+    found = {name: {each.text: each.pose.position for each in markers if each.ns == name} for name in ('goal', 'obstacle_name')}
+    assert list(found['goal']) == ['goal0', 'goal1'] and list(found['obstacle_name']) == ['1']
+    (place,), (height,) = project([[getattr(found['obstacle_name']['1'], axis) for axis in 'xyz']], plane)
+    np.testing.assert_allclose(place, OBSTACLES.centre[OBSTACLES.ids.index('1')], atol=1e-12)
+    towards_viewer = -1.0 if plane == 'xz' else 1.0
+    assert towards_viewer * (height - three_ways().height) > 0.01, 'the text is above the obstacle'
+
+
+def test_a_label_has_short_lines_and_parts_no_side_from_its_obstacle():
+    sides = tuple((f'cup{i}', 1) for i in range(4))
+    long = replace(outcome('goal0:+cup0+cup1'), candidate=Candidate('goal0:+cup0+cup1', 0, sides, PATH, 0.3))
+    (text,) = [each.text for each in made('markers', prediction(long)).markers if each.ns == 'label']
+    assert text == '60 %, left of cup0,\nleft of cup1, left of cup2,\nleft of cup3'
+    many = replace(long, candidate=replace(long.candidate, sides=4 * sides))
+    (text,) = [each.text for each in made('markers', prediction(many)).markers if each.ns == 'label']
+    assert text == '60 %, goal0:+cup0+cup1'
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])

@@ -4,26 +4,32 @@
 
 import json
 import os
+import re
 import runpy
 import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 import ros_helpers
 import yaml
+from message_helpers import message_types
 
-from foc_ros.core.config import list_parameters
+from foc_ros.analysis.replay import replay
+from foc_ros.core.config import Config, list_parameters
 from foc_ros.core.errors import RecordingError
 from foc_ros.io import csv_tables as tables
 from foc_ros.io import documents
 from foc_ros.io.documents import read_document
 from foc_ros.io.topics import TYPES
-from foc_ros.ros.messages.encode_prediction import LIKELIHOOD_COLUMNS, OUTPUTS
+from foc_ros.ros.messages.encode_markers import LIKELY, UNLIKELY
+from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_outputs
+from foc_ros.ros.messages.ranking import order_candidates
 
 ROOT = Path(__file__).parents[1]
 STARTER = (
@@ -193,15 +199,64 @@ def leaves(layout):
             yield from leaves(layout[side])
 
 
+def read_layout():
+    return json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
+
+
 def test_foxglove_shows_topics_of_the_node_in_its_panels():
-    layout = json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
+    layout = read_layout()
     assert set(leaves(layout['layout'])) == set(layout['configById'])
     scene = layout['configById']['3D!foc']
-    assert {'/foc/prediction', '/foc/path', '/foc/markers'} <= set(scene['topics']) <= set(TOPICS)
+    assert {'/foc/prediction', '/foc/path', '/foc/markers', '/hand_pose', '/goals'} <= set(scene['topics']) <= set(TOPICS)
     assert scene['topics']['/foc/prediction']['colorField'] == 'likelihood'
     assert TOPICS[scene['publish']['poseTopic']] == 'geometry_msgs/msg/PoseStamped'
-    for i, line in enumerate(layout['configById']['Plot!likelihoods']['paths']):
-        assert line['value'] == f'/foc/likelihoods.data[{i * len(LIKELIHOOD_COLUMNS)}]'
+    tables = [panel['topicToRender'] for name, panel in layout['configById'].items() if name.startswith('Diagnostic')]
+    assert tables == ['/foc/likelihoods_by_name', '/diagnostics']
+
+
+def test_what_foxglove_draws_has_the_size_of_a_reach():
+    """Its defaults are those of a street: axes of 1 m, names of frames of 0.2 m, and a path as a band of 0.2 m."""
+    scene = read_layout()['configById']['3D!foc']
+    topics, frames = scene['topics'], scene['scene']['transforms']
+    sizes = [topics['/foc/path']['lineWidth'], topics['/hand_pose']['axisScale'], frames['axisScale']]
+    sizes += topics['/goals']['arrowScale']
+    assert topics['/goals']['type'] == 'arrow' and min(sizes) > 0.0 and max(sizes) <= 0.05 and not frames['showLabel']
+    assert topics['/foc/prediction']['gradient'] == [f'#{mix(UNLIKELY)}40', f'#{mix(LIKELY)}ff'], 'the colours of the markers'
+
+
+def mix(colour):
+    return bytes(round(255 * part) for part in colour).hex()
+
+
+def find_values(message, path):
+    """Return what a message path of Foxglove finds: fields, elements, and elements with a field of a value."""
+    found = [message]
+    for field, element, key, value in re.findall(r'\.(\w+)|\[(\d+|:)\]|\{(\w+)=="(\w+)"\}', path):
+        if field:
+            found = [getattr(each, field) for each in found]
+        elif element:
+            rows = slice(None) if element == ':' else slice(int(element), int(element) + 1)
+            found = list(chain.from_iterable(each[rows] for each in found))
+        else:
+            found = [each for each in found if getattr(each, key) == value]
+    return [float(each) for each in found]
+
+
+def test_the_plots_of_foxglove_find_the_likelihoods_of_goals_and_paths():
+    prediction = next(iter(replay(ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', Config())))
+    made = encode_outputs(prediction, 'xy', message_types('rosbags'))
+    expected = {goal.name: [goal.likelihood] for goal in prediction.goals} | {'unknown': [prediction.unknown]}
+    expected |= {f'path {rank}': [each.likelihood] for rank, each in enumerate(order_candidates(prediction))}
+    assert len(prediction.goals) == 2 and len(expected) >= 7 and prediction.unknown > 0.0
+    table = read_layout()['configById']['DiagnosticStatusPanel!classes']
+    shown = [each for each in made['likelihoods_by_name'].status if each.name == table['selectedName']]
+    assert [(each.hardware_id, each.values[0].key) for each in shown] == [(table['selectedHardwareId'], prediction.most_likely)]
+    plots = [panel for name, panel in read_layout()['configById'].items() if name.startswith('Plot!')]
+    lines = [line for panel in plots for line in panel['paths']]
+    assert {line['label'] for line in lines} == {*(f'goal{i}' for i in range(4)), *(f'path {i}' for i in range(4)), 'unknown'}
+    for line in lines:
+        topic, path = re.fullmatch(r'/foc/(\w+)(.*)', line['value']).groups()
+        assert find_values(made[topic], path) == pytest.approx(expected.get(line['label'], []), abs=1e-5)
 
 
 PERMISSIONS = ROOT / 'config' / 'sros2_policy.xml'

@@ -13,6 +13,7 @@ prediction that is not renewed disappears.
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,18 +38,26 @@ ELLIPSES = 6
 """Number of ellipses along each path."""
 MAX_DRAWN = 128
 """Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
-THICKNESS, TEXT_HEIGHT = 0.002, 0.008
+THICKNESS, TEXT_HEIGHT = 0.002, 0.01
+TALL = 10 * THICKNESS
+"""Height of round obstacles [m]; texts are above them."""
 MOTOR, TOTAL = 'motor_noise', 'total_uncertainty'
 """Namespaces of the two ellipses."""
 ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
 """Opacity as a share of that of the path, and thickness [m]: the inner ellipse stands out of the outer one."""
-LEGEND = 'ellipses of one standard deviation; inner: motor noise, which eta is about; outer: total uncertainty'
+LEGEND = 'ellipses of one standard deviation\ninner: motor noise, which eta is about\nouter: total uncertainty'
+LABELLED = 0.05
+"""Least likelihood of a labelled path: the labels of unlikely ones would cover those of the others."""
+MOST_LETTERS, LINE_LETTERS = 60, 28
+"""Length of a class in words up to which a label has them, as names of many obstacles would cover the scene; length of a line."""
 
 Colour = tuple[float, float, float, float]
-GREY: Colour = (0.55, 0.55, 0.55, 0.5)
+GREY: Colour = (0.48, 0.48, 0.48, 0.5)
+BLACK: Colour = (0.0, 0.0, 0.0, 1.0)
 OBSTACLE: Colour = (0.45, 0.45, 0.5, 0.9)
 DEVIATION: Colour = (0.85, 0.35, 0.2, 0.25)
-UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.95, 0.6, 0.05])
+UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.78, 0.32, 0.04])
+"""Colours of paths. Foxglove writes in each mixture of them, and in GREY, on white; RViz shows them on a dark background."""
 
 
 def encode_markers(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
@@ -58,9 +67,21 @@ def encode_markers(prediction: Prediction, plane: str, types: MessageTypes) -> A
     markers = [encoder.encode('', 0, 0, action=3)]  # DELETEALL
     for index, outcome in enumerate([*order_candidates(prediction), *unsolved]):
         markers.extend(encoder.encode_candidate(index, outcome))
+    markers.extend(encoder.encode_names())
     markers.extend(encoder.encode_legend())
     markers.extend(encoder.encode_obstacles())
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
+
+
+def _is_labelled(outcome: PredictedCandidate) -> bool:
+    return not outcome.has_likelihood or outcome.likelihood >= LABELLED
+
+
+def _write_label(share: str, words: str, notes: str) -> str:
+    """Return a label in short lines, which do not part the side of an obstacle in the words of a class from its name."""
+    kept = words.replace(' of ', '\0of\0')
+    lines = textwrap.wrap(f'{share}, {kept}{notes}', LINE_LETTERS, break_long_words=False, break_on_hyphens=False)
+    return '\n'.join(lines).replace('\0', ' ')
 
 
 @dataclass(frozen=True)
@@ -82,20 +103,21 @@ class _MarkerEncoder:
         likelihood = outcome.likelihood
         if outcome.has_likelihood:
             red, green, blue = UNLIKELY + likelihood * (LIKELY - UNLIKELY)
-            colour, text = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
+            colour, share = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
             found = 'estimated' if outcome.is_estimated else 'compromised'
-            text += '' if outcome.is_solved else f', {found}: eta {outcome.eta:.3f}'
+            notes = '' if outcome.is_solved else f', {found}: eta {outcome.eta:.3f}'
             for name in ELLIPSE_STYLES if index == 0 else (MOTOR,):
                 yield from self._encode_ellipses(name, index, outcome, colour)
         else:
-            colour, text = GREY, outcome.reason
+            colour, share, notes = GREY, '- %', f', {outcome.reason}'
         points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[*map(self._encode_point, points)])
-        if outcome.has_likelihood and likelihood < 0.01:  # its label would cover those of the others
-            return
-        label = f'{outcome.label} ({describe_candidate(outcome, len(self.prediction.goal_positions))}) {text}'
-        yield self.encode('label', index, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), points[len(points) // 2], text=label)
+        if _is_labelled(outcome):
+            words = describe_candidate(outcome, len(self.prediction.goal_positions))
+            words = outcome.label if len(words) > MOST_LETTERS else words
+            place = points[round((0.45 + 0.12 * (index % 3)) * (len(points) - 1))]  # labels of neighbours stand apart
+            yield self._encode_text('label', index, _write_label(share, words, notes), place, colour, 1.0)
 
     def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
         """Yield ellipses of one standard deviation about the mean, spread over the path."""
@@ -114,13 +136,24 @@ class _MarkerEncoder:
         for i, centre in enumerate(self._lift_curve(path, outcome, steps)):
             yield self.encode(name, 1000 * index + i, CYLINDER, faint, (*diameters[i], float(thick[i])), centre, angles[i])
 
+    def encode_names(self) -> Iterator[Any]:
+        """Yield the names of several goals, and those of the obstacles that the labels of paths name."""
+        goals, near = self.prediction.goals, self.prediction.obstacles
+        for row, place in enumerate(self._lift(self.prediction.goal_positions)):
+            if len(goals) > 1:
+                yield self._encode_text('goal', row, goals[row].name, place, GREY, 2.0)
+        named = {name for each in self.prediction.candidates if _is_labelled(each) for name, _ in each.candidate.sides}
+        for row, place in enumerate(self._lift(near.centre)):
+            if near.ids[row] in named:
+                yield self._encode_text('obstacle_name', row, near.ids[row], place, BLACK)
+
     def encode_legend(self) -> Iterator[Any]:
         """Yield the legend of the ellipses, below the hand, if any are drawn, and the shares that no candidate has."""
         for outcome in self.prediction.candidates_with_likelihood[:1]:
-            (place,) = self._lift(outcome.solution.path[:1] - [0.0, 0.05])
+            (place,) = self._lift(outcome.solution.path[:1])
             shares = (self.prediction.unknown, 'unknown'), (self.prediction.other, 'another goal')
             text = '\n'.join([LEGEND, *(f'{100 * share:.0f} % {name}' for share, name in shares if share > 0.0)])
-            yield self.encode('legend', 0, TEXT, (*GREY[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
+            yield self._encode_text('legend', 0, text, place, GREY, 3.0)
 
     def encode_obstacles(self) -> Iterator[Any]:
         near = self.prediction.obstacles
@@ -128,22 +161,32 @@ class _MarkerEncoder:
             distances = measure_offsets(self.prediction.candidates[0].candidate.guess[0], near)[1][0] - near.radius
             near = near.take(np.argsort(distances, kind='stable'))
         near = near.take(list(range(min(len(near), MAX_DRAWN))))
-        for name, growths, colour in (
-            ('obstacle', np.zeros(len(near)), OBSTACLE),
-            ('obstacle_deviation', near.radius_stddev, DEVIATION),
+        for name, growths, colour, above in (
+            ('obstacle', np.zeros(len(near)), OBSTACLE, 0.0),
+            ('obstacle_deviation', near.radius_stddev, DEVIATION, -THICKNESS),  # at equal heights, viewers draw either above
         ):
             for row, growth in enumerate(growths.tolist()):
-                yield self._encode_obstacle(name, near, row, growth, colour)
+                yield self._encode_obstacle(name, near, row, growth, colour, above)
 
-    def _encode_obstacle(self, name: str, obstacles: Obstacles, row: int, growth: float, colour: Colour) -> Any:
+    def _encode_obstacle(self, name: str, obstacles: Obstacles, row: int, growth: float, colour: Colour, above: float) -> Any:
         """Return an obstacle, larger by a growth [m]: a cylinder, or triangles between its centre and its outline."""
         (centre,) = self._lift(obstacles.centre[row : row + 1])
         if obstacles.corners[row] == 1:
             diameter = 2 * (float(obstacles.radius[row]) + growth)
-            return self.encode(name, row, CYLINDER, colour, (diameter, diameter, 10 * THICKNESS), centre)
+            return self.encode(name, row, CYLINDER, colour, (diameter, diameter, TALL), self._raise(centre, above))
         outline = self._lift(trace_obstacle(obstacles, row, growth, 32))
         corners = [corner for before, after in pairwise(outline) for corner in (centre, before, after)]
-        return self.encode(name, row, TRIANGLES, colour, points=[*map(self._encode_point, corners)])
+        return self.encode(
+            name, row, TRIANGLES, colour, centre=self._raise((0.0, 0.0, 0.0), above), points=[*map(self._encode_point, corners)]
+        )
+
+    def _encode_text(
+        self, name: str, identity: int, text: str, point: Sequence[float], colour: Colour, below: float = 0.0
+    ) -> Any:
+        """Return a text at a point, in front of the obstacles; below: by how many lines its first one is below the point."""
+        down = TEXT_HEIGHT * (below + text.count('\n') / 2) if below else 0.0  # viewers centre a text at its place
+        place = self._raise(point, TALL, down)
+        return self.encode(name, identity, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
 
     def encode(
         self,
@@ -166,6 +209,11 @@ class _MarkerEncoder:
     def _lift(self, positions: Array) -> list[list[float]]:
         """Return positions in the plane (m, 2) as points in space, at the height of the hand."""
         return cast('list[list[float]]', lift(positions, self.prediction.height, self.plane).tolist())
+
+    def _raise(self, point: Sequence[float], above: float, down: float = 0.0) -> list[float]:
+        """Return a point in space moved towards a viewer, who sees the first axis of the plane to the right, and down [m]."""
+        (shift,) = lift(np.array([[0.0, -down]]), -above if self.plane == 'xz' else above, self.plane)
+        return cast('list[float]', (point + shift).tolist())
 
     def _lift_curve(self, curve: Array, outcome: PredictedCandidate, rows: Any = slice(None)) -> list[list[float]]:
         """Return rows of a curve (m, 2) along the whole way of a candidate as points in space, at its predicted heights."""
