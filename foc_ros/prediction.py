@@ -23,7 +23,7 @@ class Prediction(core_prediction.Prediction):
         Solved ones first, the most likely first; then those that could not be solved, with their status. The `height` of a
         candidate has `mean` and `covariance` of the height over the plane and its derivatives, None where it is not predicted.
     most_likely : str or None
-        Label of the most likely class, which changes only when another one leads by 0.05; None if none was solved.
+        Label of the most likely class, which changes only when another one leads by 0.15; None if none was solved.
     unknown : float
         Share of the likelihood of classes that the search has seen and that are no candidates.
     other : float

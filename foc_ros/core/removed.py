@@ -21,7 +21,7 @@ REMOVED = {
     'likelihood.adaptation': 'nothing is learnt from choices any more',
     'likelihood.hold_s': 'it is 0.2 s',
     'likelihood.smoothing_s': 'a likelihood changes by one in 0.15 s at most',
-    'likelihood.margin': 'it is 0.05',
+    'likelihood.margin': 'it is 0.15',
     'experience.prior_count': RECORDINGS,
     'experience.prior_count_beyond': RECORDINGS,
     'experience.prior_count_path': RECORDINGS,
