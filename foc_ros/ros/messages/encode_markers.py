@@ -173,11 +173,11 @@ class _MarkerEncoder:
         (centre,) = self._lift(obstacles.centre[row : row + 1])
         if obstacles.corners[row] == 1:
             diameter = 2 * (float(obstacles.radius[row]) + growth)
-            return self.encode(name, row, CYLINDER, colour, (diameter, diameter, TALL), self._raise(centre, above))
+            return self.encode(name, row, CYLINDER, colour, (diameter, diameter, TALL), self._move(centre, above))
         outline = self._lift(trace_obstacle(obstacles, row, growth, 32))
         corners = [corner for before, after in pairwise(outline) for corner in (centre, before, after)]
         return self.encode(
-            name, row, TRIANGLES, colour, centre=self._raise((0.0, 0.0, 0.0), above), points=[*map(self._encode_point, corners)]
+            name, row, TRIANGLES, colour, centre=self._move((0.0, 0.0, 0.0), above), points=[*map(self._encode_point, corners)]
         )
 
     def _encode_text(
@@ -185,7 +185,7 @@ class _MarkerEncoder:
     ) -> Any:
         """Return a text at a point, in front of the obstacles; below: by how many lines its first one is below the point."""
         down = TEXT_HEIGHT * (below + text.count('\n') / 2) if below else 0.0  # viewers centre a text at its place
-        place = self._raise(point, TALL, down)
+        place = self._move(point, TALL, down)
         return self.encode(name, identity, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
 
     def encode(
@@ -210,10 +210,16 @@ class _MarkerEncoder:
         """Return positions in the plane (m, 2) as points in space, at the height of the hand."""
         return cast('list[list[float]]', lift(positions, self.prediction.height, self.plane).tolist())
 
-    def _raise(self, point: Sequence[float], above: float, down: float = 0.0) -> list[float]:
-        """Return a point in space moved towards a viewer, who sees the first axis of the plane to the right, and down [m]."""
-        (shift,) = lift(np.array([[0.0, -down]]), -above if self.plane == 'xz' else above, self.plane)
-        return cast('list[float]', (point + shift).tolist())
+    @cached_property
+    def _directions(self) -> list[tuple[float, float]]:
+        """Components of two directions in space: down in the plane, and towards a viewer who sees its first axis to the right."""
+        (down,) = lift(np.array([[0.0, -1.0]]), 0.0, self.plane).tolist()
+        (towards,) = lift(np.zeros((1, 2)), -1.0 if self.plane == 'xz' else 1.0, self.plane).tolist()
+        return list(zip(down, towards, strict=True))
+
+    def _move(self, point: Sequence[float], towards: float, down: float = 0.0) -> list[float]:
+        """Return a point in space moved towards a viewer and down [m]."""
+        return [at + towards * b + down * a for at, (a, b) in zip(point, self._directions, strict=True)]
 
     def _lift_curve(self, curve: Array, outcome: PredictedCandidate, rows: Any = slice(None)) -> list[list[float]]:
         """Return rows of a curve (m, 2) along the whole way of a candidate as points in space, at its predicted heights."""
