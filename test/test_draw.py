@@ -3,6 +3,8 @@
 """Pictures for print: what is drawn is what was computed, and it can be told apart, read and placed anywhere."""
 
 from dataclasses import replace
+from importlib.resources import files
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Circle, Ellipse
 from report_samples import START_NS, prediction, widen
 
+from foc_ros import Config, replay
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import Status
 from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, GHOST_COLOUR, get_candidate_style
@@ -78,6 +81,19 @@ def test_paths_below_one_percent_have_one_line_in_the_legend_and_no_letter():
         assert legend_of(axes).count(words) == 1 and ' 0 %' not in legend_of(axes)
         letters = {text.get_text() for text in axes.texts} & set('ABC')
         assert letters == ({'A'} if likelihoods[0] > 0.01 else set())
+
+
+def test_every_path_that_is_drawn_begins_at_the_hand_also_one_that_was_solved_before():
+    config = Config().with_values({'rate_hz': 10.0, 'foc.steps': 10})
+    made = islice(replay(files('foc_ros') / 'recordings' / 'reaching.mcap', config), 18)
+    prediction = max(made, key=lambda each: sum(one.age_s > 0.0 for one in each.candidates_with_likelihood))
+    assert any(each.age_s > 0.0 for each in prediction.candidates_with_likelihood), 'unlikely ones are solved now and then'
+    lines = axes_of(prediction).lines
+    (now,) = [line for line in lines if line.get_label() == 'hand']
+    paths = [line for line in lines if '%' in line.get_label()]
+    assert len(paths) > 3
+    for line in paths:
+        np.testing.assert_allclose(line.get_xydata()[0], now.get_xydata()[0], atol=1e-9)
 
 
 def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it():

@@ -195,7 +195,9 @@ def pool_recordings(
     on_ways = np.array([of_ways[is_same].sum() for is_same, _ in agreements])
     likelihoods = update_ways(np.array([each.likelihood for each in taken]), on_ways, decisions)
     group = decisions.way if len(decisions.next_row) else np.zeros_like(goal)
-    likelihoods = divide_among_groups(likelihoods * compare_goals(evidence)[goal], group, np.bincount(group, likelihoods))
+    likelihoods = divide_among_groups(
+        likelihoods * compare_goals(evidence)[goal], group, np.bincount(group, likelihoods).astype(float)
+    )
     pooled = []
     for each, share, (is_same, until_s) in zip(taken, likelihoods.tolist(), agreements, strict=True):
         paths, weights = follow_recordings(library, evidence, until_s, hand, each.times)
