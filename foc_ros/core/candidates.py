@@ -180,7 +180,7 @@ def estimate_unfollowed(
 
     The estimate follows from the candidate that costs most for the length of its path (`compare_efforts`): classes that are not
     followed have the longest paths, with turns that cost more than their length tells. These classes are ranked with the
-    candidates by the same rule, and what they get is the unknown share.
+    candidates by the same rule, for which their means are the positions alone, and what they get is the unknown share.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def estimate_unfollowed(
             status=Status.ESTIMATED,
             message='not followed',
             dt=dt,
-            mean=_derive_states(candidate.guess, dt, reference.solution.mean.shape[1]),
+            mean=candidate.guess,
             effort=cost / dt,
             expected=cost / dt,
         )
