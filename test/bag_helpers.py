@@ -60,15 +60,15 @@ def write_bag(path: Path, items: Iterable[tuple[str, int, Any]] | None = None, r
     return path
 
 
-def write_by_rosbags(path: Path, items: Iterable[tuple[str, int, Any]], **options: Any) -> None:
-    """Write a bag with the library rosbags alone; options: of its writer."""
+def write_by_rosbags(path: Path, items: Iterable[tuple[str, int, Any]], store: Any = STORE, **options: Any) -> None:
+    """Write a bag with the library rosbags alone; store: of the message types; options: of its writer."""
     with BagByRosbags(path, **options) as writer:
         connections: dict[str, Any] = {}
         for topic, stamp_ns, message in items:
             kind = message.__msgtype__
             if topic not in connections:
-                connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
-            writer.write(connections[topic], stamp_ns, STORE.serialize_cdr(message, kind))
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], stamp_ns, store.serialize_cdr(message, kind))
 
 
 def write_mcap(

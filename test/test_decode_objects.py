@@ -6,16 +6,15 @@ import math
 import re
 from importlib.util import find_spec
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
-from bag_helpers import CONFIG, messages, ns
+from bag_helpers import CONFIG, messages, ns, write_by_rosbags
 from hypothesis import given
 from hypothesis import strategies as st
 from message_helpers import SECOND, both_kinds, message_types, pose, pose_array, pose_stamped
 from object_messages import OBJECT_TYPES, STORE, collision_object, detection, detections
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin
 
 from foc_ros.analysis.replay import replay
 from foc_ros.core.errors import LostHandError, MessageError, RecordingError
@@ -137,13 +136,8 @@ def test_a_bag_with_them_is_replayed_by_its_own_definitions(tmp_path, topic):
         if topic == '/collision_objects':
             box = collision_object((BOX, (0.06, 0.04, 0.1), (0.15, 0, 0)), name='box', **where)
         items.append((topic, ns(seconds), box))
-    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections: dict[str, Any] = {}
-        for name, stamp_ns, message in sorted(items, key=lambda item: item[1]):
-            kind = message.__msgtype__
-            connection = connections.setdefault(name, None) or writer.add_connection(name, kind, typestore=STORE)
-            connections[name] = connection
-            writer.write(connection, stamp_ns, STORE.serialize_cdr(message, kind))
+    ordered = sorted(items, key=lambda item: item[1])
+    write_by_rosbags(tmp_path / 'bag', ordered, STORE, version=9, storage_plugin=StoragePlugin.MCAP)
     predictions = list(replay(tmp_path / 'bag', CONFIG))
     assert len(predictions) == 10
     name = 'box/0' if topic == '/collision_objects' else 'box'

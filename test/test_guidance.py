@@ -11,21 +11,8 @@ from prediction_samples import outcome
 
 import foc_ros
 from foc_ros.core.config import Config, GuidanceConfig
-from foc_ros.core.guidance.guide import (
-    DOUBT,
-    EVIDENCE,
-    GuidanceInput,
-    GuidanceState,
-    combine,
-    guide,
-    weigh_candidates,
-)
-from foc_ros.core.guidance.paths import (
-    POSITION_STDDEV,
-    compute_stiffness,
-    find_crossing,
-    find_need,
-)
+from foc_ros.core.guidance.guide import DOUBT, EVIDENCE, GuidanceInput, GuidanceState, combine, guide, weigh_candidates
+from foc_ros.core.guidance.paths import POSITION_STDDEV, compute_stiffness, find_crossing, find_need
 from foc_ros.core.obstacle_table import make_obstacles
 
 ROUND = make_obstacles([(0.1, 0.0)], [0.03])

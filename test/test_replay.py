@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_mcap, write_parameters
-from message_helpers import read_columns
+from message_helpers import marker, marker_array, read_columns, transform
 from rosbags.highlevel import AnyReader
 
 from foc_ros.analysis.replay import Replay, replay
@@ -21,7 +21,6 @@ from foc_ros.cli.main import main
 from foc_ros.core.config import Config, GuidanceConfig, replace_values
 from foc_ros.io.bags import BagReader
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
-from foc_ros.ros.messages.types import make_header
 
 RECORDING = Path(__file__).parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 FEW = 0.12
@@ -115,15 +114,11 @@ def by_stamp(*given):
 
 def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path):
     """As ROS 1 named frames; in any input, in a transform and in the parameter."""
-    turned = TYPES.make('geometry_msgs/msg/Transform', rotation=TYPES.make('geometry_msgs/msg/Quaternion', w=1.0))
-    link = TYPES.make(
-        'geometry_msgs/msg/TransformStamped', header=make_header(TYPES, 0, '/world'), child_frame_id='/tool', transform=turned
-    )
+    link = transform(TYPES, '/tool', (0.0, 0.0, 0.0), parent='/world')
     given = [('/tf_static', ns(-0.1), TYPES.make('tf2_msgs/msg/TFMessage', transforms=[link]))]
     for topic, stamp_ns, message in messages(seconds=FEW):
         if topic == '/hand_pose':
-            header = make_header(TYPES, stamp_ns, '/tool')
-            message = TYPES.make('geometry_msgs/msg/PoseStamped', header=header, pose=message.pose)
+            message.header.frame_id = '/tool'
         given.append((topic, stamp_ns, message))
     bag, config = write_bag(tmp_path / 'slashes', given), replace_values(CONFIG, {'frame_id': '/world'})
     assert len(list(replay(bag, config))) == len(reach(FEW))
@@ -137,10 +132,8 @@ def test_a_hand_that_does_not_move_is_told(tmp_path, capsys):
 
 
 def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path, capsys):
-    marker = TYPES.make('visualization_msgs/msg/Marker', header=make_header(TYPES, ns(0), FRAME), type=9)
-    array = TYPES.make('visualization_msgs/msg/MarkerArray', markers=[marker, marker])
-    moved = TYPES.make('geometry_msgs/msg/TransformStamped', header=make_header(TYPES, ns(0), 'base'), child_frame_id='base')
-    tree = TYPES.make('tf2_msgs/msg/TFMessage', transforms=[moved])
+    array = marker_array(TYPES, *2 * [marker(TYPES, stamp_ns=ns(0), type=9)])
+    tree = TYPES.make('tf2_msgs/msg/TFMessage', transforms=[transform(TYPES, 'base', (0.0, 0.0, 0.0), parent='base')])
     given = [('/tf', ns(-0.09), tree), ('/obstacle_markers', ns(-0.08), array)]
     assert run(write_bag(tmp_path / 'odd', by_stamp(messages(seconds=FEW), given))) == 0
     assert capsys.readouterr().err == (
@@ -152,8 +145,7 @@ def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path, capsys):
 
 
 def test_a_scene_in_another_frame_than_the_first_pose_is_counted(tmp_path, capsys):
-    marker = TYPES.make('visualization_msgs/msg/Marker', header=make_header(TYPES, ns(0), 'camera'), type=2)
-    array = TYPES.make('visualization_msgs/msg/MarkerArray', markers=[marker])
+    array = marker_array(TYPES, marker(TYPES, stamp_ns=ns(0), frame_id='camera'))
     assert run(write_bag(tmp_path / 'odd', by_stamp(messages(seconds=FEW), [('/obstacle_markers', ns(-0.08), array)]))) == 0
     assert capsys.readouterr().err == (
         'foc_ros replay: 1 messages before the first hand pose left out: they are in another frame than it\n'
@@ -252,16 +244,7 @@ def test_a_table_is_printed_and_a_report_is_written(tmp_path, bag, capsys):
 
 def camera_at(y, seconds, late_s=0.02):
     """Return a transform for a time that is logged later: a camera at (0, y) that looks along the y axis of the world."""
-    stamped = TYPES.make(
-        'geometry_msgs/msg/TransformStamped',
-        header=make_header(TYPES, ns(seconds), FRAME),
-        child_frame_id='camera',
-        transform=TYPES.make(
-            'geometry_msgs/msg/Transform',
-            translation=TYPES.make('geometry_msgs/msg/Vector3', y=y),
-            rotation=TYPES.make('geometry_msgs/msg/Quaternion', z=np.sqrt(0.5), w=np.sqrt(0.5)),
-        ),
-    )
+    stamped = transform(TYPES, 'camera', (0.0, y, 0.0), (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)), ns(seconds))
     return '/tf', ns(seconds + late_s), TYPES.make('tf2_msgs/msg/TFMessage', transforms=[stamped])
 
 

@@ -14,22 +14,8 @@ from assistance import RIVALS
 from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.simulation import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
-from foc_ros.analysis.simulation.operators import (
-    DT,
-    Arm,
-    Task,
-    draw_task,
-    interpolate_minimum_jerk,
-)
-from foc_ros.analysis.simulation.study import (
-    RULES,
-    Assistance,
-    Trial,
-    make_pairs,
-    measure_trial,
-    run_pair,
-    run_trial,
-)
+from foc_ros.analysis.simulation.operators import DT, Arm, Task, draw_task, interpolate_minimum_jerk
+from foc_ros.analysis.simulation.study import RULES, Assistance, Trial, make_pairs, measure_trial, run_pair, run_trial
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.obstacle_table import make_obstacles
