@@ -116,8 +116,9 @@ def test_an_outlier_is_refused_and_the_movement_goes_on():
     np.testing.assert_array_equal(*means)
     with pytest.raises(foc_ros.InputError, match=r'^position'):
         predictor.update(0.06, (0.3, 0.4))
-    restarted = predictor.update(0.08, (0.3, 0.41))
-    np.testing.assert_array_equal(restarted.candidates[0].solution.mean[0], [0.3, 0.41, 0.0, 0.0, 0.0, 0.0])
+    for t, position in ((0.08, (0.3, 0.41)), (0.08 + FAST.estimator.gap_s + 0.01, (0.0, 0.0))):  # the jump goes on; a gap
+        restarted = predictor.update(t, position)
+        np.testing.assert_array_equal(restarted.candidates[0].solution.mean[0], [*position, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_lists_states_and_tables_are_accepted():

@@ -107,20 +107,29 @@ NO_NUMBERS = (
 )
 NAMES = '--operators: expected names of accurate, noisy, laggy, changes_way, unannounced_goal, human_paths'
 KINDS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections, goals, goal_pose'
+PEOPLE = '--recordings: expected recordings of people for the operator human_paths, got none'
 INPUTS = f'--remap: expected one of the inputs {KINDS}'
 SCHEDULER = '--scheduler: expected the address of a Dask scheduler, as in tcp://host:8786'
 
 WRONG = [
     (['solve', 'scene.yaml'], WRONG_SCENE),
     (['solve', 'scene.yaml', '--plot', 'a.gif'], ['--plot: expected a name that ends in .png, .pdf, .svg, got a.gif']),
+    (['solve', 'scene.yaml', '--monte-carlo', '0'], ['Invalid value "0" for --monte-carlo. Must be >= 1.']),
+    (['solve', 'scene.yaml', '--monte-carlo', 'x'], ['Invalid value for --monte-carlo: unable to convert "x" into int.']),
     (['solve', 'scene.yaml', '--plot', 'no/a.png'], ['--plot: expected a file in a directory that exists, got no/a.png']),
     (['simulate', '--operators', 'noisi,x'], [f'{NAMES} (did you mean noisy?), got noisi', f'{NAMES}, got x']),
+    (['simulate', '--assistance', 'magic'], ['--assistance: expected names of none, foc, got magic']),
+    (['simulate', '--operators', 'human_paths'], [PEOPLE]),
+    (['simulate', '--trials', '0'], ['Invalid value "0" for --trials. Must be >= 1.']),
+    (['simulate', '--seed', '-1'], ['Invalid value "-1" for --seed. Must be >= 0.']),
     (['simulate', '--report', 'scene.yaml'], ['--report: expected a folder, got scene.yaml, which is a file']),
     (['replay', 'bag.mcap', '--remap', 'hand_pos:=/a'], [f'{INPUTS} (did you mean hand_pose?), got hand_pos']),
     (['replay', 'bag.mcap', '--remap', 'hand_pose:='], ['--remap: expected INPUT:=TOPIC, got hand_pose:=']),
     (['replay', 'bag.mcap', '--learn', 'no/a'], ['--learn: expected a file in a directory that exists, got no/a']),
     (['evaluate', 'tables'], NO_NUMBERS),
     (['evaluate', 'scene.yaml'], ['scene.yaml: expected a bag directory, a .mcap or a .db3 file']),
+    (['evaluate', 'tables', '--report', 'scene.yaml'], ['--report: expected a folder, got scene.yaml, which is a file']),
+    (['fit', '.', '--output', 'a', '--params', 'nowhere.yaml'], ['nowhere.yaml: cannot be read: No such file or directory']),
     (['fit', '.', '--output', 'no/a'], ['--output: expected a file in a directory that exists, got no/a']),
     (
         ['fit', '.', '--output', 'a', '--allow', 'etta'],

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, DurationConfig, EstimatorConfig, replace_values
 from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go
-from foc_ros.core.hand.kalman import JUMP_SPEED, JUMP_STDDEVS, FilterState, compute_gramian, compute_transition, update
+from foc_ros.core.hand.kalman import FilterState, compute_gramian, compute_transition, update
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
@@ -23,7 +23,7 @@ from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, compute_error_map
 from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
-from foc_ros.core.types import NANOSECONDS, HandSample, HandState, SampleStatus
+from foc_ros.core.types import NANOSECONDS, HandSample, HandState
 
 CONFIG = EstimatorConfig(position_stddev=0.001, jerk_density=5.0, onset_speed=0.05, gap_s=0.5)
 START = 100 * NANOSECONDS
@@ -73,59 +73,6 @@ def test_the_estimate_stays_finite_and_positive_for_any_configuration(stddev, de
         scale = np.sqrt(np.diag(state.covariance))
         assert np.all(scale > 0.0)
         assert np.linalg.eigvalsh(state.covariance / np.outer(scale, scale)).min() > -1e-9
-
-
-def test_duplicates_and_late_samples_change_nothing():
-    state = run(np.arange(0.0, 1.0, 0.02), np.zeros((50, 2)))[-1]
-    for seconds, status in [(0.0, SampleStatus.DUPLICATE), (-1e-9, SampleStatus.LATE), (-0.5, SampleStatus.LATE)]:
-        updated = update(state, sample(0.98 + seconds, 9.0, 9.0), CONFIG)
-        assert updated.status is status
-        assert updated.state is state
-
-
-def test_backward_jumps_and_gaps_restart_the_filter():
-    state = run(np.arange(0.0, 1.0, 0.02), np.outer(np.arange(0.0, 1.0, 0.02), [0.5, 0.0]))[-1]
-    assert state.onset_ns is not None
-    for seconds, status in [
-        (-0.501, SampleStatus.RESTARTED_BACKWARD),
-        (0.501, SampleStatus.RESTARTED_GAP),
-        (1e9, SampleStatus.RESTARTED_GAP),
-    ]:
-        jump = sample(0.98 + seconds, 0.7, 0.1)
-        updated, fresh = update(state, jump, CONFIG), update(None, jump, CONFIG).state
-        assert updated.status is status
-        np.testing.assert_array_equal(updated.state.mean, fresh.mean)
-        np.testing.assert_array_equal(updated.state.covariance, fresh.covariance)
-        assert updated.state.onset_ns is None
-    assert update(state, sample(0.98 + 0.5), CONFIG).status is SampleStatus.ACCEPTED
-
-
-@pytest.mark.parametrize('dt', [0.0035, 0.02, 0.1])
-def test_a_position_that_jumps_decides_nothing_before_the_next_one(dt):
-    times = np.arange(0.0, 1.0, dt)
-    state = run(times, np.outer(times, [2.0, 0.0]))[-1]
-    expected = state.mean[0] + dt * state.mean[2]
-    limit = JUMP_STDDEVS * CONFIG.position_stddev + JUMP_SPEED * dt
-    assert update(state, sample(times[-1] + dt, expected - 0.99 * limit, 0.0), CONFIG).status is SampleStatus.ACCEPTED
-    held = update(state, sample(times[-1] + dt, expected - 1.01 * limit, 0.0), CONFIG)
-    assert held.status is SampleStatus.JUMPED and held.status.is_refused
-    np.testing.assert_array_equal(held.state.mean, state.mean)
-    following = times[-1] + 2 * dt
-
-    movement = sample(following, expected + dt * state.mean[2], 0.0)
-    continued = update(held.state, movement, CONFIG)
-    assert continued.status is SampleStatus.ACCEPTED and continued.state.jumped is None
-    np.testing.assert_array_equal(continued.state.mean, update(state, movement, CONFIG).state.mean)
-
-    jump = sample(following, expected - 1.01 * limit + 2.0 * dt, 0.0)
-    restarted = update(held.state, jump, CONFIG)
-    assert restarted.status is SampleStatus.RESTARTED_JUMP and restarted.status.is_restart and restarted.state.onset_ns is None
-    np.testing.assert_array_equal(restarted.state.mean, update(None, jump, CONFIG).state.mean)
-
-    other = update(held.state, sample(following, expected + 9.0, 0.0), CONFIG)
-    assert other.status is SampleStatus.JUMPED
-    later = sample(times[-1] + CONFIG.gap_s + dt, expected - 9.0, 0.0)
-    assert update(other.state, later, CONFIG).status is SampleStatus.RESTARTED_GAP
 
 
 def test_a_movement_begins_above_the_onset_speed_and_ends_below_half_of_it():

@@ -175,11 +175,6 @@ def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_
     assert any(line.startswith('Positions 0.5 s ahead: ') for line in lines)
 
 
-def test_a_report_that_cannot_be_written_is_refused_before_the_work(tables, capsys):
-    assert run(tables, '--report', str(tables / 'goals.csv')) == 2
-    assert '--report: expected a folder' in capsys.readouterr().err
-
-
 HEADER = 'recording,object,x_m,y_m,z_m,width_m,depth_m,height_m\n'
 BOXES = (
     'a,Target,0.3,0,0,0.05,0.05,0.08\n'

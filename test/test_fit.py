@@ -142,11 +142,3 @@ def _check_node_starts(printed, config):
             process.wait(30.0)
     assert [each.double_value for each in values] == [flatten(config)[name] for name in names]
     assert process.returncode == 0
-
-
-def test_a_parameter_file_that_is_not_there_ends_in_one_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(['fit', '.', '--output', 'out.yaml', '--params', 'nowhere.yaml']) == 2
-    error = capsys.readouterr().err
-    assert 'nowhere.yaml: cannot be read' in error and error.count('\n') == 1
-    assert not (tmp_path / 'out.yaml').exists()

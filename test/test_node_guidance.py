@@ -171,14 +171,6 @@ def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros):
     assert bench.node._guidance.loop._thread is None, 'the thread has ended'
 
 
-def test_a_silent_hand_is_released(ros):
-    bench = begin(ros)
-    ros.spin_until(lambda: figures(bench.health())['guidance'] == 'stale', 'the hand is stale')
-    ros.spin_until(lambda: not bench.forces[-1].any(), 'the force is zero')
-    ros.spin_until(lambda: time.monotonic() - bench.wrenches[-1][0] > 0.3, 'nothing is published for a hand that is stale')
-    assert not bench.forces[-1].any()
-
-
 def test_commands_are_blended_and_pass_unchanged_without_guidance(ros):
     bench = begin(ros)
 

@@ -10,8 +10,6 @@ from pathlib import Path
 import ros_required  # noqa: F401
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from lifecycle_msgs.msg import Transition, TransitionEvent
-from lifecycle_msgs.srv import ChangeState, GetState
 from process_helpers import ROOT, Player, ended, predict_once, running
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
@@ -21,8 +19,6 @@ from std_srvs.srv import SetBool
 from foc_ros.core.config import list_parameters
 from foc_ros.ros.isolated_node import reserve_domain
 from foc_ros.ros.main import main
-from foc_ros.ros.messages.encode_prediction import OUTPUTS
-from foc_ros.ros.messages.types import find_message_class
 
 
 def entry_point(name):
@@ -151,20 +147,6 @@ def test_every_parameter_is_listed_described_read_and_set(client):
         assert not read_only or 'read-only' in result.reason
 
 
-def test_the_state_is_changed_and_every_topic_is_received(client):
-    kinds = {f'foc/{name}': find_message_class(kind) for name, (kind, _) in OUTPUTS.items()}
-    kinds |= {'/diagnostics': DiagnosticArray, 'foc/transition_event': TransitionEvent}
-    received = {name: client.graph.collect(client, kind, name) for name, kind in kinds.items()}
-
-    def change(label):
-        assert client.ask(ChangeState, 'change_state', ChangeState.Request(transition=Transition(label=label))).success
-        return str(client.ask(GetState, 'get_state', GetState.Request()).current_state.label)
-
-    states = {'deactivate': 'inactive', 'cleanup': 'unconfigured', 'configure': 'inactive', 'activate': 'active'}
-    assert {each: change(each) for each in states} == states
-    Player(client.graph).play_until(lambda: all(received.values()), f'a message on each of {", ".join(kinds)}')
-
-
 def test_a_node_that_is_killed_and_started_again(ros):
     with running(ros) as process:
         predict_once(ros)
@@ -194,7 +176,6 @@ def set_obstacles(ros, client, on):
 
 
 def test_the_loop_is_engaged_handed_over_stale_and_recovered(ros):
-    from diagnostic_msgs.msg import DiagnosticArray
     from std_msgs.msg import Float64
 
     client = ros.node('client')

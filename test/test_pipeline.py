@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
+from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_stamped
 from object_messages import collision_object
 
 from foc_ros.core import pipeline as module
@@ -93,20 +93,6 @@ def seen(intake):
     return intake.pipeline.scene.obstacles(state.stamp_ns).ids
 
 
-def test_every_input_reaches_the_pipeline(intake):
-    assert move(intake, 1.0) is SampleStatus.ACCEPTED
-    assert intake.sample is not None and intake.sample.height == 0.2
-    assert intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)]))) is SampleStatus.ACCEPTED
-    assert show(intake, marker(TYPES, (0.3, 0.1, 0.0), id=5)) is SampleStatus.ACCEPTED
-    assert seen(intake) == ('0', 'a/5')
-    assert intake.pipeline.scene.obstacles(SECOND).radius_stddev.tolist() == [0.0, 0.004]
-    assert intake.take('goals', pose_array(TYPES, [(0.3, 0.0, 0.0), (0.3, 0.1, 0.0)])) is SampleStatus.ACCEPTED
-    assert intake.pipeline.scene.goals.tolist() == [[0.3, 0.0], [0.3, 0.1]]
-    assert intake.take('goal_pose', pose_stamped(TYPES, (0.4, 0.0, 0.0))) is SampleStatus.ACCEPTED
-    assert intake.pipeline.scene.goals.tolist() == [[0.4, 0.0]]
-    assert intake.counts == {} and intake.last_refusal is None
-
-
 def test_a_marker_expires_by_the_stamp_of_the_hand(intake):
     move(intake, 1.0)
     show(intake, marker(TYPES, id=1, lifetime=0.5), marker(TYPES, id=2))
@@ -120,6 +106,7 @@ def test_markers_of_publishers_with_different_delays_are_all_used(intake):
     for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
         assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is SampleStatus.ACCEPTED
     assert seen(intake) == ('a/0', 'b/0', 'c/0')
+    assert intake.pipeline.scene.obstacles(SECOND).radius_stddev.tolist() == [0.004] * 3
     assert intake.pipeline.scene.sources['markers'].stamp_ns == SECOND
 
 
@@ -154,17 +141,6 @@ def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):
         intake.remove_source('collision_objects')
 
 
-def test_markers_in_another_frame_are_discarded(intake):
-    """They are received before the hand pose that fixes another working frame."""
-    show(intake, marker(TYPES, id=1, frame_id='camera'))
-    move(intake, 1.0)
-    assert intake.counts == {'obstacles_wrong_frame': 1}
-    assert show(intake, marker(TYPES, id=2)) is SampleStatus.ACCEPTED
-    assert seen(intake) == ('a/2',)
-    assert show(intake, marker(TYPES, id=3, frame_id='camera')) is None
-    assert seen(intake) == ('a/2',) and "expected 'world'" in intake.last_refusal
-
-
 POSE_MS = SECOND // 1000
 A, S, R = SampleStatus.ACCEPTED, SampleStatus.SKIPPED, SampleStatus.RESTARTED_BACKWARD
 
@@ -179,8 +155,8 @@ def pose(ms, x=0.0, frame_id='world'):
         pytest.param(0.0035, (0, 1, 2, 3, 4, 5, 6, 7, 8), (A, S, S, S, A, S, S, S, A), id='1 kHz'),
         pytest.param(0.0035, (0, 4, 8.2, 11.7, 16), (A, A, A, A, A), id='250 Hz with jitter'),
         pytest.param(0.003, (0, 0, 1, 1, -1, 3), (A, SampleStatus.DUPLICATE, S, S, SampleStatus.LATE, A), id='out of order'),
-        pytest.param(0.003, (0, 1, -2000, -1999, -1997), (A, S, R, S, A), id='a jump back'),
-        pytest.param(0.003, (0, 1000, 1001), (A, SampleStatus.RESTARTED_GAP, S), id='a gap'),
+        pytest.param(0.003, (0, 1, -500, -501, -500, -497), (A, S, SampleStatus.LATE, R, S, A), id='back by more than gap_s'),
+        pytest.param(0.003, (0, 500, 1001, 1002), (A, A, SampleStatus.RESTARTED_GAP, S), id='a gap of more than gap_s'),
         pytest.param(0.0, (0, 1, 1.001), (A, A, A), id='switched off'),
     ],
 )
@@ -205,12 +181,6 @@ def test_only_the_stamp_of_a_skipped_pose_is_looked_at():
     wrong = pose(5)
     wrong.header.stamp.nanosec = SECOND
     assert intake.take('hand_pose', wrong) is None
-
-
-def test_a_publisher_in_a_wrong_frame_does_not_keep_the_right_one_away():
-    intake = Intake(Pipeline(replace_values(Config(), {'frame_id': 'world'})))
-    found = [intake.take('hand_pose', pose(2 * i, 0.0, 'camera' if i % 2 else 'world')) for i in range(100)]
-    assert found.count(A) == 50
 
 
 def test_the_union_of_the_sources_holds_the_latest_row_of_an_id():

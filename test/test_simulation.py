@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from assistance import RIVALS
 from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.simulation import ASSISTANCE, NOISY, OPERATORS, UNANNOUNCED_GOAL
+from foc_ros.analysis.simulation import OPERATORS, UNANNOUNCED_GOAL
 from foc_ros.analysis.simulation.operators import DT, Arm, Task, draw_task, interpolate_minimum_jerk
-from foc_ros.analysis.simulation.study import RULES, Assistance, Trial, make_pairs, measure_trial, run_pair, run_trial
+from foc_ros.analysis.simulation.study import Assistance, Trial, make_pairs, measure_trial, run_pair
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.obstacle_table import make_obstacles
@@ -56,17 +55,6 @@ def test_measures_of_a_trial_with_known_answers():
     assert measures['opposing_share'] == pytest.approx(0.5, rel=0.02)
 
 
-@pytest.mark.parametrize('name', [*ASSISTANCE, *RIVALS])
-def test_every_rule_keeps_force_and_slew_within_the_limits(name):
-    task = draw_task(NOISY, np.random.default_rng(2))
-    noise = np.random.default_rng(3).normal(size=(900, 2, 2))
-    trial = run_trial(task, {**RULES, **RIVALS}[name], QUICK, noise)
-    sizes = np.hypot(*trial.assistance.T)
-    assert sizes.max() <= QUICK.guidance.f_max + 1e-9
-    assert np.hypot(*np.diff(trial.assistance, axis=0).T).max() <= QUICK.guidance.slew * DT + 1e-9
-    assert (sizes.max() > 0.0) == (name != 'none')
-
-
 class Misled(Assistance):
     """Takes a wrong way to be the likeliest, and draws back."""
 
@@ -103,21 +91,6 @@ def test_the_command_prints_equal_cells_whatever_the_workers_and_writes_a_report
     assert (cells[0]['effort_difference'], cells[0]['wrong_way_s']) == (0.0, None)
     page = (tmp_path / 'simulation.html').read_text('utf-8')
     assert page.count('<figure>') == 3 + 1 and 'foc' in page
-
-
-@pytest.mark.parametrize(
-    ('options', 'words'),
-    [
-        (['--operators', 'noisy,careless'], '--operators: expected names of accurate, noisy'),
-        (['--assistance', 'magic'], '--assistance: expected names of none, foc'),
-        (['--operators', 'human_paths'], '--recordings: expected recordings of people for the operator human_paths, got none'),
-        (['--trials', '0'], 'Invalid value "0" for --trials. Must be >= 1.'),
-        (['--seed', '-1'], 'Invalid value "-1" for --seed. Must be >= 0.'),
-    ],
-)
-def test_wrong_options_are_refused(options, words, capsys):
-    assert main(['simulate', *options]) == 2
-    assert words in capsys.readouterr().err
 
 
 def test_recorded_paths_are_intended_paths(tmp_path, capsys):

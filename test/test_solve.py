@@ -120,23 +120,6 @@ def test_the_terminal_gives_reason_and_remedy_of_what_is_not_solved(tmp_path, ca
         assert line.startswith('goal0:') and any(line.endswith(f'remedy: {status.remedy}') for status in Status)
 
 
-@pytest.mark.parametrize(
-    ('scene', 'options', 'line'),
-    [
-        ({**SCENE, 'eta': 2}, (), 'foc_ros solve: eta: expected a number in [0, 0.999], got 2'),
-        (SCENE, ('--monte-carlo', '0'), 'foc_ros solve: Invalid value "0" for --monte-carlo. Must be >= 1.'),
-        (SCENE, ('--monte-carlo', 'x'), 'foc_ros solve: Invalid value for --monte-carlo: unable to convert "x" into int.'),
-    ],
-)
-def test_wrong_input_is_exit_2_with_one_line(tmp_path, capsys, scene, options, line):
-    try:
-        code = solve(tmp_path, scene, *options)
-    except SystemExit as leaving:
-        code = leaving.code
-    assert code == 2
-    assert capsys.readouterr() == ('', f'{line}\n')
-
-
 def test_json_describes_the_whole_solution(tmp_path, capsys):
     for each in candidates(tmp_path, capsys, {**SCENE, 'strategy': 'lv', 'start_stddev': 0.001}):
         assert each['costs']['effort'] == pytest.approx(each['effort']) and each['costs']['lambda_variance'] > 0

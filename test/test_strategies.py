@@ -13,14 +13,11 @@ from reach_helpers import bowed, case_guess, case_problem, one_obstacle, random_
 
 import foc_ros
 from foc_ros.core.config import Config, FocConfig
-from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import eta_of_k
 from foc_ros.core.obstacles.shapes import collect_obstacles
-from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
-from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.predict import predict
 from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.solution import Status
@@ -114,21 +111,6 @@ def test_however_few_the_steps_there_is_an_answer(strategy, steps):
     assert solution.mean.shape == (steps + 1, 6)
     assert np.isfinite(solution.mean).all()
     assert np.isfinite(solution.covariance).all()
-
-
-@pytest.mark.parametrize(
-    ('field', 'values'),
-    [
-        ('start', {'initial_mean': np.full(6, np.nan)}),
-        ('goal', {'goal_position': np.array([np.inf, 0.0])}),
-        ('noise', {'noise': np.array([0.1, np.nan])}),
-        ('start covariance', {'initial_covariance': np.full((6, 6), np.inf)}),
-    ],
-)
-def test_a_problem_that_is_not_finite_is_refused_by_name(field, values):
-    given = {'initial_mean': np.zeros(6), 'goal_position': np.array([0.3, 0.0]), 'noise': np.array([0.1, 0.1])}
-    with pytest.raises(SceneError, match=f'{field}: expected finite numbers'):
-        rest_to_goal(build_triple_integrator_horizon(0.02, 50), obstacles=make_obstacles(), eta=0.9, **(given | values))
 
 
 DT = 0.02
