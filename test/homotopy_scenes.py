@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from foc_ros.core.classes import Search, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
+from foc_ros.core.obstacles.geometry import measure_offsets
 
 CLEARANCE = 0.005
 GOAL = np.array([0.35, 0.0])
@@ -38,10 +39,9 @@ def find(
     return search(mean, goals, obstacles, settings, [1.0] * len(goals), steps, previous)
 
 
-def gap_to_circles(path: np.ndarray, obstacles: Obstacles, clearance: float = CLEARANCE) -> float:
-    """Least distance of a path's points from the circles with the clearance [m]."""
-    apart = np.hypot(*(path[:, None] - obstacles.centre).transpose(2, 0, 1)) - obstacles.radius - clearance
-    return float(apart.min(initial=np.inf))
+def measure_clear(path: np.ndarray, obstacles: Obstacles, clearance: float = CLEARANCE) -> float:
+    """Least distance of a path's points from the obstacles with the clearance [m]."""
+    return float((measure_offsets(path, obstacles)[1] - obstacles.radius - clearance).min())
 
 
 def avoiding() -> tuple[Obstacles, np.ndarray]:

@@ -110,8 +110,8 @@ def test_an_outlier_is_refused_and_the_movement_goes_on():
     for each in (predictor, plain):
         each.set_goals([(0.3, 0.0)])
         each.update(0.0, (0.0, 0.0))
-    with pytest.raises(foc_ros.InputError, match=r'^position: expected a position within 0\.11 m .*, got one that is 0\.5 m'):
-        predictor.update(0.02, (0.3, 0.4))
+    with pytest.raises(foc_ros.InputError, match=r'^position: expected a position within 0\.11 m .*, got one that is 0\.115 m'):
+        predictor.update(0.02, (0.069, 0.092))
     means = [each.update(0.04, (0.01, 0.0)).candidates[0].solution.mean for each in (predictor, plain)]
     np.testing.assert_array_equal(*means)
     with pytest.raises(foc_ros.InputError, match=r'^position'):

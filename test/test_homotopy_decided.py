@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from homotopy_scenes import CLEARANCE, find, gap_to_circles
+from homotopy_scenes import CLEARANCE, find
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -31,18 +31,6 @@ def test_obstacle_exactly_on_the_line_is_passed_on_both_sides_the_same():
     left, right = found.candidates
     np.testing.assert_allclose(left.guess * [1, -1], right.guess, atol=1e-12)
     assert left.guess[:, 1].max() > 0.034
-
-
-def test_the_one_gap_in_a_ring_is_found_and_a_turn_back_is_long():
-    angle = 2 * np.pi * np.arange(12) / 12
-    ring = 0.1 * np.column_stack([np.cos(angle), np.sin(angle)])
-    obstacles = make_obstacles(np.delete(ring, 6, axis=0), 0.03)
-    found = find(obstacles, k=4)
-    assert len(found.candidates) == 2
-    for one in found.candidates:
-        assert dict(one.sides).items() <= find_path_sides(one.guess, obstacles).items()
-    assert all(one.length > 0.1 + 0.1 * np.pi + 0.2 for one in found.candidates)
-    assert all(gap_to_circles(one.guess, obstacles) > -1e-9 for one in found.candidates)
 
 
 def test_obstacles_out_of_the_way_have_no_part_in_the_name():

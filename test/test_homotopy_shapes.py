@@ -4,11 +4,22 @@
 
 import numpy as np
 import pytest
-from homotopy_scenes import AVOIDING, CLEARANCE, GOAL, HAND, avoiding, find, make_box, random_shapes, shortest_by_pattern, turn
+from homotopy_scenes import (
+    AVOIDING,
+    CLEARANCE,
+    GOAL,
+    HAND,
+    avoiding,
+    find,
+    make_box,
+    measure_clear,
+    random_shapes,
+    shortest_by_pattern,
+    turn,
+)
 
 from foc_ros.core.classes import find_path_sides, scene
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import make_box_polygon
 
 BEST = 16
@@ -82,11 +93,6 @@ def test_turned_and_shifted_scenes_and_other_orders_have_the_same_classes(seed):
     for a, b in zip(one.candidates, other.candidates, strict=True):
         # the outlines of circles do not turn with the scene
         np.testing.assert_allclose(turn(a.guess, angle) + shift, b.guess, atol=2e-3)
-
-
-def measure_clear(path, obstacles, clearance=CLEARANCE):
-    """Least distance of a path's points from the obstacles with the clearance [m]."""
-    return float((measure_offsets(path, obstacles)[1] - obstacles.radius - clearance).min())
 
 
 @pytest.mark.parametrize('seed', range(15))
@@ -175,17 +181,6 @@ def test_a_gap_in_any_direction_is_open_from_twice_the_clearance(angle, gap, thr
     obstacles = make_obstacles(np.array([0.17, 0.0]) + np.array([apart, -apart]), 0.03)
     sides = [tuple(side for _, side in one.sides) for one in find(obstacles, k=4).candidates]
     assert ((1, -1) in sides or (-1, 1) in sides) is through
-
-
-def test_an_obstacle_in_no_name_still_blocks():
-    # a screen beside the hand blocks the path round the one obstacle in front; it is behind the hand, so no name contains it
-    screen = [[-0.012, 0.02 + 0.02 * k] for k in range(20)]
-    obstacles = make_obstacles([[0.1, 0.0], *screen], [0.05] + [0.012] * 20)
-    found = find(obstacles)
-    assert {one.label for one in found.candidates} == {'goal0:+0', 'goal0:-0'}
-    for one in found.candidates:
-        apart = np.hypot(*(one.guess[:, None] - obstacles.centre).transpose(2, 0, 1)) - obstacles.radius - 0.005
-        assert apart.min() > -1e-6
 
 
 def test_the_search_ends_at_the_largest_number_of_states_and_says_so(monkeypatch):

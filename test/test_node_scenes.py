@@ -155,17 +155,8 @@ def test_a_disk_that_is_full_ends_the_output_bag_in_one_line(tmp_path):
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
-    command = [
-        sys.executable,
-        '-m',
-        'foc_ros',
-        'replay',
-        bag,
-        '--output',
-        tmp_path / 'out',
-        '--params',
-        write_parameters(tmp_path),
-    ]
+    command = [sys.executable, '-m', 'foc_ros', 'replay', bag, '--output', tmp_path / 'out']
+    command += ['--params', write_parameters(tmp_path)]
     pipes = {'capture_output': True, 'text': True, 'timeout': 100, 'check': False}
     result = subprocess.run(command, cwd=ROOT, preexec_fn=limit_files, **pipes)
     assert result.returncode == 2 and result.stderr.strip().count('\n') == 0 and 'cannot be written' in result.stderr
