@@ -94,6 +94,14 @@ def until(condition: Callable[[], Any], what: str, seconds: float = 60.0) -> Any
     return value
 
 
+def has_ended(pid: int) -> bool:
+    """Return whether a process has ended: it is gone, or a zombie that nobody has waited for."""
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] == 'Z'
+    except FileNotFoundError:
+        return True
+
+
 def visit(browser: Any, started: Play, width: int = 1280, height: int = 1000, dark: bool = False) -> None:
     """Open the page and wait until it shows predictions."""
     show_address(browser, started.url, width, height, dark)

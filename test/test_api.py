@@ -335,15 +335,6 @@ def test_one_goal_needs_no_list(goals):
     assert [each.name for each in predictor.update(0.0, (0.0, 0.0)).goals] == ['goal0']
 
 
-def test_three_numbers_are_one_goal_with_a_height():
-    predictor = foc_ros.Predictor(FAST)
-    predictor.set_goals((0.3, 0.0, 0.1))
-    with pytest.raises(foc_ros.InputError, match=r'^position: expected x, y and the height, because the goals have heights'):
-        predictor.update(0.0, (0.0, 0.0))
-    height = predictor.update(0.0, (0.0, 0.0, 0.0)).candidates[0].height
-    assert height is not None and height.mean[-1, 0] == pytest.approx(0.1, abs=1e-3)
-
-
 def test_both_spellings_of_the_centre_are_taken():
     assert Circle(center=(0.1, 0.2), radius=0.01) == Circle((0.1, 0.2), 0.01)
     assert foc_ros.Box(center=(0.1, 0.2), size=(0.1, 0.1)) == foc_ros.Box((0.1, 0.2), (0.1, 0.1))

@@ -196,15 +196,6 @@ def test_exit_codes(ends, capsys, outcome, code, line):
     assert capsys.readouterr() == ('', line)
 
 
-def test_arguments_of_node_are_passed_to_ros(monkeypatch):
-    taken = []
-    monkeypatch.setattr('foc_ros.ros.main.main', lambda given: taken.append(list(given)) or 0)
-    monkeypatch.setattr('foc_ros.cli.commands.find_spec', lambda name: object())
-    ros = ['--ros-args', '-r', 'hand_pose:=/PSM1/measured_cp', '-p', 'rate_hz:=20.0', '--params-file', 'foc.yaml']
-    assert command_line.main(['node', *ros]) == 0
-    assert taken == [ros]
-
-
 LOUD = """
 import sys
 from foc_ros.cli import main as command_line

@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.obstacles.shapes import Box
 from foc_ros.ros.messages import decode_objects
 from foc_ros.ros.messages.decode_objects import MarkerTable
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
@@ -131,15 +130,6 @@ def test_the_last_finite_row_of_an_id_is_used():
     scene = decode(table)
     assert (scene.obstacles.ids, scene.obstacles.centre[:, 0].tolist()) == (('1', '3', '2'), [1, 2, 3])
     assert scene.dropped == {'not_finite': 1, 'duplicate_id': 1}
-
-
-@given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10), st.floats(-7, 7)), min_size=1, max_size=6))
-def test_boxes_of_a_cloud_are_those_of_the_public_interface(rows):
-    obstacles = decode(obstacle_table([(0, 0, 0, 1, *row) for row in rows], [(name, '<f8') for name, _ in BOX])).obstacles
-    for row, (size_x, size_y, yaw) in enumerate(rows):
-        polygon = Box((0, 0), (size_x, size_y), yaw, radius=1.0).polygon
-        assert obstacles.corners[row] == len(polygon)
-        np.testing.assert_array_equal(obstacles.vertices[row, : len(polygon)], polygon)
 
 
 ROWS = obstacle_table([(1, 2, 3, 4)] * 2)

@@ -7,12 +7,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 
 import ros_required  # noqa: F401
 import pytest
+from play_helpers import has_ended, until
 from rosbags.highlevel import AnyReader
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
@@ -100,24 +100,13 @@ sys.exit(demo.perform(Path({str(output)!r})))
     raise AssertionError(f'the demo never played: {demo.communicate()}')
 
 
-def gone(pid):
-    deadline = time.monotonic() + 10.0
-    while time.monotonic() < deadline:
-        try:
-            os.kill(pid, 0)
-        except ProcessLookupError:
-            return True
-        time.sleep(0.02)
-    return False
-
-
 def test_an_interrupt_ends_it_cleanly(tmp_path):
     demo, node = start(tmp_path / 'out')
     demo.send_signal(signal.SIGINT)
     printed, errors = demo.communicate(timeout=60)
     assert (demo.returncode, errors) == (130, '')
     assert printed.splitlines()[-1].startswith('interrupted')
-    assert gone(node)
+    until(lambda: has_ended(node), 'the end of the node', 10.0)
     assert counted(tmp_path / 'out' / 'bag')['/hand_pose'] > 0
     assert not (tmp_path / 'out' / 'report').exists()
 

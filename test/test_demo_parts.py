@@ -8,12 +8,12 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from play_helpers import has_ended, until
 from report_samples import START_NS, prediction, predictions, samples
 from rich.console import Console
 from rosbags.highlevel import AnyReader
@@ -190,13 +190,6 @@ def test_a_domain_in_use_is_not_taken(monkeypatch):
                 pass
 
 
-def is_alive(pid):
-    try:
-        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
-    except FileNotFoundError:
-        return False
-
-
 @pytest.mark.skipif(sys.platform != 'linux', reason='only Linux ends a child with its parent')
 def test_the_node_does_not_outlive_a_killed_demo(tmp_path):
     package = tmp_path / 'stand_in' / 'foc_ros'
@@ -216,12 +209,9 @@ with NodeProcess(os.environ | {{'PYTHONPATH': {str(package.parent)!r}}}, Path({s
     with subprocess.Popen([sys.executable, '-c', demo], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         pid = int(process.stdout.readline())
-        assert is_alive(pid)
+        assert not has_ended(pid)
         process.send_signal(signal.SIGKILL)
-    deadline = time.monotonic() + 20.0
-    while is_alive(pid):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    until(lambda: has_ended(pid), 'the end of the node', 20.0)
 
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -38,18 +38,12 @@ def solve_margin(problems, starts, settings, deadline):
     return [replace(each, aims_at_eta=True) for each in results]
 
 
-def discretise_double_integrator(dt):
-    A = np.block([[np.eye(2), dt * np.eye(2)], [np.zeros((2, 2)), np.eye(2)]])
-    return Plant(A, np.vstack([dt**2 / 2 * np.eye(2), dt * np.eye(2)]), dt)
-
-
 @pytest.fixture(autouse=True)
 def parts(monkeypatch):
     for registry in (STRATEGIES, PLANTS, LIKELIHOOD_RULES, QP_BACKENDS):
         monkeypatch.setattr(registry, '_parts', dict(registry._parts))
     strategy: Strategy = solve_margin
     foc_ros.register_strategy('margin', strategy)
-    foc_ros.register_plant('double', lambda settings: PlantModel(discretise_double_integrator))
     foc_ros.register_likelihood_rule('linear', lambda costs, config: -config.beta * costs)
     foc_ros.register_qp_backend('outside', lambda qp: QP_BACKENDS.get('quadprog')(qp))
 
@@ -75,15 +69,6 @@ def test_a_strategy_without_results_is_named(given):
     STRATEGIES.register('forgetful', lambda problems, starts, settings, deadline: given)
     with pytest.raises(InputError, match='strategy forgetful: expected a list of StrategyResult'):
         solved(one_obstacle(), BOWED, 'forgetful')
-
-
-@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
-def test_a_plant_is_solved_by_every_strategy(strategy):
-    config = foc_ros.Config().with_values({'foc.plant': 'double', 'foc.noise_x': 0.05, 'foc.noise_y': 0.05})
-    for each in foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy=strategy, config=config):
-        assert each.status is Status.SOLVED
-        assert each.mean.shape == (31, 4)
-        assert foc_ros.monte_carlo(each.solution, 1000).step[2] >= 0.9
 
 
 def test_a_likelihood_rule_weighs_the_classes():

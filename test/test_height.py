@@ -152,7 +152,7 @@ def test_an_obstacle_is_cleared_on_the_way_to_every_goal_or_blocks():
 
 def test_a_predictor_with_heights_predicts_and_clears():
     predictor = foc_ros.Predictor(CONFIG)
-    predictor.set_goals([(0.4, 0.0, 0.25)])
+    predictor.set_goals((0.4, 0.0, 0.25))
     low, post = foc_ros.Circle((0.2, 0.0), 0.03, heights=(0.0, 0.1), name='low'), foc_ros.Circle((0.2, 0.1), 0.03, name='post')
     predictor.set_obstacles([low, post])
     for tick in range(20):
@@ -163,8 +163,8 @@ def test_a_predictor_with_heights_predicts_and_clears():
     height = prediction.candidates[0].height
     assert height.mean.shape == (STEPS + 1, 3) and height.covariance.shape == (STEPS + 1, 3, 3)
     assert height.mean[0, 1] == pytest.approx(-0.2 * t, rel=0.2)
-    for position in ((0.1, 0.0), (0.1, 0.0, float('nan'))):
-        with pytest.raises(foc_ros.SceneError, match=r'^position: expected'):
+    for position, words in (((0.1, 0.0), 'x, y and the height, because the goals have heights'), ((0.1, 0.0, float('nan')), '')):
+        with pytest.raises(foc_ros.SceneError, match=rf'^position: expected {words}'):
             predictor.update(1.0, position)
 
 

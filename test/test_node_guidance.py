@@ -14,6 +14,7 @@ import pytest
 from geometry_msgs.msg import PoseStamped, TwistStamped, Wrench, WrenchStamped
 from message_helpers import SECOND, pose_stamped
 from node_helpers import TYPES, Bench, figures
+from play_helpers import until
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
@@ -222,13 +223,6 @@ def test_neither_a_slow_prediction_nor_an_error_stops_guidance(ros, monkeypatch)
 PRIORITY_CONFIG = Config().with_values({'guidance.enabled': True, 'guidance.realtime_priority': 7})
 
 
-def wait_until(condition):
-    end = time.monotonic() + 10.0
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.001)
-
-
 def make_loop(warn=lambda _: None):
     return GuidanceLoop(PRIORITY_CONFIG, lambda *_: None, lambda _: None, warn)
 
@@ -256,7 +250,7 @@ def test_the_thread_of_guidance_has_it_while_guidance_is_enabled(monkeypatch):
     loop = make_loop()
 
     def wait_for(*priorities):
-        wait_until(lambda: asked == [('guidance', each) for each in priorities])
+        until(lambda: asked == [('guidance', each) for each in priorities], 'the priorities', 10.0)
 
     loop.start()
     try:
@@ -280,7 +274,7 @@ def test_a_late_update_leaves_the_processor_to_others(monkeypatch):
     monkeypatch.setattr(GuidanceLoop, 'update', update_slowly)
     loop = make_loop()
     loop.start()
-    wait_until(lambda: len(updates) >= 5)
+    until(lambda: len(updates) >= 5, 'five updates', 10.0)
     loop.stop()
     pauses = [began - ended for (_, ended), (began, _) in itertools.pairwise(updates)]
     assert min(pauses) > 0.09 / PRIORITY_CONFIG.guidance.rate_hz

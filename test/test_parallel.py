@@ -6,12 +6,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 import worker_tasks
+from play_helpers import has_ended, until
 from test_evaluate import evaluate, write_three
 
 from foc_ros.analysis.parallel import Failure, open_workers, run
@@ -67,9 +67,8 @@ def check_that_only_the_deadly_fail(error):
     assert found == {name: failure if name in ('r3', 'r5') else square for name, square in SQUARES}
 
 
-@pytest.mark.parametrize('count', [2])
-def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(count):
-    with open_workers(count):
+def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else():
+    with open_workers(2):
         check_that_only_the_deadly_fail('TerminatedWorkerError')
 
 
@@ -88,32 +87,22 @@ def start_workers(tmp_path):
             list(run(worker_tasks.wait_here, [(name, {str(tmp_path)!r}) for name in 'ab']))"""
     pipes = {'stderr': subprocess.PIPE, 'text': True, 'start_new_session': True}
     process = subprocess.Popen([sys.executable, '-c', script], cwd=Path(__file__).parent, **pipes)
-    deadline = time.monotonic() + LIMIT_S
-    while len(list(tmp_path.iterdir())) < 2 and time.monotonic() < deadline:
-        time.sleep(0.05)
+    until(lambda: len(list(tmp_path.iterdir())) == 2, 'two workers')
     return process, [int(each.name) for each in tmp_path.iterdir()]
-
-
-def wait_for_the_end(workers):
-    assert len(workers) == 2
-    deadline = time.monotonic() + LIMIT_S / 2.0
-    while any(Path(f'/proc/{each}').exists() for each in workers) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not any(Path(f'/proc/{each}').exists() for each in workers)
 
 
 def test_workers_end_with_a_parent_that_is_killed(tmp_path):
     process, workers = start_workers(tmp_path)
     process.kill()
     process.communicate()
-    wait_for_the_end(workers)
+    until(lambda: all(map(has_ended, workers)), 'the end of the workers')
 
 
 def test_an_interrupt_of_the_terminal_ends_command_and_workers(tmp_path):
     process, workers = start_workers(tmp_path)
     os.killpg(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=LIMIT_S)
-    wait_for_the_end(workers)
+    until(lambda: all(map(has_ended, workers)), 'the end of the workers')
     assert errors.rstrip().endswith('KeyboardInterrupt'), 'the traceback of the command, which its program does not print'
     assert 'Warning' not in errors and errors.count('Traceback') == 1
 

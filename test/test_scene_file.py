@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config
 from foc_ros.core.errors import RecordingError, SceneError
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, collect_obstacles
@@ -181,13 +180,3 @@ def test_a_number_beyond_all_floats_is_refused_with_field_value_and_bound(tmp_pa
     ) as caught:
         load_scene(tmp_path / name)
     assert len(str(caught.value)) < 300
-
-
-def test_a_guess_is_a_minimum_jerk_line_with_a_bulge_to_its_left():
-    guess = parse_scene(
-        {**without('obstacles'), 'start': [0, 0], 'goal': [0.3, 0], 'guess': {'amplitude': -0.05, 'kind': 'text'}}
-    ).guess
-    r = np.linspace(0, 1, 41)
-    assert np.allclose(guess, np.column_stack([0.3 * (10 * r**3 - 15 * r**4 + 6 * r**5), -0.05 * np.sin(np.pi * r)]))
-    turned = guess_path(np.zeros(2), np.array([0.0, 0.3]), 40, amplitude=0.05)
-    assert np.allclose(turned[20], [-0.05, 0.15])

@@ -92,18 +92,6 @@ def test_a_hand_inside_a_margin_gets_out_of_it_in_the_recovery_time(strategy, st
 
 
 @EVERY
-def test_a_warm_start_is_corrected_to_the_goal_from_where_the_hand_really_is(strategy):
-    before = solved(one_obstacle(0.86), BOWED, strategy)
-    state = np.array([0.002, 0.001, 0.03, 0.01, 0.8, 0.2])  # not where the plan would be, and far from its acceleration
-    problem = replace(one_obstacle(0.86), initial_mean=state)
-    start = warm_start(before, problem)
-    found = solve_problem(problem, start, FocConfig(strategy=strategy))
-    fresh = solve_problem(problem, cold_start(BOWED), FocConfig(strategy=strategy))
-    assert found.status is fresh.status is Status.SOLVED
-    np.testing.assert_allclose(found.path, fresh.path, atol=1e-5)
-
-
-@EVERY
 @pytest.mark.parametrize('steps', [1, 2, 5])
 def test_however_few_the_steps_there_is_an_answer(strategy, steps):
     problem = reach(make_obstacles([[0.15, 0.01]], [0.03], [0.001]), steps=steps)

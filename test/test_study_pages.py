@@ -58,6 +58,9 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path):
     assert row in page and 'Better with the fitted parameters: positions in the region of 90 %' in page
     assert '&lt;b&gt;few&lt;/b&gt; recordings' in page and 'x.mcap: no hand' in page
     assert page.count('<img') == 1
+    assert '<p class="warning">Few recordings (2)' in page and 'held out: scored on' in page
+    assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
+    assert warn_of_few(FEW, 'recordings') == []
 
 
 def test_a_fit_without_parameters_has_tables_only_and_a_folder_that_cannot_be_written_is_rejected(tmp_path):
@@ -100,16 +103,6 @@ def test_a_page_names_what_made_it_and_no_path(tmp_path):
     assert 'someone' not in page and str(Path.cwd()) not in page
     write_page(tmp_path, 'x.html', 'x', [], (), Config())
     assert 'All parameters have their defaults.' in (tmp_path / 'x.html').read_text(encoding='utf-8')
-
-
-def test_few_recordings_are_warned_of(tmp_path):
-    assert warn_of_few(FEW, 'recordings') == [] and warn_of_few(FEW - 1, 'recordings')[0].startswith(
-        f'Few recordings ({FEW - 1})'
-    )
-    write_report(tmp_path, 'x', ANSWER)
-    page = (tmp_path / 'fit.html').read_text(encoding='utf-8')
-    assert '<p class="warning">Few recordings (2)' in page and 'held out: scored on' in page
-    assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
 
 
 def test_results_are_told_in_plain_words_first():
