@@ -109,6 +109,15 @@ def types(request: pytest.FixtureRequest) -> MessageTypes:
     return message_types(request.param)
 
 
+@pytest.fixture
+def registries(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forget what a test registers at its end."""
+    from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
+
+    for registry in (STRATEGIES, PLANTS, LIKELIHOOD_RULES, QP_BACKENDS):
+        monkeypatch.setattr(registry, '_parts', dict(registry._parts))
+
+
 @pytest.fixture(scope='module')
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """Yield a headless Chromium for the tests of a file."""

@@ -22,7 +22,6 @@ import foc_ros.solving
 from foc_ros import Circle, Goal
 from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.interpolation import interpolate_covariance
-from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 from foc_ros.core.solution import Status
 
 CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003, name='cup')
@@ -34,9 +33,8 @@ FAST = foc_ros.Config().with_values({'foc.steps': 20, 'budget_s': 0.0})
     [foc_ros.api, foc_ros.solving, foc_ros.extending, foc_ros.core.config, foc_ros.core.obstacles.shapes],
     ids=lambda module: module.__name__,
 )
-def test_the_examples_of_the_docstrings_hold(module, monkeypatch):
-    for registry in (STRATEGIES, PLANTS, LIKELIHOOD_RULES, QP_BACKENDS):  # what the examples register ends with them
-        monkeypatch.setattr(registry, '_parts', dict(registry._parts))
+@pytest.mark.usefixtures('registries')
+def test_the_examples_of_the_docstrings_hold(module):
     results = doctest.testmod(module)
     assert results.attempted
     assert not results.failed

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bag_helpers import TYPES
 from play_helpers import has_ended, until
 from report_samples import START_NS, prediction, predictions, samples
 from rich.console import Console
@@ -26,15 +27,13 @@ from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.io.bags import TYPESTORE, Item
+from foc_ros.io.bags import Item
 from foc_ros.reporting.live_text import show_live
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 from foc_ros.ros import isolated_node
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
-from foc_ros.ros.messages.types import RosbagsTypes
 
-TYPES = RosbagsTypes(TYPESTORE)
 STEP_NS = 20_000_000
 
 

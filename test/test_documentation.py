@@ -85,11 +85,17 @@ def test_links_lead_somewhere(page):
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_paths_named_exist(page):
-    """Module paths, scripts and tests in code font are those of this tree."""
+def test_what_a_page_names_exists(page):
+    """Module paths, scripts and tests in code font, parameters and commands are those of this tree."""
     text = page.read_text('utf-8')
-    for path in re.findall(r'`((?:foc_ros|scripts|test|examples|benchmarks|config|rosdep)/[\w/.]*)`', text):
-        assert (ROOT / path).exists(), f'{page.name}: there is no {path}'
+    paths = re.findall(r'`((?:foc_ros|scripts|test|examples|benchmarks|config|rosdep)/[\w/.]*)`', text)
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+    known = {parameter.name for parameter in list_parameters()}
+    groups = '|'.join(sorted({name.partition('.')[0] for name in known if '.' in name}))
+    assert set(re.findall(rf'`((?:{groups})\.(?!py`)\w+)`', text)) <= known
+    shown = '\n'.join([*re.findall(r'^```console\n(.*?)^```', text, re.MULTILINE | re.DOTALL), *re.findall(r'`([^`\n]+)`', text)])
+    commands = re.findall(r'(?:^|[/ ])foc_ros ([a-z][\w-]*)(?![\w.])', shown, re.MULTILINE)
+    assert set(commands) <= {*list_commands(), 'foc_node'}
 
 
 def test_every_page_is_in_the_table_of_contents():
@@ -97,22 +103,6 @@ def test_every_page_is_in_the_table_of_contents():
     listed = set(re.findall(r'^(\w+)$', contents, re.MULTILINE))
     pages = {page.stem for page in (ROOT / 'doc').glob('*.md')} - {'index'}
     assert pages <= listed, f'doc/index.md does not list {pages - listed}'
-
-
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_parameters_named_exist(page):
-    known = {parameter.name for parameter in list_parameters()}
-    groups = '|'.join(sorted({name.partition('.')[0] for name in known if '.' in name}))
-    for name in re.findall(rf'`((?:{groups})\.(?!py`)\w+)`', page.read_text('utf-8')):
-        assert name in known, f'{page.name}: there is no parameter {name}'
-
-
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_commands_named_exist(page):
-    text = page.read_text('utf-8')
-    shown = '\n'.join([*re.findall(r'^```console\n(.*?)^```', text, re.MULTILINE | re.DOTALL), *re.findall(r'`([^`\n]+)`', text)])
-    for command in re.findall(r'(?:^|[/ ])foc_ros ([a-z][\w-]*)(?![\w.])', shown, re.MULTILINE):
-        assert command in {*list_commands(), 'foc_node'}, f'{page.name}: there is no command {command}'
 
 
 def test_every_command_is_documented():

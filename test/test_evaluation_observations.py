@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from bag_helpers import TYPES
 from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.csv_recordings import EPOCH_NS
@@ -18,9 +19,8 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT
-from foc_ros.io.bags import TYPESTORE, Item
+from foc_ros.io.bags import Item
 from foc_ros.ros.messages.encode_inputs import encode_goals
-from foc_ros.ros.messages.types import RosbagsTypes
 
 FAST = {'rate_hz': 4.0, 'foc.steps': 20, 'foc.strategy': 'fixed', 'foc.tau': 1e-4, 'foc.lam': 0.0, 'homotopy.max_detour': 100.0}
 PLAIN = replace_values(Config(), FAST | {'likelihood.planning_horizon_s': 1000.0, 'likelihood.other_goal': 0.0})
@@ -71,7 +71,7 @@ def test_no_goal_is_true_for_predictions_with_other_goals(data):
 
         def items(self):
             """Yield three goals half way; the two earlier ones return with the next message of the tables."""
-            goals = encode_goals(RosbagsTypes(TYPESTORE), EPOCH_NS, 'world', np.array([(0.1 * k, 0.3, 0.0) for k in range(3)]))
+            goals = encode_goals(TYPES, EPOCH_NS, 'world', np.array([(0.1 * k, 0.3, 0.0) for k in range(3)]))
             for item in find_recordings(data)['one'].items():
                 yield item
                 if item.role == 'hand_pose' and EPOCH_NS + 600_000_000 < item.log_ns < EPOCH_NS + 700_000_000:

@@ -24,7 +24,6 @@ from studies import PAPER_ETA, QUICK, RatioCurve
 
 import foc_ros
 from foc_ros import Status
-from foc_ros.core import registry
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
@@ -41,7 +40,7 @@ def python_blocks(page):
 
 
 @pytest.fixture
-def pyplot(monkeypatch, tmp_path):
+def pyplot(monkeypatch, tmp_path, registries):
     """Figures are kept and not shown; the registries are as before afterwards."""
     monkeypatch.setenv('MPLBACKEND', 'Agg')
     mpl.use('Agg')
@@ -49,8 +48,6 @@ def pyplot(monkeypatch, tmp_path):
 
     monkeypatch.setattr(plt, 'show', lambda: None)
     monkeypatch.chdir(tmp_path)
-    for parts in (each for each in vars(registry).values() if isinstance(each, registry.Registry)):
-        monkeypatch.setattr(parts, '_parts', dict(parts._parts))
     plt.close('all')
     yield plt
     plt.close('all')

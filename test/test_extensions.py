@@ -20,7 +20,7 @@ from foc_ros.core.ocp.strategies import Strategy, solve_fixed
 from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
 from foc_ros.core.plant.plants import Plant, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.predict import build_problem, predict
-from foc_ros.core.registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
+from foc_ros.core.registry import QP_BACKENDS, STRATEGIES
 from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
@@ -39,9 +39,7 @@ def solve_margin(problems, starts, settings, deadline):
 
 
 @pytest.fixture(autouse=True)
-def parts(monkeypatch):
-    for registry in (STRATEGIES, PLANTS, LIKELIHOOD_RULES, QP_BACKENDS):
-        monkeypatch.setattr(registry, '_parts', dict(registry._parts))
+def parts(registries):
     strategy: Strategy = solve_margin
     foc_ros.register_strategy('margin', strategy)
     foc_ros.register_likelihood_rule('linear', lambda costs, config: -config.beta * costs)
@@ -116,12 +114,11 @@ GOAL = np.array([[0.3, 0.0]])
 
 
 @pytest.fixture
-def register(monkeypatch):
+def register():
     def add(name, factory):
         foc_ros.register_plant(name, factory)
         return Config().with_values({'foc.plant': name})
 
-    monkeypatch.setattr(PLANTS, '_parts', dict(PLANTS._parts))
     yield add
     make_plant_model.cache_clear()
 

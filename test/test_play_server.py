@@ -20,6 +20,7 @@ import pytest
 pytest.importorskip('tornado', reason='tornado is not installed')
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
+from bag_helpers import TYPES
 from play_helpers import play, until
 from report_samples import START_NS, prediction
 from session_helpers import BOX, CIRCLE, SCENE, TASKS, parse
@@ -29,7 +30,6 @@ from tornado.websocket import websocket_connect
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
-from foc_ros.io.bags import TYPESTORE
 from foc_ros.play.address import open_sockets
 from foc_ros.play.messages import LONGEST_MESSAGE, PageClock, parse_message
 from foc_ros.play.predictor import Predictor, State
@@ -40,7 +40,6 @@ from foc_ros.play.tasks import Phase, Tasks, tabulate_scores
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.decode_poses import decode_goals
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
-from foc_ros.ros.messages.types import RosbagsTypes
 
 HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': None}
 
@@ -189,7 +188,7 @@ def test_without_a_library_the_message_says_what_to_install(tmp_path, name, word
     assert result.stderr == f'foc_ros play: {words}\n'
 
 
-TYPES, NOW_NS = RosbagsTypes(TYPESTORE), 10**15
+NOW_NS = 10**15
 PART_HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': 8.0}
 
 

@@ -15,6 +15,7 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from dataclasses import replace
 
 import pytest
+from bag_helpers import TYPES
 from report_samples import START_NS, prediction, samples, scene
 
 from foc_ros.core.config import Config
@@ -28,7 +29,6 @@ from foc_ros.reporting.study_pages import write_fit as write_report
 from foc_ros.reporting.views import HandTrajectory, Slots, build_hand_trajectory, build_snapshot, is_late, read_snapshot
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.ranking import compute_cost_ratios
-from foc_ros.ros.messages.types import RosbagsTypes
 
 RECORDING = Path(__file__).resolve().parents[1] / 'foc_ros' / 'recordings' / 'reaching.mcap'
 ANSWER = {
@@ -125,9 +125,6 @@ def test_results_are_told_in_plain_words_first():
         'Changes way: collisions in 5 % of the trials with guidance; '
         'collisions in 10 % of the trials and 1.23 s for a movement without guidance.'
     ]
-
-
-TYPES = RosbagsTypes(TYPESTORE)
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none():
