@@ -92,3 +92,10 @@ def random_scene(generator: np.random.Generator, obstacles: int | None = None) -
     centre = np.stack((goal[0] * generator.uniform(0.3, 0.7, n), generator.uniform(-0.07, 0.07, n)), axis=1)
     made = make_obstacles(centre, generator.uniform(0.017, 0.03, n), generator.uniform(0.001, 0.0035, n))
     return made, goal, float(generator.choice([-1, 1]) * generator.uniform(0.03, 0.12))
+
+
+def random_reach(generator: np.random.Generator, **options) -> tuple[Problem, np.ndarray]:
+    """Return the problem of a random scene, and a guess; options: of `reach`."""
+    obstacles, goal, amplitude = random_scene(generator)
+    problem = reach(obstacles, goal=goal, **options)
+    return problem, bowed((0, 0), goal, problem.horizon.steps, amplitude)

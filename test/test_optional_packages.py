@@ -73,12 +73,6 @@ def test_package_xml_and_the_optional_packages_are_all_requirements():
     assert required[''] | required['report'] | required['play'] | required['cluster'] == list_keys() | set(OPTIONAL)
 
 
-def test_only_the_solvers_have_keys_of_pip():
-    """A release on the build farm, which installs nothing by pip, lacks these two and nothing else."""
-    keys = {node.text for node in ET.parse(ROOT / 'package.xml').getroot() if node.tag.endswith('depend')}
-    assert {key for key in keys if key.endswith('-pip')} == {'python3-piqp-pip', 'python3-qpsolvers-pip'}
-
-
 def run(program, names=OPTIONAL):
     """Run a program in a Python in which packages cannot be imported."""
     command = [sys.executable, '-c', BLOCK.format(names=names) + program]

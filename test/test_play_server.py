@@ -100,19 +100,12 @@ def test_only_files_of_the_page_are_served(tmp_path):
     serve(tmp_path, test)
 
 
-def test_a_name_that_was_made_to_lead_here_is_refused(tmp_path):
+def test_another_page_and_a_name_that_was_made_to_lead_here_are_refused(tmp_path):
     async def test(address):
         port = address.rpartition(':')[2]
         for path in ('/', '/play.js', '/report', '/socket'):
             assert (await get(address, path, Host=f'attacker.example:{port}')).code == 404
         assert (await get(address, '/', Host=f'localhost:{port}')).code == 200
-
-    serve(tmp_path, test)
-
-
-def test_another_page_cannot_connect(tmp_path):
-    async def test(address):
-        port = address.rpartition(':')[2]
         for origin in ('http://attacker.example', f'http://127.0.0.1:{int(port) - 1}', 'null', f'http://localhost:{port}'):
             with pytest.raises(HTTPClientError, match='403'):
                 await connect(address, origin)
@@ -195,11 +188,9 @@ PART_HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': 8.0}
 @pytest.mark.parametrize(
     ('message', 'error'),
     [
-        ('{', r"message: expected JSON, got '\{'"),
         ('[' * 20_000, 'message: expected JSON'),
         ('[]', r'message: expected .*, got \[\]'),
         ({'type': 'open', 'file': '/etc/passwd'}, "message: expected .* 'hand', 'scene', .* got .*'open'"),
-        (PART_HAND | {'x': 9.0}, r'hand\.x: expected a number <= 0\.38, got 9\.0'),
         (PART_HAND | {'x': math.nan}, r'hand\.x: expected a finite number, got nan'),
         (PART_HAND | {'y': '0'}, r"hand\.y: expected a number, got '0'"),
         (PART_HAND | {'t': -1}, r'hand\.t: expected a number >= 0, got -1'),

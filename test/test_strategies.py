@@ -9,7 +9,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reach_helpers import bowed, case_guess, case_problem, one_obstacle, random_scene, reach, reference_cases, solved
+from reach_helpers import (
+    bowed,
+    case_guess,
+    case_problem,
+    one_obstacle,
+    random_reach,
+    random_scene,
+    reach,
+    reference_cases,
+    solved,
+)
 
 import foc_ros
 from foc_ros.core.config import Config, FocConfig
@@ -108,9 +118,7 @@ OPTIMAL = FocConfig(strategy='optimal')
 
 
 def make_reach(seed, preference=HARD, **rest):
-    obstacles, goal, amplitude = random_scene(np.random.default_rng(seed))
-    problem = reach(obstacles, goal=goal, **{'noise': (0.1, 0.1), 'preference': preference, **rest})
-    return problem, bowed((0, 0), goal, problem.horizon.steps, amplitude)
+    return random_reach(np.random.default_rng(seed), **{'noise': (0.1, 0.1), 'preference': preference, **rest})
 
 
 def solve_optimal(problem, guess):
@@ -134,13 +142,8 @@ SETTINGS = {name: FocConfig(strategy=name) for name in ('lv', 'hc')}
 
 
 def soft_scenes(count, seed=1):
-    generator, made = np.random.default_rng(seed), []
-    for number in range(count):
-        obstacles, goal, amplitude = random_scene(generator)
-        noise = (0.05, 0.15, 0.3)[number % 3]
-        problem = replace(reach(obstacles, goal=goal, noise=(noise, noise)), preference=WHOLE_SHORTFALL)
-        made.append((problem, bowed((0, 0), goal, 50, amplitude)))
-    return made
+    generator, noises = np.random.default_rng(seed), [(0.05, 0.05), (0.15, 0.15), (0.3, 0.3)]
+    return [random_reach(generator, noise=noises[number % 3], preference=WHOLE_SHORTFALL) for number in range(count)]
 
 
 def loss(solution, problem):
