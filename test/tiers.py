@@ -73,7 +73,6 @@ PROCESS = (
     'test_solution_numbers.py::test_an_infeasible_*',
     'test_homotopy_shapes.py::test_brute_force_finds_*',
     'test_homotopy_shapes.py::test_candidates_stay_*',
-    'test_gradients.py::test_*corner*',
     'test_extensions.py::test_a_qp_backend_*',
     'test_tracks.py::test_*_class_*',
     'test_tracks.py::test_a_strategy_stops_*',
