@@ -23,11 +23,14 @@ from reach_helpers import (
 
 import foc_ros
 from foc_ros.core.config import Config, FocConfig
+from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import eta_of_k
 from foc_ros.core.obstacles.shapes import collect_obstacles
+from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
+from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.predict import predict
 from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.solution import Status
@@ -102,6 +105,18 @@ def test_a_hand_inside_a_margin_gets_out_of_it_in_the_recovery_time(strategy, st
 
 
 @EVERY
+def test_a_warm_start_is_corrected_to_the_goal_from_where_the_hand_really_is(strategy):
+    before = solved(one_obstacle(0.86), BOWED, strategy)
+    state = np.array([0.002, 0.001, 0.03, 0.01, 0.8, 0.2])  # not where the plan would be, and far from its acceleration
+    problem = replace(one_obstacle(0.86), initial_mean=state)
+    start = warm_start(before, problem)
+    found = solve_problem(problem, start, FocConfig(strategy=strategy))
+    fresh = solve_problem(problem, cold_start(BOWED), FocConfig(strategy=strategy))
+    assert found.status is fresh.status is Status.SOLVED
+    np.testing.assert_allclose(found.path, fresh.path, atol=1e-5)
+
+
+@EVERY
 @pytest.mark.parametrize('steps', [1, 2, 5])
 def test_however_few_the_steps_there_is_an_answer(strategy, steps):
     problem = reach(make_obstacles([[0.15, 0.01]], [0.03], [0.001]), steps=steps)
@@ -109,6 +124,21 @@ def test_however_few_the_steps_there_is_an_answer(strategy, steps):
     assert solution.mean.shape == (steps + 1, 6)
     assert np.isfinite(solution.mean).all()
     assert np.isfinite(solution.covariance).all()
+
+
+@pytest.mark.parametrize(
+    ('field', 'values'),
+    [
+        ('start', {'initial_mean': np.full(6, np.nan)}),
+        ('goal', {'goal_position': np.array([np.inf, 0.0])}),
+        ('noise', {'noise': np.array([0.1, np.nan])}),
+        ('start covariance', {'initial_covariance': np.full((6, 6), np.inf)}),
+    ],
+)
+def test_a_problem_that_is_not_finite_is_refused_by_name(field, values):
+    given = {'initial_mean': np.zeros(6), 'goal_position': np.array([0.3, 0.0]), 'noise': np.array([0.1, 0.1])}
+    with pytest.raises(SceneError, match=f'{field}: expected finite numbers'):
+        rest_to_goal(build_triple_integrator_horizon(0.02, 50), obstacles=make_obstacles(), eta=0.9, **(given | values))
 
 
 DT = 0.02
