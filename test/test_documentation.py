@@ -40,7 +40,7 @@ NOT_RUN = {
     '. .venv/bin/activate': 'the program is on the path of the test already',
     'ros2 *': 'needs a ROS installation; test_launch.py, test_node_process.py and scripts/colcon_check do the same',
     'foc_ros evaluate *': 'takes minutes; test_evaluate.py runs it with few predictions',
-    'foc_ros fit *': 'takes minutes; test_fit.py runs it with few predictions, and the node with the parameters that it writes',
+    'foc_ros fit *': 'takes minutes; test_fit.py runs it with few predictions',
     'foc_ros node --ros-args --params-file operator.yaml': 'needs the output of a fit',
     'foc_ros play': 'runs until it is stopped, on a fixed port; test_play_browser.py starts it on a free one',
     'foc_ros simulate *': 'takes minutes; test_simulation.py runs a part',
