@@ -27,6 +27,9 @@ These rows hold the mean where it is then, so that a contact slides by about as 
 APART = 0.25
 """Least time between other rows of an obstacle and one that is added, for a contact of the last QP or for a place over which a
 path would leap [steps]. Along a side there may be two contacts; more rows keep them from sliding."""
+SETTLING, SETTLED_APART = 1e-2, 0.02
+"""Gain of a QP below which a contact that held the mean off keeps its row so near to the place to which it has moved [steps]: at
+a corner, contacts would swing between two places that have no row together."""
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5
@@ -156,7 +159,8 @@ class Planner:
         minima = now.at.contacts.take(np.isin(now.at.contacts.problem, rows))
         kept = np.isin(now.contacts.problem, rows) & (now.multipliers > 0.0)
         held, multipliers = now.contacts.take(kept), now.multipliers[kept]
-        more = [(further.take(np.isin(further.problem, rows)), SAME), (held, APART)]
+        held_apart = np.where(now.gain[held.problem, None] < SETTLING, SETTLED_APART, APART)
+        more: list[tuple[Contacts, Array | float]] = [(further.take(np.isin(further.problem, rows)), SAME), (held, held_apart)]
         is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
         if margins.between and is_polygon.any():
             kinks = minima.take(is_polygon)
@@ -169,8 +173,8 @@ class Planner:
         return places, _move_multipliers(held, multipliers, places)
 
 
-def _is_known(places: Contacts, known: Contacts, apart: float) -> NDArray[np.bool_]:
-    """Return whether each place is less than a time [steps] apart from a known one, (q,)."""
+def _is_known(places: Contacts, known: Contacts, apart: Array | float) -> NDArray[np.bool_]:
+    """Return whether each place is less than a time [steps], or one of each (q, 1), apart from a known one, (q,)."""
     same = (places.problem[:, None] == known.problem) & (places.obstacle[:, None] == known.obstacle)
     found: NDArray[np.bool_] = (same & (np.abs(places.time[:, None] - known.time) < apart)).any(axis=1)
     return found
