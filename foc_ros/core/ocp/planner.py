@@ -28,8 +28,8 @@ APART = 0.25
 """Least time between other rows of an obstacle and one that is added, for a contact of the last QP or for a place over which a
 path would leap [steps]. Along a side there may be two contacts; more rows keep them from sliding."""
 SETTLING, SETTLED_APART = 1e-2, 0.02
-"""Gain of a QP below which a contact that held the mean off keeps its row so near to the place to which it has moved [steps]: at
-a corner, contacts would swing between two places that have no row together."""
+"""Gain of a QP below which a contact with a polygon keeps its row so near to the place to which it has moved [steps]: contacts at
+a corner would swing between two places that have no row together."""
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5
@@ -159,7 +159,8 @@ class Planner:
         minima = now.at.contacts.take(np.isin(now.at.contacts.problem, rows))
         kept = np.isin(now.contacts.problem, rows) & (now.multipliers > 0.0)
         held, multipliers = now.contacts.take(kept), now.multipliers[kept]
-        held_apart = np.where(now.gain[held.problem, None] < SETTLING, SETTLED_APART, APART)
+        is_settling = margins.is_polygon[held.problem, held.obstacle] & (now.gain[held.problem] < SETTLING)
+        held_apart = np.where(is_settling, SETTLED_APART, APART)[:, None]
         more: list[tuple[Contacts, Array | float]] = [(further.take(np.isin(further.problem, rows)), SAME), (held, held_apart)]
         is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
         if margins.between and is_polygon.any():
