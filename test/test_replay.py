@@ -204,7 +204,7 @@ def test_an_independent_reader_finds_topics_counts_and_numbers_in_the_output_bag
     assert (information['version'], information['storage_identifier']) == (9, 'mcap')
     assert (information['message_count'], information['relative_file_paths']) == (sum(map(len, found.values())), ['out.mcap'])
     for prediction, cloud in zip(replay(bag, CONFIG), found['/foc/prediction'], strict=True):
-        table, first = read_columns(cloud), prediction.candidates[0]
+        table, first = read_columns(cloud), next(each for each in prediction if each.label == prediction.most_likely)
         assert np.allclose(table['x'][table['candidate'] == 0], first.mean[:, 0], atol=1e-6)
         assert np.allclose(table['likelihood'][table['candidate'] == 0], first.likelihood)
 
