@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, cast
 
 from .errors import ParameterError, join_errors
@@ -328,13 +329,7 @@ def list_parameters(group: type = Config, prefix: str = '') -> Iterator[Paramete
 
 def flatten(config: Config) -> dict[str, float | int | str | bool]:
     """Return every value by dotted name."""
-    values: dict[str, float | int | str | bool] = {}
-    for parameter in list_parameters():
-        value: Any = config
-        for part in parameter.name.split('.'):
-            value = getattr(value, part)
-        values[parameter.name] = value
-    return values
+    return {parameter.name: attrgetter(parameter.name)(config) for parameter in list_parameters()}
 
 
 def replace_values(config: Config, values: Mapping[str, object]) -> Config:
