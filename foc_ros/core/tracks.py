@@ -12,13 +12,13 @@ duration T over [a, T], resampled at N steps of (T - a) / N, that begins where t
 An unlikely class keeps it too, as long as the scene stays the same. Each prediction solves one in `TURNS` of these classes: those
 whose solutions are oldest.
 
-No likelihood changes at once from one extreme to the other, that of what no candidate has neither: with p_i of this prediction,
-l_i before (0 for a new class), and the time h between both,
+The rate at which a likelihood changes is bounded, and so is that of the shares that no candidate has. With p_i of this
+prediction, l_i before (0 for a new class), and the time h between both,
 
     l_i <- ((1 - g) l_i + g p_i) / sum,   g = min(1, h / (`FULL_CHANGE_S` max_i |p_i - l_i|)).
 
-Small changes are not delayed. With a new goal all likelihoods are those of this prediction: that nothing was known of it does not
-make it unlikely.
+Small changes are not delayed. With a new goal all likelihoods are those of this prediction, because a goal of which nothing was
+known is not unlikely.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ each goal. With W all classes, or those of the same way through all rows if a ro
 
     p_i <- p_W p_i f_i / sum_W p_j f_j,   f_i = (n_2 q + n_g) / (n_2 + N_g),   g the goal of class i.
 
-How often a goal was reached does not matter here (`habits`), and of a goal without recordings nothing is known.
+How often a goal was reached does not matter here, because `habits` counts it. A goal without recordings keeps f_i = q.
 
 From the state m of the maximum on, a recording passes obstacles on the sides of some classes. With G the classes that take the
 same gap in the next row, W those of the same way through all rows, and n_G and n_W = sums of the w_r of recordings that lead to
@@ -195,9 +195,8 @@ def pool_recordings(
     on_ways = np.array([of_ways[is_same].sum() for is_same, _ in agreements])
     likelihoods = update_ways(np.array([each.likelihood for each in taken]), on_ways, decisions)
     group = decisions.way if len(decisions.next_row) else np.zeros_like(goal)
-    likelihoods = divide_among_groups(
-        likelihoods * compare_goals(evidence)[goal], group, np.bincount(group, likelihoods).astype(float)
-    )
+    of_groups = np.bincount(group, likelihoods).astype(float)
+    likelihoods = divide_among_groups(likelihoods * compute_goal_factors(evidence)[goal], group, of_groups)
     pooled = []
     for each, share, (is_same, until_s) in zip(taken, likelihoods.tolist(), agreements, strict=True):
         paths, weights = follow_recordings(library, evidence, until_s, hand, each.times)
@@ -252,7 +251,7 @@ def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand
     return paths, evidence.weight[:, None] * np.clip((left_s[:, None] - times) / FADE_S, 0.0, 1.0)
 
 
-def compare_goals(evidence: Evidence) -> Array:
+def compute_goal_factors(evidence: Evidence) -> Array:
     """Return the factors (g,) on the likelihoods of goals by which recordings change them."""
     near = evidence.weight @ evidence.is_at_goal
     whole = max(int(evidence.recorded.sum()), 1)
@@ -271,7 +270,7 @@ def update_ways(likelihoods: Array, counts: Array, decisions: Decisions) -> Arra
     levels = (
         (whole, decisions.next_gap, PRIOR_COUNT, counts),
         (decisions.next_gap, decisions.way, PRIOR_COUNT_BEYOND, counts),
-        (decisions.way, each, 1.0, none),
+        (decisions.way, each, 1.0, none),  # within a way the model decides
     )
     pooled = np.ones(len(counts))
     for group, part, prior_count, seen in levels:

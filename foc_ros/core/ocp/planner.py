@@ -28,8 +28,8 @@ APART = 0.25
 """Least time between other rows of an obstacle and one that is added, for a contact of the last QP or for a place over which a
 path would leap [steps]. Along a side there may be two contacts; more rows keep them from sliding."""
 SETTLING, SETTLED_APART = 1e-2, 0.02
-"""Gain of a QP below which a contact with a polygon keeps its row so near to the place to which it has moved [steps]: contacts at
-a corner would swing between two places that have no row together."""
+"""Gain below which a problem is near its solution, and least time there between a contact with a polygon and the place to which
+it moves [steps]. Both have rows then: with one row, a contact at a corner would swing between two places."""
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5

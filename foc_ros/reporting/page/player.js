@@ -20,7 +20,7 @@ const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
 // The row of the first value that is not below a bound.
 const first = (values, least) => { const row = values.findIndex((value) => value >= least); return row < 0 ? values.length : row; };
 // The value that a share of some values does not exceed.
-const usualMost = (values, share) => [...values].sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(share * values.length))] || 0;
+const quantile = (values, share) => [...values].sort((a, b) => a - b)[Math.min(values.length - 1, Math.floor(share * values.length))] || 0;
 const span = () => [frameTimes[state.from], frameTimes[state.to]];
 const faded = (track) => state.focus !== null && state.focus !== track;
 const alphaOf = (track) => (faded(track) ? 0.15 : 1);
@@ -103,7 +103,7 @@ function drawTimes() {
   const known = data.solve_ms.filter((value) => value !== null);
   byId('times-part').hidden = !known.length;
   if (!known.length) { return; }
-  const top = 1.25 * usualMost(known, 0.99) || 1;
+  const top = 1.25 * quantile(known, 0.99) || 1;
   const rows = data.times.map((time, row) => [time, data.solve_ms[row]]).filter(([time, value]) => value !== null && time >= span()[0] && time <= span()[1]);
   const points = rows.map(([time, value]) => [time, Math.min(value, top)]);
   charts.times.draw({ span: span(), top, lines: [{ points, colour: 'var(--soft)', width: 0, marks: points.length <= MOST_MARKS }], now: frameTimes[state.frame] });
@@ -203,7 +203,7 @@ function play() {
 }
 
 // A few predictions of a strange movement would leave no room for the others.
-const topSpeed = 1.15 * Math.max(0.01, ...hand.v, usualMost(data.frames.map((frame) => (frame.candidates.length ? Math.max(...sums(frame.candidates[0].v, SPEED)) : 0)), 0.9));
+const topSpeed = 1.15 * Math.max(0.01, ...hand.v, quantile(data.frames.map((frame) => (frame.candidates.length ? Math.max(...sums(frame.candidates[0].v, SPEED)) : 0)), 0.9));
 if (data.frames.length < data.count) {
   const drawn = data.times.length < data.count ? `${data.times.length} of them` : 'all of them';
   byId('decimated').textContent = `The slider stops at ${data.frames.length} of the ${data.count} predictions; likelihoods are drawn for ${drawn}. `;
