@@ -40,9 +40,10 @@ SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 LAST_GAIN = 1e-4
 """Gain, as a logarithm of cost, that may remain when a problem counts as solved. A step that fails although its QP promised less
 fails by rounding."""
-CLOSE = 3e-5
-"""Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it."""
-UNLIKELY, SMALL_PART = 6.0, 0.02
+CLOSE, CLOSE_FOR_NOW = 3e-5, 1e-3
+"""Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it; and
+where a later prediction goes on, so that one that misses it by what a QP cannot know does: each repetition would cost as much."""
+UNLIKELY, SMALL_PART = 6.0, 0.2
 """A class can wait for the next prediction if it is less likely than the best by more than the first number, as a logarithm, and
 if its QP promises less than the second one as a part of that."""
 LARGEST_TOLERANCE = 5e-3
@@ -73,7 +74,7 @@ class Solver:
 
     def __init__(self, margins: Margins, wanted_k: Array, rate: Array, lam: Array, *, goes_on: bool = False) -> None:
         problems = margins.problems
-        self.margins, self.wanted_k = margins, wanted_k * (1.0 + CLOSE)
+        self.margins, self.wanted_k = margins, wanted_k * (1.0 + (CLOSE_FOR_NOW if goes_on else CLOSE))
         self.objective = Objective(problems, wanted_k, rate, lam)
         self.gain = np.array([each.horizon.gain for each in problems])
         self.most, self._small_gain, self._goes_on = MOST_ITERATIONS, SMALL_GAIN, goes_on
