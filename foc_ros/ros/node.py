@@ -31,6 +31,7 @@ from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
+from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
 
@@ -47,6 +48,8 @@ from .worker import Computation, Worker
 
 REST_S, LONGEST_REST_S = 0.004, 0.02
 """Shortest and longest time for which the poses of a fast hand gather before they are taken together [s]."""
+DRAWN_S = 0.035
+"""Least time between the stamps of two arrays of markers [s]: for the eye, 25 images a second are enough."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
 """Inputs of which each message replaces the one before: of several in the queue, the newest that is accepted is used."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -65,7 +68,7 @@ class FocNode(LifecycleNode):
         # a logger throttles each line of code by itself: with one logger per input, no input suppresses the lines of another
         self._loggers = {role: self.get_logger().get_child(role) for role in endpoints.INPUTS}
         self._state, self._is_engaged, self._start_error = 'unconfigured', True, ''
-        self._has_predicted, self._is_hand_fast, self._hand_s = False, False, 0.0
+        self._has_predicted, self._is_hand_fast, self._hand_s, self._drawn_ns = False, False, 0.0, -NANOSECONDS
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._goal_topics = endpoints.GoalTopics(self)
@@ -283,6 +286,8 @@ class FocNode(LifecycleNode):
         config = ended.task.config
         self._monitor.note_computed(prediction, config.budget_s)
         wanted = [name for name, publisher in self._outputs.items() if publisher.get_subscription_count()]
+        if abs(prediction.stamp_ns - self._drawn_ns) < DRAWN_S * NANOSECONDS:
+            wanted = [name for name in wanted if name != 'markers']
         now_s, clock_ns = monotonic(), self.get_clock().now().nanoseconds
         reason = self._freshness.find_late_reason(prediction.stamp_ns, ended.received_s, now_s, clock_ns, config)
         if reason is not None:
@@ -292,6 +297,7 @@ class FocNode(LifecycleNode):
         for name in wanted:  # one after the other: the markers of 8 candidates take longer than all else, and come last
             (message,) = encode_outputs(prediction, config.plane, self._types, [name]).values()
             if name == 'markers':
+                self._drawn_ns = prediction.stamp_ns
                 message.markers.extend(self._guidance.encode_markers(self._types))
             self._publish(self._outputs[name], message)
         self._goal_topics.publish(prediction, self._types)

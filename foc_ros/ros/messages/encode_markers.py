@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Encoding of a prediction as a MarkerArray: paths, ellipses and labels of all candidates, and the uncertain obstacles.
 
-Each candidate has ellipses of one standard deviation of the motor noise, which eta is about. The most likely one also has outer
-ones of the total uncertainty; those of all candidates would cover the scene. The names of their namespaces and a legend say so.
-Where the height is predicted, they are cylinders of one standard deviation of it up and down.
+Each labelled path has ellipses of one standard deviation of the motor noise, which eta is about. The most likely one also has
+outer ones of the total uncertainty; those of all candidates would cover the scene. Namespaces and a legend name the two. Where
+the height is predicted, they are cylinders of one standard deviation of it up and down.
 
 Every array first deletes the markers of the one before, and all markers expire after LIFETIME_S, so that the drawing of a
 prediction that is not renewed disappears.
@@ -47,7 +47,7 @@ ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
 """Opacity as a share of that of the path, and thickness [m]: the inner ellipse stands out of the outer one."""
 LEGEND = 'ellipses of one standard deviation\ninner: motor noise, which eta is about\nouter: total uncertainty'
 LABELLED = 0.05
-"""Least likelihood of a labelled path: the labels of unlikely ones would cover those of the others."""
+"""Least likelihood of a path with a label and ellipses: those of unlikely ones would cover those of the others."""
 MOST_LETTERS, LINE_LETTERS = 60, 28
 """Length of a class in words up to which a label has them, as names of many obstacles would cover the scene; length of a line."""
 
@@ -106,13 +106,14 @@ class _MarkerEncoder:
             colour, share = (red, green, blue, 0.4 + 0.6 * likelihood), f'{100 * likelihood:.0f} %'
             found = 'estimated' if outcome.is_estimated else 'compromised'
             notes = '' if outcome.is_solved else f', {found}: eta {outcome.eta:.3f}'
-            for name in ELLIPSE_STYLES if index == 0 else (MOTOR,):
+            names = (MOTOR, TOTAL) if index == 0 else (MOTOR,)
+            for name in names if _is_labelled(outcome) else ():
                 yield from self._encode_ellipses(name, index, outcome, colour)
         else:
             colour, share, notes = GREY, '- %', f', {outcome.reason}'
         points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
-        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=[*map(self._encode_point, points)])
+        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=self._encode_points(points))
         if _is_labelled(outcome):
             words = describe_candidate(outcome, len(self.prediction.goal_positions))
             words = outcome.label if len(words) > MOST_LETTERS else words
@@ -174,11 +175,9 @@ class _MarkerEncoder:
         if obstacles.corners[row] == 1:
             diameter = 2 * (float(obstacles.radius[row]) + growth)
             return self.encode(name, row, CYLINDER, colour, (diameter, diameter, TALL), self._move(centre, above))
-        outline = self._lift(trace_obstacle(obstacles, row, growth, 32))
-        corners = [corner for before, after in pairwise(outline) for corner in (centre, before, after)]
-        return self.encode(
-            name, row, TRIANGLES, colour, centre=self._move((0.0, 0.0, 0.0), above), points=[*map(self._encode_point, corners)]
-        )
+        middle, *outline = self._encode_points([centre, *self._lift(trace_obstacle(obstacles, row, growth, 32))])
+        corners = [corner for before, after in pairwise(outline) for corner in (middle, before, after)]
+        return self.encode(name, row, TRIANGLES, colour, centre=self._move((0.0, 0.0, 0.0), above), points=corners)
 
     def _encode_text(
         self, name: str, identity: int, text: str, point: Sequence[float], colour: Colour, below: float = 0.0
@@ -203,7 +202,7 @@ class _MarkerEncoder:
         sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
         turn = x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine, w * cosine - z * sine
         orientation = self.types.fill('geometry_msgs/msg/Quaternion', turn)
-        pose = self.types.make('geometry_msgs/msg/Pose', position=self._encode_point(centre), orientation=orientation)
+        pose = self.types.make('geometry_msgs/msg/Pose', position=self._encode_points([centre])[0], orientation=orientation)
         return make_marker(self.types, name, identity, kind, colour, scale, pose=pose, **self._shared_fields, **rest)
 
     def _lift(self, positions: Array) -> list[list[float]]:
@@ -229,9 +228,8 @@ class _MarkerEncoder:
         between = np.interp(np.linspace(0.0, 1.0, len(curve)), np.linspace(0.0, 1.0, len(heights)), heights)
         return cast('list[list[float]]', lift(curve[rows], between[rows], self.plane).tolist())
 
-    def _encode_point(self, point: Sequence[float]) -> Any:
-        x, y, z = point
-        return self.types.make('geometry_msgs/msg/Point', x=x, y=y, z=z)
+    def _encode_points(self, points: Sequence[Sequence[float]]) -> list[Any]:
+        return self.types.fill_each('geometry_msgs/msg/Point', np.array(points))
 
 
 _PLANE_ROTATION = {
