@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from foc_ros.analysis.replay import Replay
 from foc_ros.cli.main import main
-from foc_ros.core.classes import find_path_sides
+from foc_ros.core.classes import find_path_sides, search
 from foc_ros.core.classes.library import STEP_S, GuessTiming, recall_demonstrations, record_demonstration
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError
@@ -45,8 +45,9 @@ def hand(at=(0.0, 0.0), frame_id='world'):
 
 def recall(demonstration, obstacles=OBSTACLES, goals=GOAL, state=None, found=()):
     library = demonstration if isinstance(demonstration, list) else [demonstration]
-    scene, timing = (state or hand(), np.asarray(goals), obstacles), GuessTiming([1.0] * len(goals), 50)
-    return recall_demonstrations(library, *scene, HomotopyConfig(), timing, found, ())
+    state, goals, timing = state or hand(), np.asarray(goals), GuessTiming([1.0] * len(goals), 50)
+    searched = search(state.mean, goals, obstacles, HomotopyConfig(), *timing)
+    return recall_demonstrations(library, state, goals, obstacles, timing, replace(searched, candidates=tuple(found)))
 
 
 DEMONSTRATION = record_demonstration('world', bow(0.1), OBSTACLES)

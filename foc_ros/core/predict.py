@@ -197,8 +197,7 @@ def _find_candidates(
     timing = GuessTiming(scene.durations_s, config.foc.steps)
     turn = Turn(deadline.take_share(SEARCH_SHARE), known.next_goal, scene.objects)
     found = search(scene.hand.mean, scene.goals, scene.near, config.homotopy, *timing, known.candidates, turn)
-    where = scene.hand, scene.goals, scene.near, config.homotopy, timing
-    return found, recall_demonstrations(library.demonstrations, *where, found.candidates, known.candidates)
+    return found, recall_demonstrations(library.demonstrations, scene.hand, scene.goals, scene.near, timing, found)
 
 
 def _solve(

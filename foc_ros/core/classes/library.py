@@ -16,14 +16,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import LEFT, RIGHT, Candidate
 from foc_ros.core.types import Array, HandState, Record
 
 from .guess import compute_path_lengths, timed
-from .names import find_names, name_course, take_near
+from .names import name_course
+from .search import Search
 from .sides import find_path_sides
 
 NEAR = 0.02
@@ -120,22 +120,15 @@ def recall_demonstrations(
     hand: HandState,
     goals: Array,
     obstacles: Obstacles,
-    config: HomotopyConfig,
     timing: GuessTiming,
-    found: Sequence[Candidate],
-    previous: Sequence[Candidate],
+    found: Search,
 ) -> tuple[Candidate, ...]:
-    """Return the found candidates and at most two demonstrated ones of other classes, in the order of their length.
+    """Return the candidates of a search and at most two demonstrated ones of other classes, in the order of their length.
 
-    goals (g, 2) [m]; previous: the candidates of the previous prediction. A demonstrated path is moved to the present hand and
-    goal. It is kept only if it still passes every obstacle on the side on which it did, and runs through none.
+    hand, goals (g, 2) [m] and obstacles: those of the search. A demonstrated path is moved to the present hand and goal. It is
+    kept only if it still passes every obstacle on the side on which it did, and runs through none.
     """
-    if not library:
-        return tuple(found)
-    near = take_near(obstacles, hand.mean[:2], goals)
-    is_named = find_names(hand.mean[:2], goals, near, config.clearance, previous).is_named
-    names = [sorted(near.ids[row] for row in np.flatnonzero(each).tolist()) for each in is_named]
-    labels, recalled = {one.label for one in found}, []
+    labels, recalled, names = {one.label for one in found.candidates}, [], found.named
     for demonstration in library:
         if not demonstration.matches(hand.frame_id, obstacles):
             continue
@@ -155,12 +148,12 @@ def recall_demonstrations(
                 labels.add(label)
                 recalled.append(Candidate(label, goal, named, guess, float(compute_path_lengths(rest)[-1])))
     if not recalled:
-        return tuple(found)
+        return found.candidates
 
     def rank(candidate: Candidate) -> tuple[float, str]:
         return round(candidate.length, 9), candidate.label
 
-    return tuple(sorted([*found, *sorted(recalled, key=rank)[:2]], key=rank))
+    return tuple(sorted([*found.candidates, *sorted(recalled, key=rank)[:2]], key=rank))
 
 
 def _name(goal: int, names: Sequence[str], sides: Mapping[str, int]) -> tuple[str, tuple[tuple[str, int], ...]]:

@@ -112,6 +112,11 @@ class SearchScene:
                 classes.append(PathClass(round(key, 9), f'goal{goal}:{name_course(sides)}', goal, sides, points))
             yield from [each for each in sorted(classes) if not self._is_left_out(each.points)]
 
+    def list_named(self) -> tuple[tuple[str, ...], ...]:
+        """Return for each goal the ids of the obstacles in the names of its classes, in alphabetical order."""
+        rows = (np.flatnonzero(is_named).tolist() for is_named in self.names.is_named)
+        return tuple([tuple(sorted([self._near.ids[row] for row in each])) for each in rows])
+
     def make_candidates(self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int) -> tuple[Candidate, ...]:
         """Return the candidates of classes, with their shortest paths as guesses for the time to go to each goal [s]."""
         made = []

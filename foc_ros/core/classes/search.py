@@ -62,12 +62,15 @@ class Search:
     unfollowed : tuple[Candidate, ...]
         Classes that were seen and are no candidates, with taut guesses. One that passes its obstacles as a candidate to another
         goal does is left out where its own goal has a candidate: its way and its goal are followed.
+    named : tuple[tuple[str, ...], ...]
+        For each goal the ids of the obstacles that the names of its classes contain, in alphabetical order.
     """
 
     candidates: tuple[Candidate, ...]
     notes: dict[str, int] = field(default_factory=dict)
     next_goal: int = 0
     unfollowed: tuple[Candidate, ...] = ()
+    named: tuple[tuple[str, ...], ...] = ()
 
 
 def search(
@@ -132,7 +135,8 @@ def search(
     ways, reached = {each.way for each in chosen}, {each.goal for each in chosen}
     seen = {each.label: each for each in ranking.seen if each.goal not in reached or not any(each.way <= way for way in ways)}
     unfollowed = scene.make_candidates(tuple(seen.values()), duration_s, steps)
-    return Search(candidates, {name: number for name, number in scene.notes.items() if number}, next_goal, unfollowed)
+    notes = {name: number for name, number in scene.notes.items() if number}
+    return Search(candidates, notes, next_goal, unfollowed, scene.list_named())
 
 
 class _Ranking:
