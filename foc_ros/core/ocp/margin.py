@@ -218,12 +218,12 @@ class Margins:
         return found._replace(value=value, distance=distance, factor=factor)
 
     def measure(self, places: Contacts, at: Indices, motion: Motion, k: Array) -> Margin:
-        """Return margins at q places.
+        """Return margins at q places, or at n times of each.
 
         Parameters
         ----------
         places : Contacts
-            The places.
+            The places; their times may have the shape (n, q).
         at : Indices
             Row of the movement of each place, (q,).
         motion : Motion
@@ -232,14 +232,14 @@ class Margins:
             Safety factor for each place, (q,).
         """
         step, share = self.response.locate(places.time)
-        mean = (hermite(share)[:, None] @ motion.mean[at, step])[:, 0]
-        variance = (hermite_quintic(share)[:, None] @ motion.variance[at, step])[:, 0]
+        mean = (hermite(share)[..., None, :] @ motion.mean[at, step])[..., 0, :]
+        variance = (hermite_quintic(share)[..., None, :] @ motion.variance[at, step])[..., 0, :]
         return self._measure_places(places, mean, variance, k)
 
     def _measure_places(self, places: Contacts, mean: Array, variance: Array, k: Array) -> Margin:
-        """Return margins at q places, for positions (q, 2) and their covariances (q, 3)."""
+        """Return margins at q places, for positions (..., q, 2) and their covariances (..., q, 3)."""
         where = places.problem, places.obstacle
-        x, y = (mean - self.centre[where] - places.time[:, None] * self.drift[where]).T
+        x, y = np.moveaxis(mean - self.centre[where] - places.time[..., None] * self.drift[where], -1, 0)
         edges = self.edges.take(where)
         return self._measure(x, y, variance + self.centre_variance[where], where, edges, places.time, k)
 

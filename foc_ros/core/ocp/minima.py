@@ -125,9 +125,8 @@ def _sample(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return times (n, q) in brackets around places (q,), the safety factors, and whether an edge is nearest there."""
     times = np.clip(places.time + half * BRACKET[:, None], 1.0, float(margins.steps))
-    several = [np.tile(each, len(times)) for each in (places.problem, places.obstacle, at)]
-    margin = margins.measure(Contacts(several[0], several[1], times.ravel()), several[2], motion, k[several[2]])
-    return times, margin.factor.reshape(times.shape), margin.is_on_edge.reshape(times.shape)
+    margin = margins.measure(places._replace(time=times), at, motion, k[at])
+    return times, margin.factor, margin.is_on_edge
 
 
 def _estimate(
