@@ -15,19 +15,36 @@ from numpy.typing import NDArray
 from foc_ros.core.types import Array
 
 
+CUBIC = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-3.0, -2.0, 3.0, -1.0], [2.0, 1.0, -2.0, 1.0]])
+"""Coefficients of each power of the share (rows) in the weights of `hermite`."""
+QUINTIC = np.array(
+    [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.5, 0.0, 0.0, 0.0],
+        [-10.0, -6.0, -1.5, 10.0, -4.0, 0.5],
+        [15.0, 8.0, 1.5, -15.0, 7.0, -1.0],
+        [-6.0, -3.0, -0.5, 6.0, -3.0, 0.5],
+    ]
+)
+"""The same in those of `hermite_quintic`."""
+
+
 def hermite(share: Array) -> Array:
     """Return the weights (..., 4) of the position and velocity at the beginning and the end of a step, for shares in [0, 1]."""
-    s, left = share, 1.0 - share
-    return np.stack((left**2 * (1.0 + 2.0 * s), left**2 * s, s**2 * (1.0 + 2.0 * left), -(s**2) * left), axis=-1)
+    return _raise(share, len(CUBIC)) @ CUBIC
 
 
 def hermite_quintic(share: Array) -> Array:
     """Return the weights (..., 6) of value, rate and second derivative at both ends of a step, for shares in [0, 1]."""
-    s, left = share, 1.0 - share
-    s2, s3, left2, left3 = s * s, s * s * s, left * left, left * left * left
-    begin = left3 * (1.0 + 3.0 * s + 6.0 * s2), left3 * s * (1.0 + 3.0 * s), 0.5 * left3 * s2
-    end = s3 * (1.0 + 3.0 * left + 6.0 * left2), -s3 * left * (1.0 + 3.0 * left), 0.5 * s3 * left2
-    return np.stack((*begin, *end), axis=-1)
+    return _raise(share, len(QUINTIC)) @ QUINTIC
+
+
+def _raise(share: Array, count: int) -> Array:
+    """Return the first powers (..., count) of shares (...)."""
+    powers = np.empty((*share.shape, count))
+    powers[..., 0], powers[..., 1:] = 1.0, share[..., None]
+    return np.multiply.accumulate(powers, axis=-1, out=powers)
 
 
 def pair_steps(motion: Array) -> Array:
