@@ -79,13 +79,15 @@ def find_offset(x: Array, y: Array, edges: Edges) -> Offset:
         return _point(x - edges.x[..., 0], y - edges.y[..., 0], no, no)
     from_x, from_y = x[..., None] - edges.x, y[..., None] - edges.y
     share = (from_x * edges.along_x + from_y * edges.along_y) * edges.inverse_square
-    is_inside = (edges.along_x * from_y >= edges.along_y * from_x).all(axis=-1) & edges.is_solid[..., 0]
+    left = edges.along_x * from_y - edges.along_y * from_x
     held = np.minimum(np.maximum(share, 0.0), 1.0)
     off_x, off_y = from_x - held * edges.along_x, from_y - held * edges.along_y
     nearest = (off_x * off_x + off_y * off_y).argmin(axis=-1)
     shape, flat = nearest.shape, np.arange(nearest.size) * share.shape[-1] + nearest.ravel()
-    x, y, share = (each.ravel()[flat].reshape(shape) for each in (off_x, off_y, share))
-    return _point(x, y, is_inside, (share > 0.0) & (share < 1.0))
+    x, y, share, left = (each.ravel()[flat].reshape(shape) for each in (off_x, off_y, share, left))
+    is_on_edge = (share > 0.0) & (share < 1.0)
+    # the nearest point to one inside of a convex polygon is on an edge, of which this one is on the left
+    return _point(x, y, is_on_edge & (left >= 0.0) & edges.is_solid[..., 0], is_on_edge)
 
 
 def _point(x: Array, y: Array, is_inside: NDArray[np.bool_], is_on_edge: NDArray[np.bool_]) -> Offset:
