@@ -37,7 +37,7 @@ class Evaluation:
         self.cost[rows], self.loss[rows], self.factor[rows] = other.cost[taken], other.loss[taken], other.factor[taken]
         self.angles[rows], self.margin[rows], self.normal[rows] = other.angles[taken], other.margin[taken], other.normal[taken]
         self.factors[rows] = other.factors[taken]
-        old, new = ~np.isin(self.contacts.problem, problems[taken]), np.isin(other.contacts.problem, problems[taken])
+        old, new = ~self.contacts.mark(problems[taken]), other.contacts.mark(problems[taken])
         self.contacts = self.contacts.take(old).join(other.contacts.take(new))
 
 

@@ -48,6 +48,11 @@ class Contacts(NamedTuple):
     obstacle: Indices
     time: Array
 
+    def mark(self, problems: Indices) -> NDArray[np.bool_]:
+        """Return whether each is of one of some problems, (q,)."""
+        found: NDArray[np.bool_] = (self.problem[:, None] == problems).any(axis=1)
+        return found
+
     def take(self, rows: NDArray[np.bool_] | Indices) -> Contacts:
         """Return some of them."""
         return Contacts(self.problem[rows], self.obstacle[rows], self.time[rows])
@@ -239,9 +244,9 @@ class Margins:
     def _measure_places(self, places: Contacts, mean: Array, variance: Array, k: Array) -> Margin:
         """Return margins at q places, for positions (..., q, 2) and their covariances (..., q, 3)."""
         where = places.problem, places.obstacle
-        x, y = np.moveaxis(mean - self.centre[where] - places.time[..., None] * self.drift[where], -1, 0)
+        offset = mean - self.centre[where] - places.time[..., None] * self.drift[where]
         edges = self.edges.take(where)
-        return self._measure(x, y, variance + self.centre_variance[where], where, edges, places.time, k)
+        return self._measure(offset[..., 0], offset[..., 1], variance + self.centre_variance[where], where, edges, places.time, k)
 
     def _measure(
         self, x: Array, y: Array, variance: Array, where: tuple[Indices, Indices], edges: Edges, time: Array, k: Array

@@ -70,7 +70,7 @@ class Plan:
         place = np.searchsorted(self.rows, other.rows)
         for mine, new in ((self.step, other.step), (self.k, other.k), (self.gain, other.gain), (self.fall, other.fall)):
             mine[place] = new
-        kept = ~np.isin(self.contacts.problem, other.rows)
+        kept = ~self.contacts.mark(other.rows)
         contacts = self.contacts.take(kept).join(other.contacts)
         multipliers = np.concatenate((self.multipliers[kept], other.multipliers))
         return Plan(self.rows, self.step, self.k, self.gain, self.fall, contacts, multipliers, other.further)
@@ -156,12 +156,12 @@ class Planner:
     def _choose_places(self, now: Iterates, rows: Indices, further: Contacts) -> tuple[Contacts, Array]:
         """Return the places at which the QPs have rows, and what is known of their multipliers."""
         margins, last = self.margins, float(self.margins.steps)
-        minima = now.at.contacts.take(np.isin(now.at.contacts.problem, rows))
-        kept = np.isin(now.contacts.problem, rows) & (now.multipliers > 0.0)
+        minima = now.at.contacts.take(now.at.contacts.mark(rows))
+        kept = now.contacts.mark(rows) & (now.multipliers > 0.0)
         held, multipliers = now.contacts.take(kept), now.multipliers[kept]
         is_settling = margins.is_polygon[held.problem, held.obstacle] & (now.gain[held.problem] < SETTLING)
         held_apart = np.where(is_settling, SETTLED_APART, APART)[:, None]
-        more: list[tuple[Contacts, Array | float]] = [(further.take(np.isin(further.problem, rows)), SAME), (held, held_apart)]
+        more: list[tuple[Contacts, Array | float]] = [(further.take(further.mark(rows)), SAME), (held, held_apart)]
         is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
         if margins.between and is_polygon.any():
             kinks = minima.take(is_polygon)

@@ -166,7 +166,7 @@ class Solver:
             now.is_done[stalled] = now.is_settled[stalled] = True
             share *= SHORTER
         now.bound[rows] = np.maximum(before, now.at.loss[rows])
-        others = ~np.isin(now.contacts.problem, rows)
+        others = ~now.contacts.mark(rows)
         now.contacts = now.contacts.take(others).join(plan.contacts)
         now.multipliers = np.concatenate((now.multipliers[others], plan.multipliers))
         now.gain[rows] = plan.gain
@@ -201,7 +201,7 @@ class Solver:
         now.k[good] = np.clip(at.factor[is_good], 0.0, self.wanted_k[good])
         now.at.put(good, at, is_good, rows)
         if is_whole:
-            now.trial = at.contacts.take(np.isin(at.contacts.problem, rows[~is_good]))
+            now.trial = at.contacts.take(at.contacts.mark(rows[~is_good]))
         return place[~is_good]
 
     def _end(self, now: Iterates, plan: Plan) -> NDArray[np.bool_]:
