@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .classes import find_path_sides
 from .classes.rows import find_decisions, tabulate_sides
-from .classes.sides import compute_branch_times, measure_passages
+from .classes.sides import compute_branch_times, find_sides, measure_passages
 from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
 from .likelihood import BETWEEN_OPERATORS, ClassGoals, compute_likelihoods, compute_lookahead_share
@@ -56,30 +55,41 @@ def solve_candidates(
         When the solutions have to be ready. A class that is not ready then has an estimate, and says so.
     """
     before = [None] * len(candidates) if earlier is None else earlier
-    starts = [_begin(*each) for each in zip(candidates, problems, before, strict=True)]
+    starts = _begin(candidates, problems, before)
     solutions = solve_problems(problems, starts, settings, deadline)
-    return [_classify(*each) for each in zip(candidates, solutions, problems, strict=True)]
+    sides = _find_all_sides([each.path for each in solutions], problems)
+    return [_classify(*each) for each in zip(candidates, solutions, sides, strict=True)]
 
 
-def _begin(candidate: Candidate, problem: Problem, previous: Solution | None) -> Start:
-    """Return the earlier solution of a candidate as its start, or its guess where that passes an obstacle on another side."""
-    if previous is None:
-        return cold_start(candidate.guess)
-    start = warm_start(previous, problem)
-    return start if _is_in_class(candidate, _find_sides(start.path, problem)) else cold_start(candidate.guess)
+def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier: Sequence[Solution | None]) -> list[Start]:
+    """Return the earlier solution of each candidate as its start, or its guess where that passes an obstacle on another side."""
+    starts = [
+        cold_start(each.guess) if solution is None else warm_start(solution, problem)
+        for each, problem, solution in zip(candidates, problems, earlier, strict=True)
+    ]
+    sides = _find_all_sides([each.path for each in starts], problems)
+    return [
+        start if _is_in_class(each, found) else cold_start(each.guess)
+        for each, start, found in zip(candidates, starts, sides, strict=True)
+    ]
 
 
-def _find_sides(path: Array, problem: Problem) -> dict[str, int]:
-    return find_path_sides(path, problem.obstacles, problem.centre_trajectories)
+def _find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list[dict[str, int]]:
+    """Return the sides on which the path of each problem passes its obstacles, for all paths of a problem at once."""
+    found: dict[int, dict[str, int]] = {}
+    for problem in {id(each): each for each in problems}.values():
+        rows = [row for row, each in enumerate(problems) if each is problem]
+        together = np.stack([paths[row] for row in rows])
+        found |= zip(rows, find_sides(together, problem.obstacles, problem.centre_trajectories), strict=True)
+    return [found[row] for row in range(len(problems))]
 
 
 def _is_in_class(candidate: Candidate, sides: Mapping[str, int]) -> bool:
     return all(sides.get(identity, side) == side for identity, side in candidate.sides)
 
 
-def _classify(candidate: Candidate, solution: Solution, problem: Problem) -> PredictedCandidate:
-    """Find the class in which a solution is, and its cost. The status says if it left the candidate's."""
-    sides = _find_sides(solution.path, problem)
+def _classify(candidate: Candidate, solution: Solution, sides: dict[str, int]) -> PredictedCandidate:
+    """Return a candidate with its solution, which passes obstacles on some sides. The status says if it left its class."""
     if solution.status.has_likelihood and not _is_in_class(candidate, sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
     return PredictedCandidate(candidate, solution, sides, solution.expected_effort * solution.dt, 0.0)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from foc_ros.core.types import Array
 
-
 CUBIC = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-3.0, -2.0, 3.0, -1.0], [2.0, 1.0, -2.0, 1.0]])
 """Coefficients of each power of the share (rows) in the weights of `hermite`."""
 QUINTIC = np.array(
