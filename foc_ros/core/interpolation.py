@@ -31,12 +31,14 @@ QUINTIC = np.array(
 
 def hermite(share: Array) -> Array:
     """Return the weights (..., 4) of the position and velocity at the beginning and the end of a step, for shares in [0, 1]."""
-    return _raise(share, len(CUBIC)) @ CUBIC
+    weights: Array = _raise(share, len(CUBIC)) @ CUBIC
+    return weights
 
 
 def hermite_quintic(share: Array) -> Array:
     """Return the weights (..., 6) of value, rate and second derivative at both ends of a step, for shares in [0, 1]."""
-    return _raise(share, len(QUINTIC)) @ QUINTIC
+    weights: Array = _raise(share, len(QUINTIC)) @ QUINTIC
+    return weights
 
 
 def _raise(share: Array, count: int) -> Array:
