@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -182,9 +183,12 @@ def round_number(value: float) -> float | None:
     return float(f'{value:.6g}') if np.isfinite(value) else None
 
 
+@lru_cache(maxsize=64)
 def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Return at most so many rows of `count`, evenly spread, the first and the last among them."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
+    rows = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
+    rows.setflags(write=False)
+    return rows
 
 
 def _encode_ellipses(centres: Array, covariance: Array) -> list[list[int]]:
@@ -199,9 +203,13 @@ def _encode_points(path: Array, most: int) -> dict[str, list[int]]:
 
 
 def _quantise(values: Array, unit: float) -> list[int]:
-    return [int(value) for value in np.rint(values / unit)]
+    whole: list[int] = np.rint(values / unit).astype(np.int64).tolist()
+    return whole
 
 
 def _quantise_differences(values: Array, unit: float) -> list[int]:
     """Return the first value and then the differences, in whole units."""
-    return [int(value) for value in np.diff(np.rint(values / unit).astype(np.int64), prepend=0)]
+    whole = np.rint(values / unit).astype(np.int64)
+    whole[1:] -= whole[:-1].copy()
+    differences: list[int] = whole.tolist()
+    return differences
