@@ -242,7 +242,11 @@ class Predictor:
         return Prediction(**vars(named))
 
     def reset(self) -> None:
-        """Forget the movement and the operator; keep goals and obstacles. The next update may have any time."""
+        """Forget the movement and the operator; keep goals and obstacles, where they are. The next update may have any time."""
+        hand = self._pipeline.hand_state
+        if self._obstacles is None and hand is not None:
+            self._obstacles = self._pipeline.scene.obstacles(hand.stamp_ns)
+        self._pipeline.remove_source('shapes')
         self._pipeline.reset()
 
 
