@@ -205,7 +205,7 @@ def parse_scene(document: object) -> ReachingScene:
         obstacles, table = collect(errors, fields.build_obstacles), collect(errors, fields.build_goals)
     if config is None or fields is None or obstacles is None or table is None or errors:
         raise join_errors(errors)
-    noise = np.array([config.foc.noise_x, config.foc.noise_y])
+    noise = None if fields.noise is None else np.array([config.foc.noise_x, config.foc.noise_y])
     scene = ReachingScene(fields.build_hand(), table.positions, obstacles, noise, None, config, table.names, table.objects)
     scene.check()
     if fields.guess is None:
