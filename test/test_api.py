@@ -106,6 +106,8 @@ def test_after_a_reset_obstacles_go_on_from_where_they_are_at_any_time():
         (2.0, (0.0, float('nan')), 'position'),
         (2.0, (0.0, 0.0, 0.0), 'position'),
         (2.0, 'here', 'position'),
+        (2.0, ('0', '0.1'), 'position'),
+        (2.0, (0.0, 0.1j), 'position'),
     ],
 )
 def test_a_sample_that_cannot_be_used_is_refused_and_changes_nothing(t, position, field):
@@ -279,6 +281,10 @@ def test_plain_values_and_the_table_are_those_of_the_prediction(predicted):
 def test_a_group_of_parameters_is_given_as_a_whole_or_by_its_values():
     assert Config(foc=FocConfig(eta=0.95)) == Config(foc={'eta': 0.95}) == Config().with_values({'foc.eta': 0.95})
     assert isinstance(Config(foc={'eta': 0}).foc.eta, float), 'a whole number becomes the type of the parameter'
+    measured = Config().with_values({'foc.steps': np.int64(20), 'rate_hz': np.float32(25.0), 'predict_height': np.bool_(False)})
+    assert measured == Config().with_values({'foc.steps': 20, 'rate_hz': 25.0, 'predict_height': False}), 'numbers of NumPy count'
+    with pytest.raises(foc_ros.ParameterError, match=r'foc\.steps: expected a number in \[5, 400\], got 401$'):
+        Config().with_values({'foc.steps': np.int64(401)})
     groups = [item.name for item in fields(Config) if 'bound' not in item.metadata]
     assert groups == [type(getattr(Config(), name)).__name__.removesuffix('Config').lower() for name in groups]
     with pytest.raises(foc_ros.ParameterError, match=r'foc\.steps') as caught:
