@@ -130,7 +130,7 @@ class Objective:
     def compare(self, loss: Array) -> Array:
         """Return how much less likely each problem is than the best one with its goal, for losses (b,), as a logarithm.
 
-        Costs do not tell how likely goals are (`core.goals`): the classes of a goal that needs more effort may be the likely ones.
+        Costs do not tell how likely goals are (`core.goals`): a goal that needs more effort may be the likely one.
         """
         absolute = loss + self._scale
         best = np.full(len(absolute), np.inf)
