@@ -200,6 +200,15 @@ def test_scenes_that_cannot_be_in_metres_are_named(tmp_path, capsys, factor, uni
         assert capsys.readouterr().err.splitlines() == told
 
 
+@pytest.mark.parametrize(('rows', 'told'), [('0.2,0,30', True), ('0.2,0,30\n0.1,0.1,0.02', False), ('0.2,0,0.9', False)])
+def test_radii_that_cannot_be_in_metres_are_named(tmp_path, capsys, rows, told):
+    folder = write_folder(tmp_path / 'tables')
+    (folder / 'obstacles.csv').write_text(f'x_m,y_m,radius_m\n{rows}\n')
+    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
+    words = f'{folder}: the sizes of the obstacles of recording a seem to be in mm: the smallest is 30 m'
+    assert capsys.readouterr().err == (f'foc_ros convert: {words}\n' if told else '')
+
+
 def test_times_that_repeat_are_named(tmp_path, capsys):
     rows = '\n'.join(f'a,{0.02 * (i // 2):.2f},{0.001 * i},0' for i in range(20))
     assert convert(tmp_path, recordings=f'recording,t_s,x_m,y_m\n{rows}\n') == 0
