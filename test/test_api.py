@@ -73,28 +73,6 @@ def test_a_predictor_follows_a_movement_and_forgets_it():
     assert predictor.update(0.0, (0.0, 0.0)).t == 0.0
 
 
-@pytest.mark.parametrize('t', [5.0, 0.0, -5.0])
-def test_moving_obstacles_move_on_from_the_update_that_first_sees_them(t):
-    predictor = predictor_of_one_cup()
-    predictor.update(t - 0.1, (0.0, 0.0))
-    predictor.set_obstacles([foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5))])
-    np.testing.assert_allclose(predictor.update(t, (0.0, 0.0)).obstacles.centre, [[0.15, 0.1]])
-    np.testing.assert_allclose(predictor.update(t + 0.1, (0.0, 0.0)).obstacles.centre, [[0.15, 0.05]])
-
-
-def test_after_a_reset_obstacles_go_on_from_where_they_are_at_any_time():
-    predictor = predictor_of_one_cup()
-    predictor.set_obstacles([foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5))])
-    for t in (5.0, 5.1):
-        predictor.update(t, (0.0, 0.0))
-    predictor.reset()
-    np.testing.assert_allclose(predictor.update(0.0, (0.0, 0.0)).obstacles.centre, [[0.15, 0.05]])
-    np.testing.assert_allclose(predictor.update(0.1, (0.0, 0.0)).obstacles.centre, [[0.15, 0.0]])
-    predictor.reset()
-    predictor.set_obstacles([foc_ros.Circle((0.2, 0.0), 0.02, name='new')])
-    assert predictor.update(0.05, (0.0, 0.0)).obstacles.ids == ('new',)
-
-
 @pytest.mark.parametrize(
     ('t', 'position', 'field'),
     [

@@ -27,13 +27,11 @@ from foc_ros.core.types import Array
 from .margin import Contacts, Indices, Margins
 from .minima import find_least_factors
 from .point import Point, solve_at
-from .problem import Problem
+from .problem import REACHED, Problem
 from .solver import LARGEST_TOLERANCE
 from .start import NO_FORCES, Forces, Start
 
 INFEASIBLE = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
-REACHED = 1e-5
-"""Relative shortfall of k that counts as rounding."""
 STALLED = 1e-6
 NEARLY = 1e-2
 """Relative shortfall of k that is made good by asking for more: an obstacle comes nearer than its contacts tell."""
@@ -168,13 +166,13 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     if now.is_waiting[row]:
         message = f'unlikely, and goes on in the next prediction: eta {reached:.4g} so far, and the likelihood is estimated'
         return collect(point, row, Status.ESTIMATED, message, aims_at_eta=False)
-    if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
+    if problem.is_reached(k) and now.is_done[row]:
         return collect(point, row, Status.SOLVED, 'solved')
     is_late = point.is_late(row)
     if is_touching and not is_late:
         return collect(point, row, Status.INFEASIBLE, INFEASIBLE)
     is_settled = now.is_settled[row] or now.gain[row] < LARGEST_TOLERANCE
-    is_short = problem.preference.is_hard and k < problem.wanted_k * (1.0 - REACHED)
+    is_short = problem.preference.is_hard and not problem.is_reached(k)
     if is_late or not (is_settled or is_short):
         status, cause = _name_unsettled(point, row)
         return collect(
