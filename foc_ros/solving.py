@@ -120,7 +120,7 @@ def solve(
     scene = _build_scene(start, table, obstacles, config)
     if guess is not None:
         points = check_array('guess', guess, (None, 2))
-        scene = replace(scene, guess=guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
+        scene = scene.with_guess(guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
     candidates = _solve(scene)
     if not candidates:
         raise SceneError('scene', 'a path between the obstacles from the start to the goal', 'none')

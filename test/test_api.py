@@ -285,6 +285,8 @@ NO_SCENES = [
     ({'duration_s': 0.0}, r'duration\.fixed_s'),
     ({'config': {'eta': 0.9}}, 'config'),
     ({'guess': [(0.1, 0.1, 0.1)]}, 'guess'),
+    ({'guess': np.linspace((0.3, 0), (0, 0), 31)}, r'guess: expected N \+ 1 = 31 points, the first within 0\.03 m of the start'),
+    ({'guess': np.linspace((0, 0), (0, 0.3), 31)}, r'guess: expected N \+ 1 = 31 points, the last within 0\.03 m of the goal'),
 ]
 
 

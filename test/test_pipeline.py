@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The pipeline: when a prediction is due, what is rejected and why, and that neither inputs nor obstacles are those of another time."""
+"""The pipeline: when a prediction is due, what is rejected and why, and that nothing outdated is used as new."""
 
 import math
 
