@@ -285,8 +285,6 @@ NO_SCENES = [
     ({'duration_s': 0.0}, r'duration\.fixed_s'),
     ({'config': {'eta': 0.9}}, 'config'),
     ({'guess': [(0.1, 0.1, 0.1)]}, 'guess'),
-    ({'guess': np.linspace((0.3, 0), (0, 0), 31)}, r'guess: expected N \+ 1 = 31 points, the first within 0\.03 m of the start'),
-    ({'guess': np.linspace((0, 0), (0, 0.3), 31)}, r'guess: expected N \+ 1 = 31 points, the last within 0\.03 m of the goal'),
 ]
 
 
@@ -300,6 +298,13 @@ NO_SCENES = [
             for obstacles in ([(0.1, 0.0, 0.02)], [CUP, CUP])
         ),
         *((lambda changed=changed: solve_with(**changed), f'^{field}: expected .*, got') for changed, field in NO_SCENES),
+        (
+            lambda: solve_with(guess=np.linspace((0.3, 0), (0, 0), 31)),
+            r'N \+ 1 = 31 points, the first within 0\.03 m of the start',
+        ),
+        (lambda: solve_with(guess=np.linspace((0, 0), (0, 0.3), 31)), r'N \+ 1 = 31 points, the last within 0\.03 m of the goal'),
+        (lambda: foc_ros.monte_carlo(solve_with(), seed=-1), r'seed: expected a number in \[0, 4\.29497e\+09\], got -1'),
+        (lambda: foc_ros.monte_carlo(solve_with(), seed=0.5), 'seed: expected a whole number, got 0.5'),
         (lambda: FocConfig(eta=2), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
         (lambda: Config(foc={'eta': 2}), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
         (lambda: Config(foc={'zeta': 2}), r'foc\.zeta: expected a known parameter .*foc\.eta.*, got 2'),

@@ -17,8 +17,8 @@ from .obstacles.geometry import measure_offsets
 from .types import NANOSECONDS, Array, HandState, Record
 
 LARGEST_MISS, ROUNDING_M = 0.1, 1e-6
-"""Largest distance of the ends of a guess from start and goal, relative to the distance between these, because it may be measured;
-and the least such distance [m]."""
+"""Largest distance of the ends of a guess from start and goal, relative to the distance between these, as it may be measured; and
+the least such distance [m]."""
 
 
 @dataclass(frozen=True)
