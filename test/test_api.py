@@ -298,11 +298,8 @@ NO_SCENES = [
             for obstacles in ([(0.1, 0.0, 0.02)], [CUP, CUP])
         ),
         *((lambda changed=changed: solve_with(**changed), f'^{field}: expected .*, got') for changed, field in NO_SCENES),
-        (
-            lambda: solve_with(guess=np.linspace((0.3, 0), (0, 0), 31)),
-            r'N \+ 1 = 31 points, the first within 0\.03 m of the start',
-        ),
-        (lambda: solve_with(guess=np.linspace((0, 0), (0, 0.3), 31)), r'N \+ 1 = 31 points, the last within 0\.03 m of the goal'),
+        (lambda: solve_with(guess=np.linspace((0.3, 0), (0, 0), 31)), r'31 points, the first within 0\.03 m of the start'),
+        (lambda: solve_with(guess=np.linspace((0, 0), (0, 0.3), 31)), r'31 points, the last within 0\.03 m of the goal'),
         (lambda: foc_ros.monte_carlo(solve_with(), seed=-1), r'seed: expected a number in \[0, 4\.29497e\+09\], got -1'),
         (lambda: foc_ros.monte_carlo(solve_with(), seed=0.5), 'seed: expected a whole number, got 0.5'),
         (lambda: FocConfig(eta=2), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
