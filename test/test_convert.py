@@ -122,6 +122,7 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path, capsys):
         ('obstacles', 'x_m,y_m,radius_m\n0,0,-0.1\n', "radius_m: expected a number in [0, 10000], got '-0.1'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,1.5\n', "expected a whole number in [-2147483648, 2147483647], got '1.5'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,3\n0,0,1,3\n', 'row 3, column id: expected another id than the rows above'),
+        ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,cup\n', "expected a whole number in [-2147483648, 2147483647], got 'cup'"),
         ('obstacles', 'x_m,y_m,radius_m\n' + 20_001 * '0,0,1\n', 'o.csv: expected at most 20,000 rows, got more'),
         ('goals', 'x_m,y_m\n' + 257 * '0,0\n', 'g.csv: expected at most 256 rows, got more'),
     ],
