@@ -149,6 +149,8 @@ class Predictor:
             from foc_ros.io.class_library import load_library
 
             source = load_library(str(source))
+        if not isinstance(source, Sequence) or not all(isinstance(each, Demonstration) for each in source):
+            raise InputError('library', 'a file, or demonstrations', repr(library))
         if self.config.budget_s:
             warm_up(self.config)  # imports are no part of the time of the first update
         self._pipeline = Pipeline(self.config, tuple(source), is_timed=False)

@@ -302,6 +302,7 @@ NO_SCENES = [
         (lambda: solve_with(guess=np.linspace((0, 0), (0, 0.3), 31)), r'31 points, the last within 0\.03 m of the goal'),
         (lambda: foc_ros.monte_carlo(solve_with(), seed=-1), r'seed: expected a number in \[0, 4\.29497e\+09\], got -1'),
         (lambda: foc_ros.monte_carlo(solve_with(), seed=0.5), 'seed: expected a whole number, got 0.5'),
+        (lambda: foc_ros.Predictor(library=5), 'library: expected a file, or demonstrations, got 5'),
         (lambda: FocConfig(eta=2), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
         (lambda: Config(foc={'eta': 2}), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
         (lambda: Config(foc={'zeta': 2}), r'foc\.zeta: expected a known parameter .*foc\.eta.*, got 2'),
