@@ -144,7 +144,7 @@ class Predictor:
 
     def __init__(self, config: Config | None = None, library: str | Path | Sequence[Demonstration] | None = None) -> None:
         self.config = check_config(config)
-        source = self.config.homotopy.library if library is None else library
+        source: object = self.config.homotopy.library if library is None else library
         if isinstance(source, (str, Path)):
             from foc_ros.io.class_library import load_library
 
