@@ -144,11 +144,13 @@ class Predictor:
 
     def __init__(self, config: Config | None = None, library: str | Path | Sequence[Demonstration] | None = None) -> None:
         self.config = check_config(config)
-        source = self.config.homotopy.library if library is None else library
+        source: object = self.config.homotopy.library if library is None else library
         if isinstance(source, (str, Path)):
             from foc_ros.io.class_library import load_library
 
             source = load_library(str(source))
+        if not isinstance(source, Sequence) or not all(isinstance(each, Demonstration) for each in source):
+            raise InputError('library', 'a file, or demonstrations', repr(library))
         if self.config.budget_s:
             warm_up(self.config)  # imports are no part of the time of the first update
         self._pipeline = Pipeline(self.config, tuple(source), is_timed=False)
@@ -242,7 +244,11 @@ class Predictor:
         return Prediction(**vars(named))
 
     def reset(self) -> None:
-        """Forget the movement and the operator; keep goals and obstacles. The next update may have any time."""
+        """Forget the movement and the operator; keep goals and obstacles, where they are. The next update may have any time."""
+        hand = self._pipeline.hand_state
+        if self._obstacles is None and hand is not None:
+            self._obstacles = self._pipeline.scene.obstacles(hand.stamp_ns)
+        self._pipeline.remove_source('shapes')
         self._pipeline.reset()
 
 

@@ -120,7 +120,7 @@ def solve(
     scene = _build_scene(start, table, obstacles, config)
     if guess is not None:
         points = check_array('guess', guess, (None, 2))
-        scene = replace(scene, guess=guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
+        scene = scene.with_guess(guess_path(scene.hand.mean[:2], target, config.foc.steps, via=points))
     candidates = _solve(scene)
     if not candidates:
         raise SceneError('scene', 'a path between the obstacles from the start to the goal', 'none')
@@ -223,7 +223,7 @@ def monte_carlo(solution: Solution, samples: int = 10_000, seed: int = 0) -> sam
     Raises
     ------
     InputError
-        For a solution without its problem, or a number of samples out of bounds.
+        For a solution without its problem, or a number of samples or a seed out of bounds.
 
     Examples
     --------
@@ -236,9 +236,10 @@ def monte_carlo(solution: Solution, samples: int = 10_000, seed: int = 0) -> sam
     problem = getattr(solution, 'problem', None)
     if problem is None:
         raise InputError('solution', 'a result of foc_ros.solve or solve_classes', repr(solution))
-    if not check_number('samples', samples, 1, 10_000_000).is_integer():
-        raise InputError('samples', 'a whole number', samples)
-    return sampling.monte_carlo(problem, solution.control.T.ravel(), int(samples), seed)
+    for name, value, low, high in (('samples', samples, 1, 10_000_000), ('seed', seed, 0, 2**32)):
+        if not check_number(name, value, low, high).is_integer():
+            raise InputError(name, 'a whole number', value)
+    return sampling.monte_carlo(problem, solution.control.T.ravel(), int(samples), int(seed))
 
 
 def plot_candidates(candidates: Sequence[PredictedCandidate], axes: Any = None) -> Any:

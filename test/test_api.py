@@ -73,14 +73,6 @@ def test_a_predictor_follows_a_movement_and_forgets_it():
     assert predictor.update(0.0, (0.0, 0.0)).t == 0.0
 
 
-def test_moving_obstacles_move_on_from_the_update_that_first_sees_them():
-    predictor = predictor_of_one_cup()
-    predictor.update(5.0, (0.0, 0.0))
-    predictor.set_obstacles([foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5))])
-    np.testing.assert_allclose(predictor.update(5.1, (0.0, 0.0)).obstacles.centre, [[0.15, 0.1]])
-    np.testing.assert_allclose(predictor.update(5.2, (0.0, 0.0)).obstacles.centre, [[0.15, 0.05]])
-
-
 @pytest.mark.parametrize(
     ('t', 'position', 'field'),
     [
@@ -92,6 +84,8 @@ def test_moving_obstacles_move_on_from_the_update_that_first_sees_them():
         (2.0, (0.0, float('nan')), 'position'),
         (2.0, (0.0, 0.0, 0.0), 'position'),
         (2.0, 'here', 'position'),
+        (2.0, ('0', '0.1'), 'position'),
+        (2.0, (0.0, 0.1j), 'position'),
     ],
 )
 def test_a_sample_that_cannot_be_used_is_refused_and_changes_nothing(t, position, field):
@@ -265,6 +259,10 @@ def test_plain_values_and_the_table_are_those_of_the_prediction(predicted):
 def test_a_group_of_parameters_is_given_as_a_whole_or_by_its_values():
     assert Config(foc=FocConfig(eta=0.95)) == Config(foc={'eta': 0.95}) == Config().with_values({'foc.eta': 0.95})
     assert isinstance(Config(foc={'eta': 0}).foc.eta, float), 'a whole number becomes the type of the parameter'
+    measured = Config().with_values({'foc.steps': np.int64(20), 'rate_hz': np.float32(25.0), 'predict_height': np.bool_(False)})
+    assert measured == Config().with_values({'foc.steps': 20, 'rate_hz': 25.0, 'predict_height': False}), 'numbers of NumPy count'
+    with pytest.raises(foc_ros.ParameterError, match=r'foc\.steps: expected a number in \[5, 400\], got 401$'):
+        Config().with_values({'foc.steps': np.int64(401)})
     groups = [item.name for item in fields(Config) if 'bound' not in item.metadata]
     assert groups == [type(getattr(Config(), name)).__name__.removesuffix('Config').lower() for name in groups]
     with pytest.raises(foc_ros.ParameterError, match=r'foc\.steps') as caught:
@@ -300,6 +298,11 @@ NO_SCENES = [
             for obstacles in ([(0.1, 0.0, 0.02)], [CUP, CUP])
         ),
         *((lambda changed=changed: solve_with(**changed), f'^{field}: expected .*, got') for changed, field in NO_SCENES),
+        (lambda: solve_with(guess=np.linspace((0.3, 0), (0, 0), 31)), r'31 points, the first within 0\.03 m of the start'),
+        (lambda: solve_with(guess=np.linspace((0, 0), (0, 0.3), 31)), r'31 points, the last within 0\.03 m of the goal'),
+        (lambda: foc_ros.monte_carlo(solve_with(), seed=-1), r'seed: expected a number in \[0, 4\.29497e\+09\], got -1'),
+        (lambda: foc_ros.monte_carlo(solve_with(), seed=0.5), 'seed: expected a whole number, got 0.5'),
+        (lambda: foc_ros.Predictor(library=5), 'library: expected a file, or demonstrations, got 5'),
         (lambda: FocConfig(eta=2), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
         (lambda: Config(foc={'eta': 2}), r'foc\.eta: expected a number in \[0, 0\.999\], got 2'),
         (lambda: Config(foc={'zeta': 2}), r'foc\.zeta: expected a known parameter .*foc\.eta.*, got 2'),

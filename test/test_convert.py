@@ -122,6 +122,7 @@ def test_an_existing_bag_stops_before_anything_is_written(tmp_path, capsys):
         ('obstacles', 'x_m,y_m,radius_m\n0,0,-0.1\n', "radius_m: expected a number in [0, 10000], got '-0.1'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,1.5\n', "expected a whole number in [-2147483648, 2147483647], got '1.5'"),
         ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,3\n0,0,1,3\n', 'row 3, column id: expected another id than the rows above'),
+        ('obstacles', 'x_m,y_m,radius_m,id\n0,0,1,cup\n', "expected a whole number in [-2147483648, 2147483647], got 'cup'"),
         ('obstacles', 'x_m,y_m,radius_m\n' + 20_001 * '0,0,1\n', 'o.csv: expected at most 20,000 rows, got more'),
         ('goals', 'x_m,y_m\n' + 257 * '0,0\n', 'g.csv: expected at most 256 rows, got more'),
     ],
@@ -198,6 +199,15 @@ def test_scenes_that_cannot_be_in_metres_are_named(tmp_path, capsys, factor, uni
         assert main(['convert', *arguments, '--output', str(tmp_path / f'bags{len(arguments)}')]) == 0
         told = [f'foc_ros convert: {arguments[0]}: the {kind} {words}' for kind in ('goals', 'obstacles')]
         assert capsys.readouterr().err.splitlines() == told
+
+
+@pytest.mark.parametrize(('rows', 'told'), [('0.2,0,30', True), ('0.2,0,30\n0.1,0.1,0.02', False), ('0.2,0,0.9', False)])
+def test_radii_that_cannot_be_in_metres_are_named(tmp_path, capsys, rows, told):
+    folder = write_folder(tmp_path / 'tables')
+    (folder / 'obstacles.csv').write_text(f'x_m,y_m,radius_m\n{rows}\n')
+    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
+    words = f'{folder}: the sizes of the obstacles of recording a seem to be in mm: the smallest is 30 m'
+    assert capsys.readouterr().err == (f'foc_ros convert: {words}\n' if told else '')
 
 
 def test_times_that_repeat_are_named(tmp_path, capsys):

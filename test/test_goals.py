@@ -67,6 +67,23 @@ def test_obstacles_decide_on_the_way_and_not_on_the_goal():
     assert shares == pytest.approx([shares[0]] * 3, abs=0.02)
 
 
+def test_paths_to_a_goal_behind_obstacles_are_solved_beside_a_free_goal():
+    """They cost much more than the path to the other goal, which does not make them unlikely."""
+    obstacles = [foc_ros.Box((0.01, 0.15), (0.3, 0.02), name='wall'), foc_ros.Circle((-0.05, 0.22), 0.03, 0.003, name='cup')]
+
+    def solve_paths_to_last(goals):
+        predictor = foc_ros.Predictor(Config(budget_s=0.0))
+        predictor.set_goals(goals)
+        predictor.set_obstacles(obstacles)
+        prediction = predictor.update(0.0, (0.0, 0.0))
+        found = [each for each in prediction.solved_candidates if each.candidate.goal == len(goals) - 1]
+        return {each.candidate.sides: pytest.approx(each.effort, rel=1e-5) for each in found}, prediction.goals[-1].likelihood
+
+    alone, _ = solve_paths_to_last([(0.0, 0.3)])
+    beside, likelihood = solve_paths_to_last([(0.3, 0.0), (0.0, 0.3)])
+    assert len(alone) == 2 and beside == alone and likelihood > 0.4
+
+
 def test_the_predictor_takes_the_object_of_a_goal():
     predictor = foc_ros.Predictor(Config().with_values({'budget_s': 0.0}))
     predictor.set_obstacles([foc_ros.Circle((0.2, 0.0), 0.03, name='cup')])

@@ -164,6 +164,9 @@ def test_a_blended_command_is_never_faster_and_equals_the_command_without_author
     assert np.hypot(*blended) <= 0.1
     assert replace(output, authority=0.0).blend_command(command).tolist() == command.tolist()
     assert output.blend_command(np.zeros(2)).tolist() == [0.0, 0.0]
+    assert output.blend_command((0, 0.1)).tolist() == blended.tolist(), 'any sequence will do'
+    with pytest.raises(foc_ros.InputError, match=r'^command: expected two numbers \[m/s\], got \(0, 0\.1, 0\)'):
+        output.blend_command((0, 0.1, 0))
 
 
 def test_mirrored_input_gives_mirrored_guidance():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The pipeline: when a prediction is due, what is rejected and why, and that no outdated input is used as a new one."""
+"""The pipeline: when a prediction is due, what is rejected and why, and that nothing outdated is used as new."""
 
 import math
 
@@ -9,6 +9,7 @@ import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_stamped
 from object_messages import collision_object
 
+import foc_ros
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.deadline import NEVER
@@ -241,3 +242,31 @@ def test_poses_stamped_by_ros_time_are_judged_by_it(poses):
         assert freshness.find_not_ready_reason(0.0, ENDLESS_CONFIG, ()) is None
     freshness.forget_clock()
     assert freshness.find_not_ready_reason(0.0, FRESH_CONFIG, ()) is None
+
+
+def predictor_of_one_goal():
+    predictor = foc_ros.Predictor(replace_values(CONFIG, {'budget_s': 0.0}))
+    predictor.set_goals([(0.3, 0.0)])
+    return predictor
+
+
+@pytest.mark.parametrize('t', [5.0, 0.0, -5.0])
+def test_moving_obstacles_move_on_from_the_update_that_first_sees_them(t):
+    predictor = predictor_of_one_goal()
+    predictor.update(t - 0.1, (0.0, 0.0))
+    predictor.set_obstacles([foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5))])
+    np.testing.assert_allclose(predictor.update(t, (0.0, 0.0)).obstacles.centre, [[0.15, 0.1]])
+    np.testing.assert_allclose(predictor.update(t + 0.1, (0.0, 0.0)).obstacles.centre, [[0.15, 0.05]])
+
+
+def test_after_a_reset_obstacles_go_on_from_where_they_are_at_any_time():
+    predictor = predictor_of_one_goal()
+    predictor.set_obstacles([foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5))])
+    for t in (5.0, 5.1):
+        predictor.update(t, (0.0, 0.0))
+    predictor.reset()
+    np.testing.assert_allclose(predictor.update(0.0, (0.0, 0.0)).obstacles.centre, [[0.15, 0.05]])
+    np.testing.assert_allclose(predictor.update(0.1, (0.0, 0.0)).obstacles.centre, [[0.15, 0.0]])
+    predictor.reset()
+    predictor.set_obstacles([foc_ros.Circle((0.2, 0.0), 0.02, name='new')])
+    assert predictor.update(0.05, (0.0, 0.0)).obstacles.ids == ('new',)

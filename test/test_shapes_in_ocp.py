@@ -11,6 +11,7 @@ import pytest
 from homotopy_scenes import measure_distance
 from reach_helpers import bowed, random_scene, reach, solved
 
+import foc_ros
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.polygons import make_box_polygon
 from foc_ros.core.obstacles.risk import k_of_eta
@@ -211,3 +212,16 @@ def test_units_of_length_and_time_do_not_matter():
         same_but_for_samples('circles', first, replace(longer, mean=longer.mean / length), unit=length**2)
         slower = solve(obstacles, goal, guess, 'optimal', duration=duration, lam=duration**-6.0)
         same_but_for_samples('circles', first, slower, unit=duration**-6.0)
+
+
+@pytest.mark.parametrize('strategy', ['fixed', 'algorithm1'])
+def test_a_mean_that_is_held_off_at_the_steps_alone_and_enters_between_them_is_not_called_infeasible(strategy):
+    """There is a path on both sides of the sharp box, as `optimal` shows, whose mean is held off between the steps too."""
+    box = Box((0.147, -0.045), (0.017, 0.06), yaw=0.3, name='box')
+    found, best = (
+        {each.label: each for each in foc_ros.solve_classes((0, 0), GOAL, box, strategy=each)} for each in (strategy, 'optimal')
+    )
+    assert {each.status for each in best.values()} == {Status.SOLVED}
+    right = found['goal0:-box']
+    assert right.status is Status.ITERATION_LIMIT and right.status.remedy == 'choose another foc.strategy'
+    assert strategy == 'algorithm1' or right.solution.message.startswith('held off at the steps alone')

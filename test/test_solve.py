@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from reach_helpers import reference_cases
 
+import foc_ros
 from foc_ros.cli.main import main
 from foc_ros.core.solution import Status
 
@@ -61,6 +62,17 @@ def test_json_has_the_promised_names(tmp_path, capsys):
         assert 0.9 - 0.05 < each['mc_path'] <= each['mc_step'] <= 1
     assert [each['sides'] for each in found] == [{'0': 'right'}, {'0': 'left'}]
     assert sum(each['likelihood'] for each in found) == pytest.approx(1) and found[0]['likelihood'] > found[1]['likelihood']
+
+
+@pytest.mark.parametrize(('duration_s', 'steps'), [(1.0, 30), (0.4, 50)])
+def test_a_scene_without_noise_has_the_answer_of_the_python_interface(tmp_path, capsys, duration_s, steps):
+    """The noise of the parameters is given for 0.02 s, and scaled to the step of the scene."""
+    post = {'x': 0.15, 'y': 0.01, 'radius': 0.03}
+    scene = {'start': [0, 0], 'goal': [0.3, 0], 'obstacles': [post], 'duration_s': duration_s, 'steps': steps}
+    read = candidates(tmp_path, capsys, scene)
+    config = foc_ros.Config().with_values({'foc.steps': steps})
+    same = foc_ros.solve_classes((0, 0), (0.3, 0), foc_ros.Circle((0.15, 0.01), 0.03), duration_s=duration_s, config=config)
+    assert [(each['label'], each['effort']) for each in read] == [(each.label, pytest.approx(each.effort)) for each in same]
 
 
 def test_only_the_class_of_a_guess_is_solved(tmp_path, capsys):

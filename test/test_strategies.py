@@ -209,6 +209,15 @@ def dense(seed):
     return reach(obstacles, goal=goal, steps=30, noise=(noise, noise), eta=eta), bowed((0, 0), goal, 30, amplitude)
 
 
+@pytest.mark.parametrize('strategy', ['optimal', 'lv'])
+@pytest.mark.parametrize(('bound', 'wanted', 'reached'), [('cantelli', 0.0, 0.0), ('gaussian', 0.2, 0.5), ('gaussian', 0.5, 0.5)])
+def test_an_eta_that_a_mean_beside_the_obstacle_keeps_is_solved(strategy, bound, wanted, reached):
+    """The wanted safety factor is 0, which the mean misses by rounding."""
+    config = Config().with_values({'foc.bound': bound})
+    found = foc_ros.solve((0, 0), (0.3, 0), foc_ros.Circle((0.15, 0.01), 0.03), eta=wanted, strategy=strategy, config=config)
+    assert found.status is Status.SOLVED and found.eta == pytest.approx(reached, abs=1e-5)
+
+
 def test_lambda_beyond_what_numbers_hold_is_said():
     problem, guess = dense(21)
     solution = solved(problem, guess, 'algorithm1')

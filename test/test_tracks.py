@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from reach_helpers import bowed, one_obstacle
 
+import foc_ros
 from foc_ros.core.classes import search
 from foc_ros.core.config import Config, FocConfig, HomotopyConfig, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
@@ -132,6 +133,23 @@ def test_when_an_obstacle_is_passed_the_candidates_keep_their_solutions_and_numb
             assert one.solution.qp_solves < other.solution.qp_solves
         exact = 1e-4 if one.likelihood > 0.5 else 1e-3  # an unlikely class is settled less exactly
         np.testing.assert_allclose(one.solution.path, other.solution.path, atol=exact)
+
+
+@pytest.mark.parametrize('rows', [[1, 0], [1], [2, 1, 0]])
+def test_classes_are_followed_to_goals_that_have_other_rows_in_the_next_message(rows):
+    places = np.array([(0.3, 0.0), (0.25, 0.15), (0.0, 0.3)])
+
+    def follow(rows):
+        """Return the numbers of the candidates by goal and sides, after the goals have got these rows."""
+        predictor = foc_ros.Predictor(replace_values(Config(), {'budget_s': 0.0, 'foc.steps': 15}))
+        predictor.set_obstacles([foc_ros.Circle((0.12, 0.03), 0.02)])
+        for step, given in enumerate([[0, 1, 2], [0, 1, 2], rows]):
+            predictor.set_goals(places[given])
+            prediction = predictor.update(0.02 * step, (0.002 * step, 0.0))
+        return {(given[each.candidate.goal], each.candidate.sides): each.way for each in prediction}
+
+    known = follow([0, 1, 2])
+    assert follow(rows) == {(goal, sides): way for (goal, sides), way in known.items() if goal in rows}
 
 
 def test_unlikely_classes_are_solved_in_turns_unless_the_scene_changes():

@@ -91,7 +91,7 @@ def _find_doubt(rows: Sequence[Row]) -> Doubt | None:
 
 
 def warn_of_far_scenes(file: Path, recorded: Iterable[tuple[Movement, RecordedScene]]) -> None:
-    """Warn of recordings whose goals or obstacles are all so far from the hand that they cannot be in m; once for each kind.
+    """Warn of recordings whose goals or obstacles are all too far from the hand, or too large, to be in m; once for each kind.
 
     Positions that are in another unit themselves give no second warning here: their movement is larger by the same factor.
     """
@@ -106,7 +106,15 @@ def warn_of_far_scenes(file: Path, recorded: Iterable[tuple[Movement, RecordedSc
                 words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, gap, extent)}'
                 reason = f'the nearest is {gap:.3g} m from the movement of the hand'
                 doubts.append((movement.name, (f'the {kind}', words, reason)))
+            elif kind == 'obstacles' and (least := _find_least_size(scene)) > max(1.0, 10.0 * extent):
+                words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, least, 0.1 * extent)}'
+                doubts.append((movement.name, ('the sizes of the obstacles', words, f'the smallest is {least:.3g} m')))
     _warn_once_for_each(file, doubts)
+
+
+def _find_least_size(scene: RecordedScene) -> float:
+    """Return the radius or the larger length of the smallest obstacle [m], 0 if there is none."""
+    return min((max(row[3], *row[6:8]) for row in scene.obstacles), default=0.0)
 
 
 def _warn_once_for_each(file: Path, doubts: Iterable[tuple[str, Doubt]]) -> None:

@@ -152,17 +152,19 @@ class Pipeline:
     def set_obstacles(self, source: str, obstacles: Obstacles, stamp_ns: int | None, frame_id: str) -> SampleStatus:
         """Replace the obstacles of one source ('cloud' or 'markers').
 
-        Obstacles without a stamp (0 or None) have no age and are not moved on. A table that is older than the present one of the
+        Obstacles without a stamp (None) have no age and are not moved on. A table that is older than the present one of the
         same source, by `estimator.gap_s` at most, is late and does not replace it.
         """
         if not self._rejections.accept_frame('obstacles_wrong_frame', source, frame_id, self.frame_id):
             return SampleStatus.WRONG_FRAME
         present = self.scene.sources.get(source)
-        newest_ns = present.stamp_ns if present is not None else None
-        if stamp_ns and newest_ns and 0 < newest_ns - stamp_ns <= self.config.estimator.gap_s * NANOSECONDS:
-            self._rejections.reject_stamp('obstacles_late', source, stamp_ns, newest_ns)
-            return SampleStatus.LATE
-        self.scene = self.scene.with_source(source, ObstacleSource(obstacles, stamp_ns or None, frame_id))
+        newest_ns = None if present is None else present.stamp_ns
+        if stamp_ns is not None and newest_ns is not None:
+            behind_ns = newest_ns - stamp_ns
+            if 0 < behind_ns <= self.config.estimator.gap_s * NANOSECONDS:
+                self._rejections.reject_stamp('obstacles_late', source, stamp_ns, newest_ns)
+                return SampleStatus.LATE
+        self.scene = self.scene.with_source(source, ObstacleSource(obstacles, stamp_ns, frame_id))
         return SampleStatus.ACCEPTED
 
     def set_goals(

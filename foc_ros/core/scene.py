@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -14,6 +15,10 @@ from .errors import SceneError
 from .obstacle_table import Obstacles, make_obstacles
 from .obstacles.geometry import measure_offsets
 from .types import NANOSECONDS, Array, HandState, Record
+
+LARGEST_MISS, ROUNDING_M = 0.1, 1e-6
+"""Largest distance of the ends of a guess from start and goal, relative to the distance between these, as it may be measured; and
+the least such distance [m]."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +123,16 @@ class ReachingScene(Record):
     def duration_s(self) -> float:
         """Duration of the movement [s]."""
         return self.config.duration.fixed_s
+
+    def with_guess(self, guess: Array) -> ReachingScene:
+        """Return the scene with a guess; raise SceneError for one that does not lead from the start to the goal."""
+        start, goal = self.hand.mean[:2], self.goals[0]
+        allowed = max(LARGEST_MISS * math.dist(start, goal), ROUNDING_M)
+        for row, name, place in ((0, 'start', start), (-1, 'goal', goal)):
+            if math.dist(guess[row], place) > allowed:
+                words = f'N + 1 = {len(guess)} points, the {"last" if row else "first"} within {allowed:.3g} m of the {name}'
+                raise SceneError('guess', f'{words} {place.tolist()}', guess[row].tolist())
+        return replace(self, guess=guess)
 
     def check(self) -> None:
         """Raise SceneError if the start lies inside the mean boundary of an obstacle, or the object of a goal is no obstacle."""

@@ -27,7 +27,8 @@ def check_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
     sizes = ', '.join('n' if size is None else str(size) for size in shape)
     expected = f'finite numbers of shape ({sizes}{"," if len(shape) == 1 else ""})'
     try:
-        array = np.array(value, dtype=float)
+        given = np.asarray(value)
+        array = given.astype(float, casting='unsafe' if given.dtype == object else 'same_kind')  # no texts, no complex numbers
     except OverflowError as error:
         raise SceneError(field, expected, 'a whole number beyond all floats') from error
     except (TypeError, ValueError) as error:

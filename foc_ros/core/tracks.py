@@ -32,7 +32,7 @@ import numpy as np
 from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
-from .solution import Candidate, Solution, agrees
+from .solution import Candidate, Solution, agrees, name_goal
 from .types import NANOSECONDS, Array, Record, Rest, as_readonly
 
 HOLD_S = 0.2
@@ -64,6 +64,13 @@ class Track(Record):
     solution: Solution | None = None
     solved_ns: int = 0
     has_failed: bool = False
+
+    def in_row(self, row: int) -> Track:
+        """Return the track of the same class, whose goal has a row now."""
+        if row == self.candidate.goal:
+            return self
+        label = f'{name_goal(row)}:{self.candidate.label.partition(":")[2]}'
+        return replace(self, candidate=replace(self.candidate, goal=row, label=label))
 
     def is_solved_within(self, stamp_ns: int, seconds: float) -> bool:
         """Tell whether there is a solution that is not older at a stamp [ns] than some seconds [s]."""
@@ -101,11 +108,19 @@ class Tracks(Record):
         return Tracks(next_number=self.next_number)
 
     def keep_goals(self, goals: Array) -> Tracks:
-        """Return what belongs to those of the goals (g, 2) [m] that are where they were."""
-        count = min(len(goals), len(self.goals))
-        kept = set(np.flatnonzero(np.hypot(*(goals[:count] - self.goals[:count]).T) <= MOVED_M).tolist())
-        durations_s = {goal: each for goal, each in self.durations_s.items() if goal in kept}
-        followed, absent = (tuple(each for each in part if each.candidate.goal in kept) for part in (self.followed, self.absent))
+        """Return what belongs to those of the goals (g, 2) [m] that are where they were, in their rows now."""
+        distances = np.hypot(*(goals[:, None] - self.goals).transpose(2, 0, 1))
+        near = np.argwhere(distances <= MOVED_M).tolist()
+        pairs = [(now != before, distances[now, before], before, now) for now, before in near]
+        rows: dict[int, int] = {}
+        for *_, before, now in sorted(pairs):  # one that is in its row stays there; of others the nearest
+            if before not in rows and now not in rows.values():
+                rows[before] = now
+        durations_s = {rows[goal]: each for goal, each in self.durations_s.items() if goal in rows}
+        followed, absent = (
+            tuple(each.in_row(rows[each.candidate.goal]) for each in part if each.candidate.goal in rows)
+            for part in (self.followed, self.absent)
+        )
         return replace(self, followed=followed, absent=absent, durations_s=durations_s)
 
     def without_solutions(self) -> Tracks:

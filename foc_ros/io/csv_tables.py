@@ -70,8 +70,8 @@ class Row:
 
     def read_integer(self, column: str, low: int, high: int, default: int) -> int:
         """Return a cell as a whole number in [low, high]; default: if the table does not have the column."""
-        value = self.read_number(column, low, high, default)
-        if value != int(value):
+        value = self.parse_number(column) if column in self.cells else float(default)
+        if not low <= value <= high or value != int(value):
             raise self.make_error(column, f'a whole number in [{low}, {high}]')
         return int(value)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -205,7 +204,7 @@ def parse_scene(document: object) -> ReachingScene:
         obstacles, table = collect(errors, fields.build_obstacles), collect(errors, fields.build_goals)
     if config is None or fields is None or obstacles is None or table is None or errors:
         raise join_errors(errors)
-    noise = np.array([config.foc.noise_x, config.foc.noise_y])
+    noise = None if fields.noise is None else np.array([config.foc.noise_x, config.foc.noise_y])
     scene = ReachingScene(fields.build_hand(), table.positions, obstacles, noise, None, config, table.names, table.objects)
     scene.check()
     if fields.guess is None:
@@ -214,7 +213,7 @@ def parse_scene(document: object) -> ReachingScene:
         raise SceneError('guess', 'one goal, which it leads to', f'{len(scene.goals)} goals')
     bulge = fields.guess.amplitude if isinstance(fields.guess, BulgeFields) else 0.0
     via = None if isinstance(fields.guess, BulgeFields) else np.array(fields.guess).reshape(-1, 2)
-    return replace(scene, guess=guess_path(scene.hand.mean[:2], scene.goals[0], config.foc.steps, bulge, via))
+    return scene.with_guess(guess_path(scene.hand.mean[:2], scene.goals[0], config.foc.steps, bulge, via))
 
 
 def _read_config(scene: Mapping[str, Any]) -> Config:

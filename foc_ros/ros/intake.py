@@ -140,7 +140,7 @@ class Intake:
 
     def _set_obstacles(self, source: str, role: str, decoded: DecodedCloud) -> SampleStatus:
         """Pass the obstacles of a source to the pipeline, and count the parts of their message that were left out."""
-        status = self.pipeline.set_obstacles(source, decoded.obstacles, decoded.stamp_ns, decoded.frame_id)
+        status = self.pipeline.set_obstacles(source, decoded.obstacles, decoded.stamp_ns or None, decoded.frame_id)
         return self._count_dropped(role, decoded.dropped, status)
 
     def _take_detections(self, message: Any, place: Place) -> SampleStatus:
@@ -184,7 +184,7 @@ class Intake:
         now_ns = self._now_ns()
         status = SampleStatus.ACCEPTED
         if markers.markers or 'markers' in self.pipeline.scene.sources:
-            status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns, frame_id)
+            status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns or None, frame_id)
         if status.is_taken:
             self._markers, self._markers_ns, self._markers_unchanged = markers, stamp_ns, markers.find_unchanged_interval(now_ns)
         return status

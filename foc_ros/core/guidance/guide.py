@@ -12,9 +12,10 @@ from enum import StrEnum
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from foc_ros.core.config import Config, GuidanceConfig
+from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array, Record
@@ -113,13 +114,15 @@ class GuidanceOutput(Record):
         x, y = self.force.tolist()
         return f'<GuidanceOutput t={self.t:g} s, {self.status}, force ({x:.3g}, {y:.3g}) N, agreement {self.agreement:.2f}>'
 
-    def blend_command(self, command: Array) -> Array:
+    def blend_command(self, command: ArrayLike) -> Array:
         """Return (1 - A) u + A |u| h (2,) for an operator's velocity command u (2,), the authority A and the heading h.
 
-        It is never faster than the command, and equal to it where the authority is 0.
+        It is never faster than the command, and equal to it where the authority is 0. InputError is raised for a wrong shape.
         """
-        speed = float(np.hypot(*command))
-        blended: Array = (1.0 - self.authority) * command + self.authority * speed * self.heading
+        wanted = np.asarray(command, dtype=float)
+        if wanted.shape != (2,):
+            raise InputError('command', 'two numbers [m/s]', repr(command))
+        blended: Array = (1.0 - self.authority) * wanted + self.authority * float(np.hypot(*wanted)) * self.heading
         return blended
 
 

@@ -28,7 +28,7 @@ from .minima import find_least_factors
 from .point import Point, solve_at
 from .problem import Problem
 from .start import Start
-from .strategies import INFEASIBLE, REACHED, StrategyResult, collect
+from .strategies import INFEASIBLE, StrategyResult, collect
 
 STRIDE, LONGEST = 4.0, 60.0
 """First stride along the curve of `lv` and `hc`, and its end: with a growth of 2, lambda has grown by 1e18 there."""
@@ -222,7 +222,7 @@ def _finish_choice(problem: Problem, chosen: Sample | None, last: Sample, solves
     """Return the result of a search that has ended."""
     if chosen is None:
         return replace(last.result, status=Status.INFEASIBLE, message=INFEASIBLE, qp_solves=solves)
-    if chosen.k >= problem.wanted_k * (1.0 - REACHED):
+    if problem.is_reached(chosen.k):
         return replace(chosen.result, qp_solves=solves)
     reached = problem.risk.find_probability(chosen.k)
     cause = 'out of reach' if problem.preference.is_hard else 'out of reach or not worth its effort'

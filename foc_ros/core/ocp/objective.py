@@ -88,6 +88,7 @@ class Objective:
         self.beta = np.array([each.preference.beta for each in problems])
         # by this the losses of problems with different steps differ from those of costs in m^2/s^5
         self._scale = np.array([math.log(each.horizon.dt) - 2.0 * math.log(each.horizon.gain) for each in problems])
+        self._goal = np.unique([each.goal for each in problems], axis=0, return_inverse=True)[1].reshape(-1)
 
     def set_rate(self, rate: Array) -> None:
         """Set the worth of a unit of safety (b,), and with it that of a mean that stays out of the obstacles."""
@@ -127,9 +128,14 @@ class Objective:
         return met
 
     def compare(self, loss: Array) -> Array:
-        """Return how much less likely each problem is than the best one, for losses (b,), as a logarithm."""
+        """Return how much less likely each problem is than the best one with its goal, for losses (b,), as a logarithm.
+
+        Costs do not tell how likely goals are (`core.goals`): a goal that needs more effort may be the likely one.
+        """
         absolute = loss + self._scale
-        behind: Array = self.beta * (absolute - absolute.min())
+        best = np.full(len(absolute), np.inf)
+        np.minimum.at(best, self._goal, absolute)
+        behind: Array = self.beta * (absolute - best[self._goal])
         return behind
 
 

@@ -63,6 +63,13 @@ class Point:
         leaps: NDArray[np.bool_] = np.abs(margins.turn(rows, margins.find_path(motion))).max(axis=(1, 2), initial=0.0) > LEAP
         return short | leaps
 
+    def is_kept_at_steps(self) -> NDArray[np.bool_]:
+        """Return whether the mean is held off at the steps alone, and keeps its distances there, (b,)."""
+        margins, rows = self.solver.margins, np.arange(len(self.k))
+        grid = margins.measure_grid(rows, margins.move(rows, self.now.control), np.zeros(len(rows)))
+        is_kept: NDArray[np.bool_] = grid.value.min(axis=(1, 2), initial=np.inf) >= -TOUCHING * margins.extent
+        return is_kept & (not margins.between)
+
 
 def solve_at(
     problems: Sequence[Problem],

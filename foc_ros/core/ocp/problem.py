@@ -24,6 +24,8 @@ from foc_ros.core.types import Array, Record, as_readonly
 BOTH = np.ones(2)
 SMALLEST_EXTENT = 1e-6
 """Least size of a scene [m]."""
+REACHED = 1e-5
+"""Shortfall of a safety factor that counts as rounding, relative to the wanted one where that is above 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,10 @@ class Problem(Record):
     def wanted_k(self) -> float:
         """The safety factor that guarantees the wanted eta."""
         return self.risk.find_safety_factor(self.eta)
+
+    def is_reached(self, k: float) -> bool:
+        """Whether a safety factor is the wanted one, rounding apart."""
+        return k >= self.wanted_k - REACHED * max(self.wanted_k, 1.0)
 
     @cached_property
     def extent(self) -> float:

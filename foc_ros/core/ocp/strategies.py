@@ -27,13 +27,12 @@ from foc_ros.core.types import Array
 from .margin import Contacts, Indices, Margins
 from .minima import find_least_factors
 from .point import Point, solve_at
-from .problem import Problem
+from .problem import REACHED, Problem
 from .solver import LARGEST_TOLERANCE
 from .start import NO_FORCES, Forces, Start
 
 INFEASIBLE = 'no path between the obstacles in this homotopy class meets the goal: the path shown violates them least'
-REACHED = 1e-5
-"""Relative shortfall of k that counts as rounding."""
+BETWEEN_STEPS = 'held off at the steps alone, the mean enters an obstacle between them'
 STALLED = 1e-6
 NEARLY = 1e-2
 """Relative shortfall of k that is made good by asking for more: an obstacle comes nearer than its contacts tell."""
@@ -168,13 +167,13 @@ def _finish_optimal(point: Point, row: int, is_touching: bool) -> StrategyResult
     if now.is_waiting[row]:
         message = f'unlikely, and goes on in the next prediction: eta {reached:.4g} so far, and the likelihood is estimated'
         return collect(point, row, Status.ESTIMATED, message, aims_at_eta=False)
-    if k >= problem.wanted_k * (1.0 - REACHED) and now.is_done[row]:
+    if problem.is_reached(k) and now.is_done[row]:
         return collect(point, row, Status.SOLVED, 'solved')
     is_late = point.is_late(row)
     if is_touching and not is_late:
         return collect(point, row, Status.INFEASIBLE, INFEASIBLE)
     is_settled = now.is_settled[row] or now.gain[row] < LARGEST_TOLERANCE
-    is_short = problem.preference.is_hard and k < problem.wanted_k * (1.0 - REACHED)
+    is_short = problem.preference.is_hard and not problem.is_reached(k)
     if is_late or not (is_settled or is_short):
         status, cause = _name_unsettled(point, row)
         return collect(
@@ -215,6 +214,8 @@ def _finish_curve(point: Point, row: int, is_touching: bool, status: Status, mes
     if is_late or not (point.now.is_done[row] or point.now.gain[row] < LARGEST_TOLERANCE):
         status, cause = _name_unsettled(point, row)
         message = f'{cause}: the likelihood is estimated'
+    elif is_touching and point.is_kept_at_steps()[row]:
+        status, message = Status.ITERATION_LIMIT, BETWEEN_STEPS
     elif is_touching:
         status, message = Status.INFEASIBLE, INFEASIBLE
     return collect(point, row, status, message, **rest)
@@ -247,14 +248,14 @@ def _run_algorithm1(problem: Problem, start: Start, settings: FocConfig, deadlin
         weights = {'tau': tau, 'lam': lam, 'iterations': iteration, 'qp_solves': iteration}
         if k >= problem.wanted_k and abs(effort - last) < SETTLED_EFFORT:
             return collect(point, 0, Status.SOLVED, 'solved', **weights)
-        if point.now.gain[0] < STALLED and point.is_touching()[0]:
+        if point.now.gain[0] < STALLED and point.is_touching()[0] and not point.is_kept_at_steps()[0]:
             message = f'QP {iteration} is infeasible at tau = {tau:.3g}, lambda = {lam:.3g}'
             return collect(point, 0, Status.INFEASIBLE, message, **weights)
         if k < problem.wanted_k:
             if lam * settings.algorithm1_growth > LARGEST_LAMBDA:
                 # so far along, the variances alone push the mean about: whether there is a path is known at the beginning
                 first = solve_at([problem], [start], (np.zeros(1), np.ones(1)), is_chance=False, between=False, deadline=deadline)
-                if first.is_touching()[0]:
+                if first.is_touching()[0] and not first.is_kept_at_steps()[0]:
                     return collect(point, 0, Status.INFEASIBLE, INFEASIBLE, **weights)
                 message = f'lambda = {lam:.3g} after {iteration} QPs, and the surrogate is still violated'
                 return collect(point, 0, Status.ITERATION_LIMIT, message, **weights)
