@@ -270,3 +270,16 @@ def test_after_a_reset_obstacles_go_on_from_where_they_are_at_any_time():
     predictor.reset()
     predictor.set_obstacles([foc_ros.Circle((0.2, 0.0), 0.02, name='new')])
     assert predictor.update(0.05, (0.0, 0.0)).obstacles.ids == ('new',)
+
+
+def test_a_class_that_a_moving_obstacle_closes_is_not_estimated_from_its_guess():
+    """The search knows where obstacles are now: by then this one has come to the other side of the guess."""
+    obstacles = [
+        foc_ros.Circle((0.15, 0.04), 0.03, velocity=(0.0, -0.15), name='a'),
+        foc_ros.Circle((0.2, -0.06), 0.02, name='b'),
+    ]
+    predictor = predictor_of_one_goal()
+    predictor.set_obstacles(obstacles)
+    prediction = predictor.update(0.0, (0.0, 0.0))
+    assert prediction.most_likely == 'goal0:+a+b'
+    assert all(each.label != 'goal0:-a+b' for each in prediction.candidates_with_likelihood)

@@ -176,11 +176,13 @@ class Margins:
         self.size_variance = 4.0 * radius**2 * deviation**2 + 2.0 * deviation**4
         self.reach_square = np.maximum(self.size_mean + tau[:, None], (LEAST_REACH * self.extent[:, None]) ** 2)
         self.edges = tabulate_edges(stack('vertices', width, 2), stack('corners'))
-        recovery = np.array([each.recovery_s for each in self.problems]) / self.step_s
+        # a hand that is inside of a margin has to be out of it at the end at the latest
+        recovery = np.minimum(np.array([each.recovery_s for each in self.problems]) / self.step_s, self.steps)
         self.recovery_steps = np.where(self.counts, recovery[:, None], 0.0)
         self.missing = np.zeros_like(radius)
         if recovery.any() and self.count:
             self.missing = self._measure_missing()
+        self.recovery_steps = np.where(self.missing > 0.0, self.recovery_steps, 0.0)
 
     def _measure_missing(self) -> Array:
         """Return by how much the hand is inside the margin of each obstacle now, (b, m) [m]."""

@@ -44,8 +44,8 @@ CLOSE, CLOSE_FOR_NOW = 3e-5, 1e-3
 """Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it; and
 where a later prediction goes on, so that one that misses it by what a QP cannot know does: each repetition would cost as much."""
 UNLIKELY, SMALL_PART = 6.0, 0.04
-"""A class can wait for the next prediction if it is less likely than the best by more than the first number, as a logarithm, and
-if its QP promises less than the second one as a part of that."""
+"""A class can wait for the next prediction if it is less likely than the best one to its goal by more than the first number, as a
+logarithm, and if its QP promises less than the second one as a part of that."""
 LARGEST_TOLERANCE = 5e-3
 """Gain of its last whole step up to which a class without the wanted eta counts as settled."""
 MOST_TRIALS, SHORTER = 5, 0.35
