@@ -1,29 +1,30 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings in parallel by joblib: one function applied to many named items.
+"""Recordings in parallel: one function applied to many named items.
 
-Where that happens is joblib's setting: this process unless :func:`open_workers`, or `joblib.parallel_config`, says otherwise.
-Results do not depend on it. What goes wrong with one item, an exception or a worker process that is killed, becomes the
-:class:`Failure` of this item alone.
+That happens in this process, or in the executor that :func:`open_workers` opens: worker processes of loky, a part of joblib, or a
+Dask cluster. Results do not depend on it. What goes wrong with one item, an exception or a worker process that is killed, becomes
+the :class:`Failure` of this item alone.
 """
 
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError
-from contextlib import closing, contextmanager
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-from joblib import Parallel, delayed, effective_n_jobs, parallel_config, register_parallel_backend
-from joblib.parallel import ThreadingBackend
+from joblib.externals.loky import get_reusable_executor
 
 from foc_ros.core.errors import FocError, FocWarning, InputError, RecordingError, warn
 from foc_ros.io.terminal import show_progress
@@ -33,8 +34,8 @@ R = TypeVar('R')
 
 CONNECT_S = 10.0
 """Time within which a scheduler and its first worker have to answer [s]."""
-DASK = 'foc_ros.dask'
-"""Name of :class:`DaskBackend` among the backends of joblib."""
+ONE_THREAD = {f'{name}_NUM_THREADS': '1' for name in ('OMP', 'OPENBLAS', 'MKL', 'BLIS', 'VECLIB', 'NUMEXPR')}
+"""Environment of a worker process, beside which others work."""
 
 
 @dataclass(frozen=True)
@@ -44,99 +45,91 @@ class Failure:
     reason: str
 
 
+class Workers(NamedTuple):
+    """open: returns the executor, a new one where the last one has broken; most: items that may be at work at the same time."""
+
+    open: Callable[[], Executor]
+    most: int
+
+
+_WORKERS: ContextVar[Workers | None] = ContextVar('workers', default=None)
+
+
 @contextmanager
 def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
     """Let :func:`run` use a number of worker processes, 1 for this one, or the Dask cluster of a scheduler.
 
     Raises InputError where there is no such cluster.
     """
-    with warnings.catch_warnings():
-        # said by joblib where a command is interrupted
-        warnings.filterwarnings('ignore', '.* tasks which were still being processed', UserWarning)
-        if scheduler is None:
-            with parallel_config('loky', n_jobs=count):
-                yield
-        else:
-            with _connect(scheduler) as client, parallel_config(DASK, client=client):
-                yield
-
-
-class DaskBackend(ThreadingBackend):
-    """The backend of joblib for a Dask cluster: as many calls wait in threads as the cluster has.
-
-    With joblib's own one a result that is lost with a killed worker, and is then blamed for the death of the next one, never
-    arrives (joblib 1.6, distributed 2026.8).
-    """
-
-    def __init__(self, client: Any = None, **options: Any) -> None:
-        super().__init__(**options)
-        self._client = client
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return DaskBackend, ()
-
-    def effective_n_jobs(self, n_jobs: int) -> int:  # noqa: ARG002 (joblib's signature)
-        """Return the number of calls at the same time, each in a thread; with a single one joblib would compute here."""
-        return int(max(2, min(sum(self._client.nthreads().values()), 512)))
-
-    def submit(self, func: Callable[[], Any], callback: Callable[[Any], None] | None = None) -> Any:
-        """Schedule a call."""
-        return super().submit(partial(self._compute, func), callback)
-
-    def _compute(self, func: Callable[[], Any]) -> Any:
-        # not pure: a call that is repeated would return the old task with its error
-        return self._client.submit(func, pure=False).result()
-
-
-register_parallel_backend(DASK, DaskBackend)
+    with ExitStack() as stack:
+        workers = None
+        if scheduler is not None:
+            client = stack.enter_context(_connect(scheduler))
+            # not pure: a call that is repeated would return the old task with its error
+            workers = Workers(partial(client.get_executor, pure=False), sum(client.nthreads().values()))
+        elif count > 1:
+            given = {'initializer': _end_with, 'initargs': (os.getpid(),), 'env': ONE_THREAD}
+            workers = Workers(partial(get_reusable_executor, count, **given), count)
+            stack.callback(lambda: get_reusable_executor(count, **given).shutdown(kill_workers=True))
+        stack.callback(_WORKERS.reset, _WORKERS.set(workers))
+        yield
 
 
 def run(function: Callable[[T], R], items: Sequence[tuple[str, T]]) -> Iterator[tuple[str, R | Failure]]:
     """Apply a function to every item; yield names and results in the order of the items.
 
+    A worker that is killed takes those beside it along. All that may have been at work is then computed again, one after the
+    other, so that only the guilty one fails.
+
     function: importable by name where the workers are, and without a state of its own; items: names with arguments that can be
     pickled. Raises RecordingError where the workers cannot go on.
     """
-    found: dict[int, R | Failure] = {}
-    first = 0
-    for number, result, texts in _run_unordered(function, [item for _, item in items]):
+    workers, futures = _WORKERS.get(), list[Answer[R]]()
+    for number, (name, item) in enumerate(items):
+        if workers is None:
+            result, texts = call_guarded(function, item)
+        else:
+            futures = futures or [_submit(workers, function, each) for _, each in items]
+            if _find_error(futures[number]) is not None:
+                _submit_lost(workers, function, items, futures)
+            result, texts = futures[number].result()
         for text in texts:
-            warn(f'{items[number][0]}: {text}')
-        found[number] = result
-        while first in found:
-            yield items[first][0], found.pop(first)
-            first += 1
+            warn(f'{name}: {text}')
+        yield name, result
 
 
-def _run_unordered(function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | Failure, list[str]]]:
-    """Yield number, result and warnings of every item, as they come.
-
-    A worker that is killed takes those beside it along. All that may have been at work is then computed again, one after the
-    other, so that only the guilty one fails.
-    """
-    missing, at_work = list(range(len(items))), 2 * effective_n_jobs(None)
-    while missing:
-        try:
-            for found in _compute(function, [(each, items[each]) for each in missing]):
-                missing.remove(found[0])
-                yield found
-        except CancelledError as error:
-            raise RecordingError('the Dask scheduler was lost before all recordings had their turn') from error
-        except Exception:
-            for number in missing[:at_work]:
-                try:
-                    yield from _compute(function, [(number, items[number])])
-                except Exception as error:
-                    yield number, Failure(f'its worker process was lost ({type(error).__name__})'), []
-            missing = missing[at_work:]
+Answer = Future[tuple[R | Failure, list[str]]]
+"""The result of an item and its warnings, or the error of a worker that was lost."""
 
 
-def _compute(function: Callable[[T], R], items: Sequence[tuple[int, T]]) -> Iterator[tuple[int, R | Failure, list[str]]]:
-    is_alone, parent = len(items) == 1 and effective_n_jobs(None) > 1, os.getpid()
-    # in a process of its own, also alone; arrays are passed as they are, not as files
-    parallel = Parallel(2 if is_alone else None, return_as='generator_unordered', batch_size=1, max_nbytes=None)
-    with closing(parallel(delayed(call_guarded)(function, *item, parent) for item in items)) as found:
-        yield from found
+def _submit(workers: Workers, function: Callable[[T], R], item: T) -> Answer[R]:
+    try:
+        return workers.open().submit(call_guarded, function, item)
+    except BrokenExecutor as error:  # it broke just now
+        lost: Answer[R] = Future()
+        lost.set_exception(error)
+        return lost
+
+
+def _submit_lost(
+    workers: Workers, function: Callable[[T], R], items: Sequence[tuple[str, T]], futures: list[Answer[R]]
+) -> None:
+    """Submit again what was lost with a worker, at first what may have been at work, which fails if it is lost once more."""
+    wait(futures)
+    lost = [number for number, each in enumerate(futures) if _find_error(each) is not None]
+    for place, number in enumerate(lost):
+        futures[number] = _submit(workers, function, items[number][1])
+        if place < workers.most and (error := _find_error(futures[number])) is not None:
+            futures[number] = Future()
+            futures[number].set_result((Failure(f'its worker process was lost ({type(error).__name__})'), []))
+
+
+def _find_error(answer: Answer[Any]) -> BaseException | None:
+    """Wait for an answer and return the error of its worker; raise RecordingError where all workers are lost."""
+    try:
+        return answer.exception()
+    except CancelledError as error:
+        raise RecordingError('the Dask scheduler was lost before all recordings had their turn') from error
 
 
 def collect(function: Callable[[T], R], items: Sequence[tuple[str, T]], description: str) -> tuple[list[R], dict[str, str]]:
@@ -154,18 +147,13 @@ def collect(function: Callable[[T], R], items: Sequence[tuple[str, T]], descript
 def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], description: str) -> list[R]:
     """Run with a progress bar and return every result; raise RecordingError where an item failed."""
     results, failed = collect(function, items, description)
-    for name, reason in failed.items():
-        raise RecordingError(f'{name}: {reason}')
+    if failed:
+        raise RecordingError(': '.join(next(iter(failed.items()))))
     return results
 
 
-def call_guarded(function: Callable[[T], R], number: int, item: T, parent: int) -> tuple[int, R | Failure, list[str]]:
-    """Return the number and result of an item, or its failure in words, as an exception may not survive pickling; and warnings.
-
-    parent: process that gave the work; a worker process that is its child ends with it.
-    """
-    if os.getppid() == parent:
-        _end_with(parent)
+def call_guarded(function: Callable[[T], R], item: T) -> tuple[R | Failure, list[str]]:
+    """Return the result of an item, or its failure in words, as an exception may not survive pickling; and warnings."""
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter('always', FocWarning)
         result: R | Failure
@@ -177,12 +165,12 @@ def call_guarded(function: Callable[[T], R], number: int, item: T, parent: int) 
             place = traceback.extract_tb(error.__traceback__)[-1]
             words = f'{type(error).__name__}: {" ".join(str(error).split())} ({Path(place.filename).name}:{place.lineno})'
             result = Failure(words)
-    return number, result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
+    return result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
 
 
-@cache
 def _end_with(parent: int) -> None:
-    """Let this process end soon after its parent has ended, by whatever cause."""
+    """Let this worker process end soon after its parent has ended, by whatever cause; an interrupt is the parent's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         while os.getppid() == parent:
