@@ -111,9 +111,7 @@ def _submit(workers: Workers, function: Callable[[T], R], item: T) -> Answer[R]:
         return lost
 
 
-def _submit_lost(
-    workers: Workers, function: Callable[[T], R], items: Sequence[tuple[str, T]], futures: list[Answer[R]]
-) -> None:
+def _submit_lost(workers: Workers, function: Callable[[T], R], items: Sequence[tuple[str, T]], futures: list[Answer[R]]) -> None:
     """Submit again what was lost with a worker, at first what may have been at work, which fails if it is lost once more."""
     wait(futures)
     lost = [number for number, each in enumerate(futures) if _find_error(each) is not None]
