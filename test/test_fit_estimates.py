@@ -12,7 +12,7 @@ from evaluation_samples import TWO_CLASSES, H, observation, recorded
 from evaluation_samples import reach as resting_reach
 from fit_recordings import GOALS, reach, recorded_hand, write_tables
 
-from foc_ros.analysis.evaluation.truth import TIMES_S
+from foc_ros.analysis.evaluation.truth import HORIZONS, TIMES_S
 from foc_ros.analysis.fitting import SettingTable, race
 from foc_ros.analysis.fitting.direct import FADING, fit_duration, fit_estimator, fit_fading, fit_wait
 from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage
@@ -285,7 +285,9 @@ def test_a_lower_coverage_is_told_in_one_sentence(held_out, before, after, words
 S = np.array(TIMES_S)
 TO_GOAL = 10 * S**3 - 15 * S**4 + 6 * S**5
 LATE = 9.0 * (S**3 * (1 - S) ** 2)[:, None] * [1.0, 0.0]
-CANDIDATES = replace(TWO_CLASSES, covariance=np.tile(1e-8 * np.eye(2), (2, H, 1, 1)), duration_sensitivity=np.stack([LATE, LATE]))
+CANDIDATES = replace(
+    TWO_CLASSES, covariance=np.tile(1e-8 * np.eye(2), (2, 3, 1, 1)), duration_sensitivity=np.stack([LATE, LATE])[:, HORIZONS]
+)
 
 
 def _make_recordings(endpoint, spread):

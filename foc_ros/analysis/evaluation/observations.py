@@ -29,7 +29,10 @@ from foc_ros.core.plant.covariance import compute_duration_sensitivity
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record
 
-from .truth import TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
+from .truth import HORIZONS_S, TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
+
+EXACT = 1e-18
+"""Variance that is added to that of a position, which may be known [m^2]: that of a nanometre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +43,9 @@ class CandidateTable(Record):
     squared control, comparable between goals; safety_shortfall (k,): by how much the safety factor is below the wanted one;
     likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; is_named
     (k, n): whether the obstacle is in the label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
-    (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much
-    the position lags behind for each share of the time to go that the movement takes longer; branch_times: when the candidates
+    (k, h, 2) [m]: the positions at `TIMES_S`; covariance (k, 3, 2, 2) [m^2], positive definite: of those at `HORIZONS_S`;
+    duration_sensitivity (k, 3, 2) [m]: by how much these lag behind for each share of the time to go that the movement takes
+    longer; branch_times: when the candidates
     part; decisions: of those that take part.
     """
 
@@ -228,7 +232,7 @@ def _tabulate_candidates(
                 for each in solutions
             ]
         ),
-        covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]),
+        covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]) + EXACT * np.eye(2),
         duration_sensitivity=np.array(
             [interpolate_steps(compute_duration_sensitivity(each, passing)[:, :2], each.dt) for each in solutions]
         ),
@@ -238,6 +242,6 @@ def _tabulate_candidates(
 
 
 def interpolate_steps(values: Array, dt: float) -> Array:
-    """Return values (N + 1, ...) at steps of dt [s] at `TIMES_S` (h, ...), linear between steps; the last one afterwards."""
+    """Return values (N + 1, ...) at steps of dt [s] at `HORIZONS_S` (3, ...), linear between; the last one afterwards."""
     times = dt * np.arange(len(values))
-    return np.asarray(make_interp_spline(times, values, k=1)(np.minimum(TIMES_S, times[-1])))
+    return np.asarray(make_interp_spline(times, values, k=1)(np.minimum(HORIZONS_S, times[-1])))

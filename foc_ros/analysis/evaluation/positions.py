@@ -39,8 +39,6 @@ from .truth import HORIZONS, HORIZONS_S, TIMES_S
 LEVELS = (0.5, 0.9)
 """Probabilities of the ellipses and regions."""
 TIMES = np.array(TIMES_S)
-EXACT = 1e-18
-"""Variance of a position that is known [m^2]: that of a nanometre."""
 RINGS, SPOKES = 25, 4
 """Rings of a Gaussian, and points of a ring. A region is exact at 50 and 90 %, because the border lies between two rings."""
 Shares = dict[str, float | None]
@@ -56,11 +54,11 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
     times up to the horizon; recordings that end before a horizon do not count.
     """
     observations = [each for recording in recordings for each in recording.observations]
-    leading, taken = [_find_leading(each) for each in observations], _find_taken(recordings)
-    covariances = [each.candidates.covariance for each in observations]
+    means = [each.candidates.mean for each in observations]
+    leading, mixture = [_choose_leading(each) for each in observations], [each.candidates.mixture for each in observations]
     predicted = {
-        'most likely': [each.candidates.mean[row] for each, row in zip(observations, leading, strict=True)],
-        'likelihood-weighted': [np.tensordot(each.candidates.mixture, each.candidates.mean, 1) for each in observations],
+        'most likely': [np.tensordot(*each, 1) for each in zip(leading, means, strict=True)],
+        'likelihood-weighted': [np.tensordot(*each, 1) for each in zip(mixture, means, strict=True)],
         'constant velocity': [
             each.hand[:2] + TIMES[:, None] * (each.hand[2:4] if each.movement_age_s > 0.0 else np.zeros(2))
             for each in observations
@@ -69,9 +67,7 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
             compute_straight_positions(each, int(compute_straight_costs(each).argmin()), TIMES) for each in observations
         ],
     }
-    mixtures = [(each, each.candidates.mixture, covariance) for each, covariance in zip(observations, covariances, strict=True)]
-    densities = np.array([compute_log_densities(*each) for each in mixtures])
-    denser = np.array([compute_denser_shares(*each) for each in mixtures])
+    densities = [compute_log_densities(each, each.candidates.mixture, each.candidates.covariance) for each in observations]
     true, errors = np.array([each.truth.positions for each in observations]), {}
     for name, each in predicted.items():
         distance = np.hypot(*(np.array(each) - true).transpose(2, 0, 1))
@@ -79,10 +75,10 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
         errors[name] = {'average': average(mean[:, HORIZONS]), 'final': average(distance[:, HORIZONS])}
     return {
         'displacement_m': errors,
-        'nlpd': {'foc': average(-densities), 'Singer Kalman': average(score_singer(recordings))},
-        'inside': {f'{level:g}': find_inside(observations, leading, covariances, level) for level in LEVELS},
-        'inside_taken': {f'{level:g}': find_inside(observations, taken, covariances, level) for level in LEVELS},
-        'inside_all': {f'{level:g}': average(np.where(np.isfinite(denser), denser < level, np.nan)) for level in LEVELS},
+        'nlpd': {'foc': average(-np.array(densities)), 'Singer Kalman': average(score_singer(recordings))},
+        'inside': measure_inside(observations, leading),
+        'inside_taken': measure_inside(observations, _choose_taken(recordings)),
+        'inside_all': measure_inside(observations, mixture),
     }
 
 
@@ -92,36 +88,25 @@ def average(values: Array) -> Shares:
     return {name: float(np.nanmean(each)) if np.isfinite(each).any() else None for name, each in columns.items()}
 
 
-def find_inside(observations: Sequence[Observation], rows: Sequence[int], covariances: Sequence[Array], level: float) -> Shares:
-    """Return the share of true positions inside the ellipses of a probability, by horizon.
+def measure_inside(observations: Sequence[Observation], weights: Sequence[Array]) -> dict[str, Shares]:
+    """Return the share of true positions inside the smallest region of each of `LEVELS`, by horizon.
 
-    rows (m,): the candidate of each observation; covariances: of its candidates (k, h, 2, 2) [m^2].
+    weights: those (k,) of the candidates in the region of each observation. The region of one candidate is its ellipse.
     """
-    inside = []
-    for each, row, covariance in zip(observations, rows, covariances, strict=True):
-        offset = (each.truth.positions - each.candidates.mean[row])[HORIZONS]
-        scaled = np.linalg.solve(covariance[row, HORIZONS] + EXACT * np.eye(2), offset[..., None])[..., 0]
-        squared = (offset * scaled).sum(axis=-1)
-        # chi-square distribution of two degrees of freedom
-        inside.append(np.where(np.isfinite(squared), squared <= -2.0 * np.log(1.0 - level), np.nan))
-    return average(np.array(inside))
+    given = (
+        (each.candidates.mean[:, HORIZONS], each.candidates.covariance, each.truth.positions[HORIZONS]) for each in observations
+    )
+    denser = np.array([find_denser_share(weight, *each) for weight, each in zip(weights, given, strict=True)])
+    return {f'{level:g}': average(np.where(np.isfinite(denser), denser < level, np.nan)) for level in LEVELS}
 
 
 def compute_log_densities(observation: Observation, shares: Array, covariance: Array) -> Array:
     """Return the log-density (..., 3) of the true positions at the horizons [nat, metres], nan where the movement has ended.
 
-    shares (k,): weights of the candidates; covariance (..., k, h, 2, 2) [m^2]: of their positions.
+    shares (k,): weights of the candidates; covariance (..., k, 3, 2, 2) [m^2]: of their positions.
     """
-    counted = np.flatnonzero(shares > 0.0)
-    offset = (observation.truth.positions - observation.candidates.mean[counted])[:, HORIZONS]
-    rows, times = np.ix_(counted, HORIZONS)
-    return log_mixture_density(shares[counted], offset, covariance[..., rows, times, :, :] + EXACT * np.eye(2))
-
-
-def compute_denser_shares(observation: Observation, shares: Array, covariance: Array) -> Array:
-    """Return the probability (3,) of all that is denser than the true positions at the horizons; as `compute_log_densities`."""
-    mean, truth = observation.candidates.mean[:, HORIZONS], observation.truth.positions[HORIZONS]
-    return find_denser_share(shares, mean, covariance[:, HORIZONS] + EXACT * np.eye(2), truth)
+    offset = (observation.truth.positions - observation.candidates.mean)[:, HORIZONS]
+    return log_mixture_density(shares, offset, covariance)
 
 
 def find_denser_share(weight: Array, mean: Array, covariance: Array, position: Array) -> Array:
@@ -146,8 +131,8 @@ def log_mixture_density(weight: Array, offset: Array, covariance: Array) -> Arra
     x, y, xx, yy, xy = *np.moveaxis(offset, -1, 0), covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
     determinant = xx * yy - xy**2
     distance = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
-    logs = np.log(weight)[:, None] - 0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi)
-    return np.asarray(logsumexp(logs, axis=-2))
+    logs = -0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi)
+    return np.asarray(logsumexp(logs, axis=-2, b=weight[:, None]))
 
 
 def _make_points() -> Array:
@@ -160,24 +145,29 @@ def _make_points() -> Array:
 POINTS = _make_points()
 
 
-def _find_leading(observation: Observation) -> int:
-    """Return the row of the most likely candidate, as published."""
+def choose_row(row: int, count: int) -> Array:
+    """Return weights (count,) of which one is 1, and the others are 0."""
+    return (np.arange(count) == row).astype(float)
+
+
+def _choose_leading(observation: Observation) -> Array:
+    """Return weights (k,) that choose the most likely candidate, as published."""
     candidates, label = observation.candidates, observation.most_likely
-    return candidates.labels.index(label) if label else int(candidates.likelihood.argmax())
+    return choose_row(candidates.labels.index(label) if label else int(candidates.likelihood.argmax()), len(candidates))
 
 
-def _find_taken(recordings: Sequence[ObservedRecording]) -> list[int]:
-    """Return the row of the likeliest candidate of the true answer; of the most likely candidate where none gives it."""
-    rows = []
+def _choose_taken(recordings: Sequence[ObservedRecording]) -> list[Array]:
+    """Return weights that choose the likeliest candidate of the true answer; the most likely candidate where none gives it."""
+    found = []
     for recording in recordings:
         questions = {observation.stamp_ns: question for observation, question in ask_main(recording)}
         for each in recording.observations:
-            question = questions.get(each.stamp_ns)
+            question, likelihood = questions.get(each.stamp_ns), each.candidates.likelihood
             if question is not None and (is_true := question.given == question.truth).any():
-                rows.append(int(np.where(is_true, each.candidates.likelihood, -1.0).argmax()))
+                found.append(choose_row(int(np.where(is_true, likelihood, -1.0).argmax()), len(likelihood)))
             else:
-                rows.append(_find_leading(each))
-    return rows
+                found.append(_choose_leading(each))
+    return found
 
 
 class SingerSetting(NamedTuple):

@@ -9,6 +9,7 @@ them are tried on observations with motor noise alone, by the density of the tru
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import Any
@@ -17,7 +18,7 @@ import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, make_ahead, make_plain, power_rule_shares
 from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, interpolate_steps
-from foc_ros.analysis.evaluation.positions import average, compute_denser_shares, compute_log_densities, find_inside
+from foc_ros.analysis.evaluation.positions import choose_row, compute_log_densities, measure_inside
 from foc_ros.analysis.evaluation.questions import ask_main
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS
@@ -141,9 +142,9 @@ def compute_mean_densities(
 
 
 def widen_covariances(observation: Observation, widenings: Iterable[Sequence[float]], config: Config) -> Array:
-    """Return the covariance (q, k, h, 2, 2) [m^2] of the candidates' positions at `TIMES_S` with each widening."""
+    """Return the covariance (q, k, 3, 2, 2) [m^2] of the candidates' positions at `HORIZONS_S` with each widening."""
     candidates, late, squares = observation.candidates, observation.candidates.duration_sensitivity, np.array(widenings) ** 2
-    unit = []  # variances by process noise and by scatter of the end, of 1 each, (k, 2, h)
+    unit = []  # variances by process noise and by scatter of the end, of 1 each, (k, 2, 3)
     for time_s in candidates.time_s.tolist():
         kind = time_s / config.foc.steps, config.foc.steps, is_passing(config.duration)
         jerk = TRIPLE_INTEGRATOR.compute_process_covariance(*kind)
@@ -162,21 +163,14 @@ def compute_coverage(
     inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; widenings (n,): for
     each recording, so that each can be judged by one that it did not influence.
     """
-    moving = [
-        (each, widening)
-        for recording, widening in zip(recordings, widenings, strict=True)
-        for each in recording.observations
-        if each.movement_age_s > 0.0
-    ]
+    moving = []
+    for recording, widening in zip(recordings, widenings, strict=True):
+        for each in recording.observations:
+            if each.movement_age_s > 0.0:
+                widened = widen_covariances(each, [widening], config)[0]
+                moving.append(replace(each, candidates=replace(each.candidates, covariance=widened)))
     if not moving:
         return {'inside_90': None, 'inside_all_90': None}
-    observations = [each for each, _ in moving]
-    shares = [power_rule_shares(each, config.likelihood) for each in observations]
-    covariances = [widen_covariances(each, [widening], config)[0] for each, widening in moving]
-    likeliest = [int(each.argmax()) for each in shares]
-    denser = np.array([compute_denser_shares(*each) for each in zip(observations, shares, covariances, strict=True)])
-    inside = np.where(np.isfinite(denser), denser < COVERAGE_LEVEL, np.nan)
-    return {
-        'inside_90': find_inside(observations, likeliest, covariances, COVERAGE_LEVEL)[COVERAGE_S],
-        'inside_all_90': average(inside)[COVERAGE_S],
-    }
+    shares = [power_rule_shares(each, config.likelihood) for each in moving]
+    weights = {'inside_90': [choose_row(int(each.argmax()), len(each)) for each in shares], 'inside_all_90': shares}
+    return {name: measure_inside(moving, each)[f'{COVERAGE_LEVEL:g}'][COVERAGE_S] for name, each in weights.items()}
