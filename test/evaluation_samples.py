@@ -30,7 +30,7 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=N
         likelihood=even if likelihood is None else np.array(likelihood, dtype=float),
         length=np.arange(1.0, k + 1.0),
         time_s=np.ones(k),
-        is_named=np.ones((k, n), dtype=bool),
+        named=frozenset(str(i) for i in range(n)),
         sides=np.array(sides, dtype=np.int8).reshape(k, n),
         mean=np.zeros((k, H, 2)),
         covariance=np.tile(np.eye(2), (k, len(HORIZONS_S), 1, 1)),

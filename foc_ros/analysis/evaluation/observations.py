@@ -41,8 +41,8 @@ class CandidateTable(Record):
 
     labels; goal (k,): row of the goals; has_likelihood (k,): whether each takes part; cost_to_go (k,) [m^2/s^5]: integral of the
     squared control, comparable between goals; safety_shortfall (k,): by how much the safety factor is below the wanted one;
-    likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; is_named
-    (k, n): whether the obstacle is in the label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
+    likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; named:
+    obstacles in any label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
     (k, h, 2) [m]: the positions at `TIMES_S`; covariance (k, 3, 2, 2) [m^2], positive definite: of those at `HORIZONS_S`;
     duration_sensitivity (k, 3, 2) [m]: by how much these lag behind for each share of the time to go that the movement takes
     longer; branch_times: when the candidates
@@ -57,7 +57,7 @@ class CandidateTable(Record):
     likelihood: Array
     length: Array
     time_s: Array
-    is_named: Bools
+    named: frozenset[str]
     sides: Sides
     mean: Array
     covariance: Array
@@ -213,7 +213,6 @@ def _tabulate_candidates(
         known = {} if each.has_likelihood else dict(each.candidate.sides)
         row[:] = [known.get(identity, side) for identity, side in zip(obstacles.ids, row, strict=True)]
     goal, grown = np.array([each.candidate.goal for each in predicted], dtype=np.intp), obstacles.grow(config.scene.hand_radius)
-    named = [[identity in dict(each.candidate.sides) for identity in obstacles.ids] for each in predicted]
     return CandidateTable(
         labels=tuple(each.candidate.label for each in predicted),
         goal=goal,
@@ -223,7 +222,7 @@ def _tabulate_candidates(
         likelihood=np.array([each.likelihood for each in predicted]),
         length=np.array([each.candidate.length for each in predicted]),
         time_s=np.array([each.times[-1] for each in solutions]),
-        is_named=np.array(named, dtype=bool).reshape(len(predicted), len(obstacles)),
+        named=frozenset(identity for each in predicted for identity, _ in each.candidate.sides),
         sides=sides,
         mean=np.array(
             [

@@ -147,7 +147,8 @@ POINTS = _make_points()
 
 def choose_row(row: int, count: int) -> Array:
     """Return weights (count,) of which one is 1, and the others are 0."""
-    return (np.arange(count) == row).astype(float)
+    weights: Array = np.eye(count)[row]
+    return weights
 
 
 def _choose_leading(observation: Observation) -> Array:

@@ -66,8 +66,7 @@ def ask_main(recording: ObservedRecording) -> Questions:
 
 def find_relevant_obstacles(recording: ObservedRecording) -> frozenset[str]:
     """Return the obstacles that are in the label of any candidate of a recording."""
-    named = (each.ids[row] for each in recording.observations for row in np.flatnonzero(each.candidates.is_named.any(axis=0)))
-    return frozenset(named)
+    return frozenset[str]().union(*(each.candidates.named for each in recording.observations))
 
 
 def ask(name: str, observation: Observation, relevant: frozenset[str]) -> Question | None:

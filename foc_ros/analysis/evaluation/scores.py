@@ -36,12 +36,10 @@ TENTHS, BINS = 10, 10
 
 def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
     """Return the sum of the log-likelihoods of the true answers under each setting of a predictor, (s,)."""
-    return np.array(
-        [
-            sum(np.log([baseline.forecast(*each, setting).true_probability(each[1]) for each in questions]))
-            for setting in baseline.settings
-        ]
+    probabilities = (
+        [baseline.forecast(*each, setting).true_probability(each[1]) for each in questions] for setting in baseline.settings
     )
+    return np.array([np.log(each).sum() for each in probabilities])
 
 
 def choose_held_out(table: Array, groups: Sequence[Hashable]) -> NDArray[np.intp]:
@@ -75,31 +73,20 @@ class Scores(NamedTuple):
 
 
 def score_forecasts(rows: Iterable[tuple[int, Observation, Question, Forecast]]) -> Scores:
-    """Score forecasts, at least one, given with the number of the recording and what was asked.
+    """Score forecasts, given with the number of the recording and what was asked.
 
     The progress of the gap in the next row counts from row to row, that of other questions over the whole movement.
     """
-    scored = [
-        (
-            number,
-            observation.truth.approach if question.name == GAP else observation.truth.progress,
-            observation.truth.left_s,
-            question.possible,
-            np.log(forecast.true_probability(question)),
-            forecast.confidence(),
-            forecast.correctness(question),
-            compute_brier_score(forecast, question),
-        )
-        for number, observation, question, forecast in rows
-    ]
-    return Scores(*np.array(scored, dtype=float).T)
-
-
-def compute_brier_score(forecast: Forecast, question: Question) -> float:
-    """Return the squared error of the probabilities, summed over all possible answers (Brier 1950)."""
-    truth = np.zeros(len(question.answers))
-    truth[question.truth] = 1.0
-    return float(((forecast.probability - truth) ** 2).sum() + question.unlisted * forecast.each_other**2)
+    scored = []
+    for number, observation, question, forecast in rows:
+        truth, is_true = observation.truth, np.arange(len(question.answers)) == question.truth
+        # the squared error of the probabilities, summed over all possible answers (Brier 1950)
+        brier = ((forecast.probability - is_true) ** 2).sum() + question.unlisted * forecast.each_other**2
+        progress = truth.approach if question.name == GAP else truth.progress
+        log_likelihood = np.log(forecast.true_probability(question))
+        confidence, correct = forecast.confidence(), forecast.correctness(question)
+        scored.append((number, progress, truth.left_s, question.possible, log_likelihood, confidence, correct, brier))
+    return Scores(*np.array(scored, dtype=float).reshape(-1, len(Scores._fields)).T)
 
 
 def compare_scores(ours: Scores, other: Scores, is_share: bool) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, make_ahead, make_plain, power_rule_shares
+from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, power_rule_shares
 from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, interpolate_steps
 from foc_ros.analysis.evaluation.positions import choose_row, compute_log_densities, measure_inside
 from foc_ros.analysis.evaluation.questions import ask_main
@@ -30,12 +30,12 @@ from foc_ros.core.types import Array
 
 from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
 
-RULES = (
-    *(make_plain(LikelihoodConfig(), beta) for beta in (0.5, 1.0, 2.0, 3.0, 6.0, 12.0)),
-    *(
-        make_ahead(LikelihoodConfig(), horizon, seconds, beta)
-        for horizon, seconds, beta in product((0.0, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0))
-    ),
+RULES = tuple(
+    LikelihoodConfig(beta=beta, planning_horizon_s=horizon_s, lookahead_s=lookahead_s)
+    for horizon_s, lookahead_s, beta in (
+        *product((WHOLE_WAY_S,), (0.0,), (0.5, 1.0, 2.0, 3.0, 6.0, 12.0)),
+        *product((0.0, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0)),
+    )
 )
 """The likelihoods of which each setting of the race gets its best. By a single one, settings that suit the others would lose."""
 LIKELIHOODS = {
