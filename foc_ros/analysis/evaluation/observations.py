@@ -139,8 +139,7 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
         warn(losses)
     goals = made[-1][0].scene.goals
     assert goals is not None
-    stamps, positions = ([getattr(each, name) for each in samples] for name in ('stamp_ns', 'position'))
-    path = RecordedPath(np.array(stamps), np.array(positions), goals, recording.goal)
+    path = RecordedPath.from_samples(samples, goals, recording.goal)
     found = [make_observation(step, hand, path, adapted) for step, hand, adapted in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')

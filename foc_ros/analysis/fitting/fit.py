@@ -20,13 +20,14 @@ from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
 from foc_ros.analysis.evaluation.positions import compute_position_scores
 from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
 from foc_ros.analysis.evaluation.report import OURS
+from foc_ros.analysis.evaluation.truth import RecordedHand, read_hand
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
 from . import Findings, clip_to_bounds, is_cross_validated
-from .direct import RecordedHand, fit_duration, fit_estimator, fit_fading, fit_wait, read_hand
+from .direct import fit_duration, fit_estimator, fit_fading, fit_wait
 from .one_replay import COVERAGE_LEVEL, NO_WIDENING, fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
 

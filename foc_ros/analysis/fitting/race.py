@@ -25,6 +25,7 @@ from scipy.special import stdtrit
 from foc_ros.analysis.evaluation.baselines import Forecast, power_rule_shares
 from foc_ros.analysis.evaluation.observations import observe
 from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
+from foc_ros.analysis.evaluation.truth import RecordedHand
 from foc_ros.analysis.intervals import SEED, resample
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
@@ -32,7 +33,7 @@ from foc_ros.core.config import ARRIVALS, Config, flatten, replace_values
 from foc_ros.core.types import Array
 
 from . import Estimate, Findings, clip_to_bounds
-from .direct import CONSTANTS, RecordedHand, fit_other_models
+from .direct import CONSTANTS, fit_duration
 from .one_replay import FEW_WIDENINGS, NO_WIDENING, RULES, compute_mean_densities
 
 NOISES, DURATIONS = (0.06, 0.25, 2.0), (0.7, 1.4, 2.0)
@@ -67,7 +68,10 @@ def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> lis
     Where a goal that is passed is modelled as one where the hand stops, no duration is right, nor where an acceleration that
     lasts is modelled as one that fades.
     """
-    models = [config, *fit_other_models(hands, config)]
+    models = [config]
+    if config.duration.model != 'fitts':
+        fitts = replace_values(config, {'duration.model': 'fitts'})
+        models.append(replace_values(fitts, fit_duration(hands, fitts).values))
     scaled = [_scale(each, CONSTANTS[each.duration.model], factor) for each, factor in product(models, (1.0, *DURATIONS))]
     arrivals = dict.fromkeys([config.duration.arrival, *ARRIVALS])
     fading_times = dict.fromkeys([config.estimator.acceleration_time_s, 0.0])

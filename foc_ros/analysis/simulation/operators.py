@@ -13,16 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from foc_ros.analysis.evaluation.truth import read_hand
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.simulation import ACCURATE, CHANGES_WAY, HUMAN_PATHS, LAGGY, NOISY, UNANNOUNCED_GOAL
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError, RecordingError
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Array, Record
-from foc_ros.io.topics import HAND
-from foc_ros.ros.intake import Intake
+from foc_ros.core.types import Array, Record
 
 DT = 0.005
 """Time step of the simulation [s]."""
@@ -223,24 +221,13 @@ def read_task(recording: Recording, config: Config) -> Task | None:
 
     None for a recording that cannot be read, that has few samples or no goals, or whose hand touches an obstacle by itself.
     """
-    intake, samples = Intake(Pipeline(config)), []
     try:
-        for item in recording.items():
-            status = intake.take(item.role, item.message)
-            if item.role == HAND and status is not None and status.is_taken and intake.sample is not None:
-                samples.append(intake.sample)
+        hand = read_hand(recording, config)
     except RecordingError:
         return None
-    scene = intake.pipeline.scene
-    stamps, rows = np.unique([each.stamp_ns for each in samples], return_index=True)
-    if len(rows) < 8 or scene.goals is None or not len(scene.goals):
+    spline = make_interp_spline(hand.times, hand.path.positions, k=5)
+    path, radius = IntendedPath.sample(spline, np.arange(0.0, hand.times[-1], DT)), config.scene.hand_radius
+    if (measure_offsets(path.position, hand.obstacles)[1] - hand.obstacles.radius).min(initial=np.inf) <= radius:
         return None
-    times = (stamps - stamps[0]) / NANOSECONDS
-    spline = make_interp_spline(times, np.array([samples[row].position for row in rows]), k=5)
-    path = IntendedPath.sample(spline, np.arange(0.0, times[-1], DT))
-    obstacles, radius = scene.obstacles(int(stamps[-1])), config.scene.hand_radius
-    if len(obstacles) and (measure_offsets(path.position, obstacles)[1] - obstacles.radius).min() <= radius:
-        return None
-    goal = path.position[-1]
-    row = int(np.hypot(*(scene.goals - goal).T).argmin())
-    return Task(ARMS[HUMAN_PATHS], obstacles, scene.goals, goal, row, path, radius)
+    goal, goals = path.position[-1], hand.path.goals
+    return Task(ARMS[HUMAN_PATHS], hand.obstacles, goals, goal, int(np.hypot(*(goals - goal).T).argmin()), path, radius)
