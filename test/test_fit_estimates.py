@@ -277,7 +277,7 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
 )
 def test_a_lower_coverage_is_told_in_one_sentence(held_out, before, after, words):
     fit = Fit(SEARCH_CONFIG, comparison={'inside_90': {'before': before, 'after': after}})
-    fit.scores = {'inside_all_90': dict(zip(('as given', 'without the recording'), held_out, strict=True))}
+    fit.found.scores = {'inside_all_90': dict(zip(('as given', 'without the recording'), held_out, strict=True))}
     found = find_lower_coverage(fit)
     assert len(found) == (words is not None) and all(each.endswith(words) for each in found)
 
@@ -305,9 +305,9 @@ def _make_recordings(endpoint, spread):
 def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoint, spread):
     recordings = _make_recordings(endpoint, spread)
     # 0.4, the given value, would be as good as 0.3 to within 2 nat
-    found, scores = fit_widening(recordings, replace_values(Config(), {'duration.spread': 0.9}))
+    found = fit_widening(recordings, replace_values(Config(), {'duration.spread': 0.9}))
     assert found.undetermined == {} or set(found.undetermined) == {'foc.process_noise'}
-    found = found.estimates
+    found, scores = found.estimates, found.scores
     assert found['foc.endpoint_stddev'].value == pytest.approx(endpoint, rel=0.4)
     assert found['duration.spread'].value == pytest.approx(spread, abs=0.11)
     for each in found.values():

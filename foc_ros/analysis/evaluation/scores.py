@@ -121,9 +121,9 @@ def summarise(scores: Scores) -> dict[str, Any]:
     return {
         **_compute_means(scores, np.ones(len(scores.recording), dtype=bool)),
         'expected_calibration_error': sum(errors) / len(scores.confidence),
-        'right_from_half_way': _mean(scores.correct[scores.progress >= 0.5]),
-        'leads_for_good_from': _mean(leads_from),
-        'leads_for_good_before_s': _mean(leads_before_s),
+        'right_from_half_way': find_mean(scores.correct[scores.progress >= 0.5]),
+        'leads_for_good_from': find_mean(leads_from),
+        'leads_for_good_before_s': find_mean(leads_before_s),
         'by_tenth': [_compute_means(scores, find_tenths(scores.progress) == number) for number in range(TENTHS)],
         'reliability': reliability,
     }
@@ -146,8 +146,8 @@ def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
             'from': each / BINS,
             'to': (each + 1) / BINS,
             'count': int(inside.sum()),
-            'confidence': _mean(scores.confidence[inside]),
-            'right': _mean(scores.correct[inside]),
+            'confidence': find_mean(scores.confidence[inside]),
+            'right': find_mean(scores.correct[inside]),
             'interval': compute_mean_interval(scores.correct[inside], scores.recording[inside]) if inside.any() else None,
         }
         for each in range(BINS)
@@ -159,15 +159,16 @@ def _compute_means(scores: Scores, chosen: NDArray[np.bool_]) -> dict[str, Any]:
     uniform = -np.log(scores.possible)
     return {
         'predictions': int(chosen.sum()),
-        'log_likelihood': _mean(scores.log_likelihood[chosen]),
-        'uniform': _mean(uniform[chosen]),
-        'gain': _mean((scores.log_likelihood - uniform)[chosen]),
-        'brier': _mean(scores.brier[chosen]),
-        'right': _mean(scores.correct[chosen]),
+        'log_likelihood': find_mean(scores.log_likelihood[chosen]),
+        'uniform': find_mean(uniform[chosen]),
+        'gain': find_mean((scores.log_likelihood - uniform)[chosen]),
+        'brier': find_mean(scores.brier[chosen]),
+        'right': find_mean(scores.correct[chosen]),
     }
 
 
-def _mean(values: Array) -> float | None:
+def find_mean(values: Array) -> float | None:
+    """Return the mean of values, None where there are none."""
     return float(values.mean()) if len(values) else None
 
 

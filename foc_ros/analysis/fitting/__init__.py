@@ -47,21 +47,19 @@ class Estimate:
         low, high = np.percentile(resampled, CENTRAL).tolist()
         return cls(name, value, min(low, value), max(high, value), how)
 
-    def as_json(self) -> dict[str, Any]:
-        """Return plain values."""
-        return {'value': self.value, 'interval': [self.low, self.high], 'how': self.how}
-
 
 @dataclass
 class Findings:
     """What one step of a fit found.
 
-    estimates by name; chosen: values that are no numbers; undetermined: why a parameter keeps its given value, by name; warnings.
+    estimates by name; chosen: values that are no numbers; undetermined: why a parameter keeps its given value, by name; scores:
+    as plain values; warnings.
     """
 
     estimates: dict[str, Estimate] = field(default_factory=dict)
     chosen: dict[str, str] = field(default_factory=dict)
     undetermined: dict[str, str] = field(default_factory=dict)
+    scores: dict[str, Any] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
     @property
@@ -79,6 +77,7 @@ class Findings:
         self.chosen |= later.chosen
         undetermined = self.undetermined | later.undetermined
         self.undetermined = {name: why for name, why in undetermined.items() if name not in self.values}
+        self.scores |= later.scores
         self.warnings += later.warnings
 
 
@@ -159,7 +158,7 @@ class SettingTable:
         for column in columns.tolist():
             value = self.settings[column][name]
             profile[value] = max(total[column], profile.get(value, -math.inf))
-        best, least, most = max(profile, key=lambda each: profile[each]), min(profile), max(profile)
+        best, least, most = max(profile, key=profile.__getitem__), min(profile), max(profile)
         variation = profile[best] - min(profile.values())
         if len(profile) == 1:
             return variation, ''

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, pow
 from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, interpolate_steps
 from foc_ros.analysis.evaluation.positions import choose_row, compute_log_densities, measure_inside
 from foc_ros.analysis.evaluation.questions import ask_main
+from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS
 from foc_ros.analysis.parallel import collect_all
@@ -56,20 +56,18 @@ hand in free motion; scatter of the end [m], of which Fitts' law expects 48 mm f
 NO_WIDENING: Setting = dict.fromkeys(WIDENINGS, 0.0)
 FEW_WIDENINGS = tuple(product((0.0, *PROCESS_NOISES[1::4]), (0.0, 3e-3, 8e-3, 24e-3, 72e-3), (0.0, 0.2, 0.4)))
 """Widenings whose best is good enough to compare predictions that differ in other parameters."""
-COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
-"""Time ahead and probability of the ellipses and regions whose coverage is reported."""
 
 
-def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> tuple[Findings, dict[str, Any]]:
-    """Return the parameters of the likelihood, from one replay of the recordings, and their scores.
+def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
+    """Return the parameters of the likelihood, from one replay of the recordings.
 
     Scores `ways`: mean log-likelihoods by how the setting was chosen, with at least three recordings also held out, by recording
-    and by the class taken. Empty where no class or goal is in question.
+    and by the class taken; none where no class or goal is in question.
     """
     questions = [ask_main(each) for each in recordings]
     if not any(questions):
         reason = 'no recording has an obstacle to pass on one of two sides, or a second goal'
-        return Findings(undetermined=dict.fromkeys(LIKELIHOODS, reason)), {}
+        return Findings(undetermined=dict.fromkeys(LIKELIHOODS, reason))
     before = flatten(config)
     given = {name: float(before[name]) for name in LIKELIHOODS}
     ahead = list_settings({name: (given[name], *tried) for name, tried in LIKELIHOODS.items()})
@@ -87,13 +85,13 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> t
         found.warnings.append(f'likelihood.beta: in {100 * missed:.0f} % of the predictions {words}')
     uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
     names = [each.name for each in recordings]
-    scores = {'uniform': float(np.mean(uniform))}
+    found.scores['ways'] = scores = {'uniform': float(np.mean(uniform))}
     scores |= {how: table.score(each) for how, each in table.list_choices(given, columns, names).items()}
     if is_cross_validated(recordings):
         taken = [each[0][1].answers[each[0][1].truth] if each else name for each, name in zip(questions, names, strict=True)]
         if len(set(taken)) > 1:
             scores['without its way'] = table.score(table.choose_held_out(columns, taken))
-    return found, {'ways': scores}
+    return found
 
 
 def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
@@ -101,8 +99,8 @@ def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
     return compute_log_likelihoods(questions, rule) / len(questions) if questions else np.full(len(rule.settings), np.nan)
 
 
-def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> tuple[Findings, dict[str, Any]]:
-    """Return the parameters that widen the covariance, from a replay with motor noise alone, and scores.
+def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
+    """Return the parameters that widen the covariance, from a replay with motor noise alone.
 
     Scores: mean log-densities and coverage by how the widening was chosen, with at least three recordings also held out.
     """
@@ -111,20 +109,21 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> tup
     settings = list_settings({name: (0.0, given[name], *tried) for name, tried in WIDENINGS.items()})
     widenings, rows = [tuple(each.values()) for each in settings], []
     for recording in recordings:
-        shares = [power_rule_shares(each, config.likelihood) for each in recording.observations]
-        pairs = zip(recording.observations, shares, strict=True)
-        densities = [compute_mean_densities(*pair, config, widenings) for pair in pairs]
+        densities = (
+            compute_mean_densities(each, power_rule_shares(each, config.likelihood), config, widenings)
+            for each in recording.observations
+        )
         known = [each for each in densities if each is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(settings), np.nan))
     table = SettingTable(np.array(rows), settings)
     found, columns = table.estimate(given, 'density of true positions')
     chosen = {'motor noise alone': np.zeros(len(recordings), dtype=np.intp)}
     chosen |= table.list_choices(given, columns, [each.name for each in recordings])
-    coverage = {name: compute_coverage(recordings, config, [widenings[each] for each in chosen[name]]) for name in chosen}
-    return found, {
-        'positions': {name: table.score(each) for name, each in chosen.items()},
-        **{kind: {name: each[kind] for name, each in coverage.items()} for kind in ('inside_90', 'inside_all_90')},
-    }
+    found.scores = {'positions': {name: table.score(each) for name, each in chosen.items()}, 'inside_90': {}, 'inside_all_90': {}}
+    for name, each in chosen.items():
+        for kind, share in compute_coverage(recordings, config, [widenings[column] for column in each]).items():
+            found.scores[kind][name] = share
+    return found
 
 
 def compute_mean_densities(
