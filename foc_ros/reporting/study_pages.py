@@ -261,14 +261,14 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
 
 
 def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> None:
-    everything = np.concatenate([task.path.position, task.goals, *(each.position for each in trials.values())])
+    everything = np.concatenate([task.path[:, 0], task.goals, *(each.position for each in trials.values())])
     (left, low), (right, high) = (everything.min(axis=0) - 0.04).tolist(), (everything.max(axis=0) + 0.04).tolist()
     draw_scene(axes, task.obstacles, task.goals, (left, right, low, high))
-    axes.plot(*task.path.position.T, color='black', linestyle='--', linewidth=1.0, label='intended')
+    axes.plot(*task.path[:, 0].T, color='black', linestyle='--', linewidth=1.0, label='intended')
     for number, (rule, trial) in enumerate(trials.items()):
         look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
         axes.plot(*trial.position.T, label=rule, **look)
-        touching = trial.position[trial.find_collisions(task)]
+        touching = trial.position[trial.measure_clearances(task) < 0.0]
         axes.plot(*touching.T, linestyle='', marker='x', markersize=4, color=look['color'])
         if rule == FOC:
             rows = np.linspace(0, len(trial.position) - 1, 24).astype(int)
