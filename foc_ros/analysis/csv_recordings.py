@@ -5,22 +5,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from foc_ros.core.errors import FocError, RecordingError, collect, warn
+from foc_ros.core.errors import FocError, RecordingError, collect, join_errors, warn
 from foc_ros.core.types import NANOSECONDS, Array
-from foc_ros.io.bags import TYPESTORE
+from foc_ros.io import topics
+from foc_ros.io.bags import TYPESTORE, Item
 from foc_ros.io.csv_tables import Column, Row, parse_rows, read_rows
 from foc_ros.ros.messages.encode_inputs import encode_boxes, encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 
-from .scenes import POSITION, RecordedScene, check_not_empty, read_recording
+from .scenes import POSITION, FindScene, RecordedScene, check_not_empty, read_recording
 
 FRAME = 'world'
 EPOCH_NS = NANOSECONDS
@@ -31,28 +32,83 @@ Doubt = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
-class Movement:
-    """One recording: stamps [ns] that never fall, and positions (n, 3) [m]."""
+class TableRecording:
+    """One recording of a table: stamps [ns] that never fall, positions (n, 3) [m], and the scene."""
 
     name: str
     stamps_ns: tuple[int, ...]
     positions: Array
+    scene: RecordedScene
+
+    @property
+    def goal(self) -> int | None:
+        """Row of the goal that was reached, None where no table says it."""
+        return self.scene.goal
+
+    def items(self) -> Iterator[Item]:
+        """Yield the messages that `convert` writes, in the order of their stamps."""
+        types, boxes, scene = RosbagsTypes(TYPESTORE), self.scene.find_boxes(self.positions), self.scene
+
+        def list_scenes() -> Iterator[tuple[int, str, Any]]:
+            # twice a second, for the first time before the first hand pose
+            for stamp_ns in range(self.stamps_ns[0] - NANOSECONDS // 10, self.stamps_ns[-1] + 1, NANOSECONDS // 2):
+                if boxes:
+                    yield stamp_ns, topics.MARKERS, encode_boxes(types, stamp_ns, FRAME, boxes)
+                else:
+                    yield stamp_ns, topics.CLOUD, encode_obstacles(types, stamp_ns, FRAME, scene.obstacles)
+                if scene.goals is not None:
+                    yield stamp_ns, topics.GOALS, encode_goals(types, stamp_ns, FRAME, scene.goals)
+
+        poses = (
+            (stamp_ns, topics.HAND, encode_hand_pose(types, stamp_ns, FRAME, position))
+            for stamp_ns, position in zip(self.stamps_ns, self.positions, strict=True)
+        )
+        for stamp_ns, role, message in merge(list_scenes(), poses, key=lambda each: each[0]):
+            yield Item(role, f'/{role}', stamp_ns, message, b'')
 
 
-def read_movements(file: Path, errors: list[FocError]) -> dict[str, Movement | RecordingError]:
-    """Return the recordings in the order of their first rows, or the error of their rows; append those of the table."""
-    found: dict[str, list[Row]] = {}
-    rows = read_rows(file, ('recording', 't_s', 'x_m', 'y_m'), ('z_m',))
-    known = len(errors)
+@dataclass(frozen=True)
+class BrokenRecording:
+    """A recording whose rows of a table cannot be used; other recordings are not affected."""
+
+    name: str
+    error: RecordingError
+    goal: ClassVar[None] = None
+
+    def items(self) -> Iterator[Item]:
+        """Raise the error of the rows."""
+        raise self.error
+
+
+def read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> dict[str, TableRecording | BrokenRecording]:
+    """Return the recordings of a table in the order of their first rows, with the scenes that are read; data: for warnings.
+
+    Raises one RecordingError for the errors of all tables if a table has no scenes or no recording that can be used.
+    """
+    errors: list[FocError] = []
+    find, found = collect(errors, read), dict[str, list[Row]]()
+    known, rows = len(errors), read_rows(file, ('recording', 't_s', 'x_m', 'y_m'), ('z_m',))
     collect(errors, parse_rows, rows, lambda row: found.setdefault(read_recording(row), []).append(row))
     if len(errors) == known:
         collect(errors, check_not_empty, file, found)
     _warn_once_for_each(file, ((name, doubt) for name, rows in found.items() if (doubt := _find_doubt(rows))))
-    return {name: _parse_movement(name, rows) for name, rows in found.items()}
+    samples = {name: _parse_samples(rows) for name, rows in found.items()}
+    failures = [each for each in samples.values() if isinstance(each, RecordingError)]
+    if find is None or errors or len(failures) == len(found):
+        raise join_errors([*errors, *failures])
+    recordings: dict[str, TableRecording | BrokenRecording] = {}
+    for name, each in samples.items():
+        if isinstance(each, RecordingError):
+            recordings[name] = BrokenRecording(name, each)
+        else:
+            stamps_ns = tuple(EPOCH_NS + round(t_s * NANOSECONDS) for t_s in each[:, 0].tolist())
+            recordings[name] = TableRecording(name, stamps_ns, each[:, 1:], find(name))
+    _warn_of_far_scenes(data, [each for each in recordings.values() if isinstance(each, TableRecording)])
+    return recordings
 
 
-def _parse_movement(name: str, table: Iterable[Row]) -> Movement | RecordingError:
-    """Return one recording from its rows, or the error of a cell out of bounds or of time that runs backward."""
+def _parse_samples(table: Iterable[Row]) -> Array | RecordingError:
+    """Return time [s] and position [m] of each row (n, 4), or the error of a cell out of bounds or of time that runs backward."""
     samples: list[list[float]] = []
 
     def parse(row: Row) -> None:
@@ -64,7 +120,7 @@ def _parse_movement(name: str, table: Iterable[Row]) -> Movement | RecordingErro
         parse_rows(table, parse)
     except RecordingError as error:
         return error
-    return Movement(name, tuple(EPOCH_NS + round(each[0] * NANOSECONDS) for each in samples), np.array(samples)[:, 1:])
+    return np.array(samples)
 
 
 def _find_doubt(rows: Sequence[Row]) -> Doubt | None:
@@ -90,22 +146,22 @@ def _find_doubt(rows: Sequence[Row]) -> Doubt | None:
     return 'the position', f'seems to be in {_find_nearest_unit(LENGTH_UNITS, speed, 0.5)}', f'the hand moves at {speed:.3g} m/s'
 
 
-def warn_of_far_scenes(file: Path, recorded: Iterable[tuple[Movement, RecordedScene]]) -> None:
+def _warn_of_far_scenes(file: Path, recordings: Iterable[TableRecording]) -> None:
     """Warn of recordings whose goals or obstacles are all so far from the hand that they cannot be in m; once for each kind.
 
     Positions that are in another unit themselves give no second warning here: their movement is larger by the same factor.
     """
     doubts: list[tuple[str, Doubt]] = []
-    for movement, scene in recorded:
-        low, high = movement.positions.min(axis=0), movement.positions.max(axis=0)
+    for each in recordings:
+        low, high = each.positions.min(axis=0), each.positions.max(axis=0)
         extent = max(float(np.linalg.norm(high - low)), 0.1)
-        for kind, rows in (('goals', scene.goals), ('obstacles', scene.obstacles)):
+        for kind, rows in (('goals', each.scene.goals), ('obstacles', each.scene.obstacles)):
             places = np.array([row[:3] for row in (() if rows is None else rows)]).reshape(-1, 3)
             gap = float(np.linalg.norm(places - np.clip(places, low, high), axis=1).min(initial=math.inf))
             if max(10.0, 20.0 * extent) < gap < math.inf:
                 words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, gap, extent)}'
                 reason = f'the nearest is {gap:.3g} m from the movement of the hand'
-                doubts.append((movement.name, (f'the {kind}', words, reason)))
+                doubts.append((each.name, (f'the {kind}', words, reason)))
     _warn_once_for_each(file, doubts)
 
 
@@ -122,24 +178,3 @@ def _warn_once_for_each(file: Path, doubts: Iterable[tuple[str, Doubt]]) -> None
 def _find_nearest_unit(units: Mapping[str, float], value: float, usual: float) -> str:
     """Return the unit in which a value is nearest to a usual one, by their ratio."""
     return min(units, key=lambda each: abs(math.log(value * units[each] / usual)))
-
-
-def recorded_messages(movement: Movement, scene: RecordedScene) -> Iterator[tuple[int, str, Any]]:
-    """Yield the messages of a bag as (stamp [ns], topic, message), in the order of their stamps."""
-    types, boxes = RosbagsTypes(TYPESTORE), scene.find_boxes(movement.positions)
-
-    def list_scenes() -> Iterator[tuple[int, str, Any]]:
-        # twice a second, for the first time before the first hand pose
-        for stamp_ns in range(movement.stamps_ns[0] - NANOSECONDS // 10, movement.stamps_ns[-1] + 1, NANOSECONDS // 2):
-            if boxes:
-                yield stamp_ns, '/obstacle_markers', encode_boxes(types, stamp_ns, FRAME, boxes)
-            else:
-                yield stamp_ns, '/obstacles', encode_obstacles(types, stamp_ns, FRAME, scene.obstacles)
-            if scene.goals is not None:
-                yield stamp_ns, '/goals', encode_goals(types, stamp_ns, FRAME, scene.goals)
-
-    poses = (
-        (stamp_ns, '/hand_pose', encode_hand_pose(types, stamp_ns, FRAME, position))
-        for stamp_ns, position in zip(movement.stamps_ns, movement.positions, strict=True)
-    )
-    return merge(list_scenes(), poses, key=lambda each: each[0])

@@ -5,18 +5,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
-from foc_ros.core.errors import FocError, InputError, RecordingError, collect, collect_all, join_errors
+from foc_ros.core.errors import InputError, RecordingError, join_errors
 from foc_ros.io.bags import BagReader, BagWriter, Item, check_bag, is_bag_file
 from foc_ros.io.terminal import show_progress
 
-from .csv_recordings import Movement, read_movements, recorded_messages, warn_of_far_scenes
-from .scenes import FindScene, RecordedScene, read_box_scenes, read_scenes
+from .csv_recordings import BrokenRecording, TableRecording, read_with_scenes
+from .scenes import read_box_scenes, read_scenes
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
 SCENES, TRIALS = 'scenes.csv', 'trials.csv'
@@ -36,32 +36,7 @@ class BagRecording:
             yield from reader
 
 
-@dataclass(frozen=True)
-class TableRecording:
-    """One recording of a table; movement: the movement, or the error of its rows; other recordings are not affected."""
-
-    name: str
-    movement: Movement | RecordingError
-    scene: RecordedScene
-
-    @property
-    def goal(self) -> int | None:
-        """Row of the goal that was reached, None where no table says it."""
-        return self.scene.goal
-
-    def read_movement(self) -> Movement:
-        """Return the movement of the hand; raises RecordingError."""
-        if isinstance(self.movement, RecordingError):
-            raise self.movement
-        return self.movement
-
-    def items(self) -> Iterator[Item]:
-        """Yield the messages that `convert` would write; raises RecordingError."""
-        for stamp_ns, topic, message in recorded_messages(self.read_movement(), self.scene):
-            yield Item(topic.removeprefix('/'), topic, stamp_ns, message, b'')
-
-
-Recording = BagRecording | TableRecording
+Recording = BagRecording | TableRecording | BrokenRecording
 
 
 def find_recordings(data: Path) -> dict[str, Recording]:
@@ -94,32 +69,14 @@ def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recordin
     return groups
 
 
-def read_tables(data: Path) -> dict[str, TableRecording]:
-    """Return the recordings of a folder of tables by name; raises RecordingError, see :func:`_read_with_scenes`."""
-
-    def read() -> FindScene:
-        trials, obstacles = data / TRIALS, data / OBSTACLES
-        if (data / SCENES).exists():
-            return read_box_scenes(data / SCENES, trials if trials.exists() else None)
-        return read_scenes(obstacles if obstacles.exists() else None, data / GOALS)
-
-    return _read_with_scenes(data / RECORDINGS, read, data)
-
-
-def _read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> dict[str, TableRecording]:
-    """Return the recordings of a table with their scenes; data: what a warning names.
-
-    Raises one RecordingError for the errors of all tables if a table has no scenes or no recording that can be used.
-    """
-    errors: list[FocError] = []
-    find = collect(errors, read)
-    movements = read_movements(file, errors)
-    failures = [each for each in movements.values() if isinstance(each, RecordingError)]
-    if find is None or errors or len(failures) == len(movements):
-        raise join_errors([*errors, *failures])
-    found = {name: TableRecording(name, movement, find(name)) for name, movement in movements.items()}
-    warn_of_far_scenes(data, [(each.movement, each.scene) for each in found.values() if isinstance(each.movement, Movement)])
-    return found
+def read_tables(data: Path) -> dict[str, TableRecording | BrokenRecording]:
+    """Return the recordings of a folder of tables by name; raises RecordingError, see :func:`read_with_scenes`."""
+    scenes, trials, obstacles = data / SCENES, data / TRIALS, data / OBSTACLES
+    if scenes.exists():
+        read = partial(read_box_scenes, scenes, trials if trials.exists() else None)
+    else:
+        read = partial(read_scenes, obstacles if obstacles.exists() else None, data / GOALS)
+    return read_with_scenes(data / RECORDINGS, read, data)
 
 
 def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, output: Path) -> str:
@@ -130,23 +87,25 @@ def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, outp
     """
     if obstacles is None and not table.is_dir():
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
-    found = read_tables(table) if obstacles is None else _read_with_scenes(table, partial(read_scenes, obstacles, goals), table)
-    movements = collect_all(TableRecording.read_movement, [(each,) for each in found.values()])
-    bags: dict[Path, Movement] = {}
-    for movement in movements:
-        name = re.sub(r'[^A-Za-z0-9._-]', '_', movement.name).lstrip('.-') or '_'  # valid on any file system
+    found = read_tables(table) if obstacles is None else read_with_scenes(table, partial(read_scenes, obstacles, goals), table)
+    broken = [each.error for each in found.values() if isinstance(each, BrokenRecording)]
+    if broken:
+        raise join_errors(broken)
+    recordings = [each for each in found.values() if isinstance(each, TableRecording)]
+    bags: dict[Path, TableRecording] = {}
+    for each in recordings:
+        name = re.sub(r'[^A-Za-z0-9._-]', '_', each.name).lstrip('.-') or '_'  # valid on any file system
         if (bag := output / name) in bags:
-            raise RecordingError(f'recordings {bags[bag].name!r} and {movement.name!r} would both be written to {name}')
-        bags[bag] = movement
+            raise RecordingError(f'recordings {bags[bag].name!r} and {each.name!r} would both be written to {name}')
+        bags[bag] = each
     for bag in bags:
         if bag.exists():
             raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
-    for bag, movement in show_progress(bags.items(), 'convert', len(bags)):
+    for bag, each in show_progress(bags.items(), 'convert', len(bags)):
         with BagWriter(bag) as writer:
-            for stamp_ns, topic, message in recorded_messages(movement, found[movement.name].scene):
-                writer.write(topic, message, stamp_ns)
-    hands = sum(len(each.stamps_ns) for each in movements)
-    scenes = [(each, found[each.name].scene) for each in movements]
-    numbers = [len(scene.find_boxes(each.positions) or scene.obstacles) for each, scene in scenes]
+            for item in each.items():
+                writer.write(item.topic, item.message, item.log_ns)
+    hands = sum(len(each.stamps_ns) for each in recordings)
+    numbers = [len(each.scene.find_boxes(each.positions) or each.scene.obstacles) for each in recordings]
     count = ' to '.join(str(each) for each in sorted({min(numbers), max(numbers)}))
     return f'{len(bags)} bags with {hands} hand poses and {count} obstacles written to {output}'

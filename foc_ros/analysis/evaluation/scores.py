@@ -21,8 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.analysis.csv_recordings import TableRecording
 from foc_ros.analysis.intervals import compute_mean_interval
-from foc_ros.analysis.recordings import Recording, TableRecording
+from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.scenes import NO_GOAL
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.types import Array
@@ -180,7 +181,7 @@ def leave_goals_out(recordings: Mapping[str, Recording]) -> dict[str, Recording]
             continue
         goal = each.goal
         if goal is None:
-            goal = find_reached_goal(each.read_movement().positions[:, :2], each.scene.goals[:, :2])[0]
+            goal = find_reached_goal(each.positions[:, :2], each.scene.goals[:, :2])[0]
         if goal is not None:
             found[name] = replace(each, scene=replace(each.scene, goals=np.delete(each.scene.goals, goal, axis=0), goal=NO_GOAL))
     return found

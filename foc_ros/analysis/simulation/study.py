@@ -249,5 +249,8 @@ def make_tables(cells: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, tuple
     for operator in dict.fromkeys(cell['operator'] for cell in cells):
         rows = [cell for cell in cells if cell['operator'] == operator]
         title = f'{operator}: mean of {rows[0]["trials"]} paired trials, and bootstrap interval of 95 %'
-        lines = [(cell['assistance'], *(show(cell, name, factor, digits) for name, (_, factor, digits) in COLUMNS.items())) for cell in rows]
+        styles = COLUMNS.items()
+        lines = [
+            (cell['assistance'], *(show(cell, name, factor, digits) for name, (_, factor, digits) in styles)) for cell in rows
+        ]
         yield title, ('', *(heading for heading, _, _ in COLUMNS.values())), lines
