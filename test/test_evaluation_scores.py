@@ -19,8 +19,8 @@ from foc_ros.analysis.evaluation.baselines import (
     guess_shortest_path,
     power_rule_shares,
 )
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.evaluation.positions import SINGER_SETTINGS, compute_position_scores, find_denser_share, forecast_singer
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.evaluation.report import make_verdict
 from foc_ros.analysis.evaluation.scores import (
     Scores,

@@ -10,9 +10,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from foc_ros.core.config import Config
+from foc_ros.analysis.recordings import Recording
+from foc_ros.core.classes.library import Demonstration
+from foc_ros.core.config import ONLINE, Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import MessageError
+from foc_ros.core.errors import MessageError, RecordingError, warn
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
@@ -198,3 +200,22 @@ class GuidanceReplay:
             if output.status is GuidanceStatus.STALE and not output.force.any() and not output.authority:
                 self._next_ns = max(self._next_ns, end_ns)
                 self._state = replace(self._state, t=(self._next_ns - self._first_ns) / NANOSECONDS)
+
+
+def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration, ...]:
+    """Return the movements of a recording that end at a goal (`foc_ros.core.learning.movements`), the last ones.
+
+    Raises RecordingError where the recording cannot be read or contains none.
+    """
+    replayed = Replay(config.with_values({'experience.learning': ONLINE, 'homotopy.library': ''}))
+    for _ in replayed.take(recording.items()):
+        pass
+    movements = replayed.pipeline.learnt.movements.finish()
+    losses = replayed.describe_losses()
+    if not movements.learnt:
+        standing = f'no movement: the hand was never faster than {config.estimator.onset_speed:g} m/s'
+        unused = losses or replayed.pipeline.not_ready_reason()
+        raise RecordingError(f'{recording.name}: {movements.refusal or unused or standing}')
+    if losses:
+        warn(losses)
+    return movements.learnt

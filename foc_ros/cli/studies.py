@@ -8,6 +8,7 @@ import json as json_format
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +36,12 @@ def learn(data: Data, /, *, output: Path, params: options.Params = options.DEFAU
     recordings = find_recordings(data)
     if len(recordings) > MOST_WAYS:
         raise InputError(f'{data}', f'at most {MOST_WAYS} recordings', len(recordings))
-    from foc_ros.analysis.learn import learn_recordings
+    from foc_ros.analysis.parallel import collect
+    from foc_ros.analysis.replay import learn_recording
     from foc_ros.io.class_library import save_library
 
-    learnt, failed = learn_recordings(recordings, params)
+    movements, failed = collect(partial(learn_recording, config=params), list(recordings.items()), 'learn')
+    learnt = [each for found in movements for each in found]
     if not learnt:
         raise RecordingError(f'{data}: no recording could be learnt: {next(iter(failed.values()))}')
     save_library(output, learnt)

@@ -13,7 +13,7 @@ import numpy as np
 
 from foc_ros.analysis.evaluation import report as evaluation
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED, UNIFORM
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.scores import TENTHS
 from foc_ros.analysis.fitting import fit as fitting
 from foc_ros.analysis.recordings import Recording

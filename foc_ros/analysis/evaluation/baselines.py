@@ -31,8 +31,7 @@ from foc_ros.core.registry import Registry
 from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import Array, Record
 
-from .observations import Observation, ObservedRecording
-from .questions import GOAL, Answer, Question
+from .observations import GOAL, Answer, Observation, ObservedRecording, Question
 
 UNCERTAINTY = 0.01
 TIE = 1e-12
@@ -132,7 +131,7 @@ def _find_movement(observation: Observation) -> tuple[Array, Array]:
     if observation.movement_age_s == 0.0:
         state[1:] = 0.0
     times_s = np.full(len(observation.goals), candidates.time_s.max())
-    times_s[candidates.goal] = candidates.time_s
+    times_s[candidates.goal[::-1]] = candidates.time_s[::-1]  # its first candidate decides
     return state, times_s
 
 

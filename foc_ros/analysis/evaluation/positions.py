@@ -31,8 +31,7 @@ from scipy.special import logsumexp
 from foc_ros.core.types import NANOSECONDS, Array
 
 from .baselines import compute_straight_costs, compute_straight_positions
-from .observations import Observation, ObservedRecording
-from .questions import ask_main
+from .observations import Observation, ObservedRecording, ask_main
 from .scores import choose_held_out
 from .truth import HORIZONS, HORIZONS_S, TIMES_S
 

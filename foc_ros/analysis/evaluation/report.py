@@ -20,9 +20,8 @@ from foc_ros.core.types import Array
 from foc_ros.io.csv_tables import read_rows
 
 from .baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
-from .observations import Observation, ObservedRecording
+from .observations import GAP, GOAL, PATH_CLASS, Observation, ObservedRecording, Questions, ask_all
 from .positions import compute_position_scores
-from .questions import GAP, GOAL, PATH_CLASS, Questions, ask_all
 from .scores import TENTHS, Scores, choose_held_out, compare_scores, compute_log_likelihoods, score_forecasts, summarise
 from .truth import HORIZONS_S
 

@@ -29,8 +29,7 @@ from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.types import Array
 
 from .baselines import Baseline, Forecast
-from .observations import Observation, ObservedRecording
-from .questions import GAP, Question, Questions
+from .observations import GAP, Observation, ObservedRecording, Question, Questions
 
 TENTHS, BINS = 10, 10
 

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import Forecast
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.observations import GAP, ObservedRecording, ask_all, ask_main, observe
 from foc_ros.analysis.evaluation.positions import compute_position_scores
-from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
 from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S, OURS
 from foc_ros.analysis.evaluation.scores import find_mean, score_forecasts
 from foc_ros.analysis.evaluation.truth import RecordedHand, read_hand

@@ -16,9 +16,8 @@ from itertools import product
 import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, power_rule_shares
-from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, interpolate_steps
+from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, ask_main, interpolate_steps
 from foc_ros.analysis.evaluation.positions import choose_row, compute_log_densities, measure_inside
-from foc_ros.analysis.evaluation.questions import ask_main
 from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from foc_ros.analysis.evaluation.baselines import Forecast, power_rule_shares
-from foc_ros.analysis.evaluation.observations import observe
-from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
+from foc_ros.analysis.evaluation.observations import GAP, ask_all, ask_main, observe
 from foc_ros.analysis.evaluation.truth import RecordedHand
 from foc_ros.analysis.intervals import SEED, resample
 from foc_ros.analysis.parallel import collect
