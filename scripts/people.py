@@ -91,7 +91,7 @@ def format_goals(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
     """
     scores = score(recordings, GOAL)
     point = np.round(scores.progress * 10.0)
-    found = summarise(Scores(*(each[np.isin(point, POINTS)] for each in scores)))
+    found = summarise(scores.take(np.isin(point, POINTS)))
     gain, right = (
         np.array([values[point == each].mean() for each in POINTS])
         for values in (scores.log_likelihood + np.log(scores.possible), scores.correct)

@@ -34,7 +34,6 @@ from foc_ros.core.types import Array, Record
 from .observations import GOAL, Answer, Observation, ObservedRecording, Question
 
 UNCERTAINTY = 0.01
-TIE = 1e-12
 PUBLISHED, REFITTED, PLAIN, UNIFORM, BOLTZMANN = 'foc', 'foc, held out', 'foc, plain rule', 'uniform', 'Boltzmann'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
@@ -68,24 +67,9 @@ class Forecast(Record):
         each = rest / question.possible
         return cls((1.0 - rest) * shares + each * question.is_possible, each)
 
-    @classmethod
-    def uniform(cls, question: Question) -> Forecast:
-        """Give all possible answers the same probability."""
-        return cls.from_answer_shares(np.zeros(len(question.answers)), question, 1.0)
-
     def true_probability(self, question: Question) -> float:
         """Return the probability of the true answer."""
         return float(self.probability[question.truth])
-
-    def confidence(self) -> float:
-        """Return the probability of the likeliest answer."""
-        return float(max(self.probability.max(), self.each_other))
-
-    def correctness(self, question: Question) -> float:
-        """Return 1 where the likeliest answer is true, else 0; each of several equally likely answers counts its part."""
-        is_likeliest = self.probability >= self.confidence() - TIE
-        unlisted = question.unlisted if self.each_other >= self.confidence() - TIE else 0
-        return float(is_likeliest[question.truth] / (is_likeliest.sum() + unlisted))
 
 
 def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Array:
@@ -216,7 +200,7 @@ def forecast_published(observation: Observation, question: Question, _: None) ->
 
 def forecast_uniform(_: Observation, question: Question, __: None) -> Forecast:
     """Give all possible answers the same probability."""
-    return Forecast.uniform(question)
+    return Forecast.from_answer_shares(np.zeros(len(question.answers)), question, 1.0)
 
 
 def forecast_straight_minimum_jerk(observation: Observation, question: Question, setting: tuple[float, float]) -> Forecast:

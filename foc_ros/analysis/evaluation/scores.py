@@ -32,6 +32,7 @@ from .baselines import Baseline, Forecast
 from .observations import GAP, Observation, ObservedRecording, Question, Questions
 
 TENTHS, BINS = 10, 10
+TIE = 1e-12
 
 
 def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
@@ -71,6 +72,22 @@ class Scores(NamedTuple):
     correct: Array
     brier: Array
 
+    def take(self, rows: NDArray[Any]) -> Scores:
+        """Return the scores of some forecasts, by their numbers or by a mask."""
+        return Scores(*(each[rows] for each in self))
+
+    def average(self) -> dict[str, Any]:
+        """Return the number of forecasts and the means of their scores, None where there are none."""
+        uniform = -np.log(self.possible)
+        return {
+            'predictions': len(self.possible),
+            'log_likelihood': find_mean(self.log_likelihood),
+            'uniform': find_mean(uniform),
+            'gain': find_mean(self.log_likelihood - uniform),
+            'brier': find_mean(self.brier),
+            'right': find_mean(self.correct),
+        }
+
 
 def score_forecasts(rows: Iterable[tuple[int, Observation, Question, Forecast]]) -> Scores:
     """Score forecasts, given with the number of the recording and what was asked.
@@ -79,12 +96,13 @@ def score_forecasts(rows: Iterable[tuple[int, Observation, Question, Forecast]])
     """
     scored = []
     for number, observation, question, forecast in rows:
-        truth, is_true = observation.truth, np.arange(len(question.answers)) == question.truth
-        # the squared error of the probabilities, summed over all possible answers (Brier 1950)
-        brier = ((forecast.probability - is_true) ** 2).sum() + question.unlisted * forecast.each_other**2
-        progress = truth.approach if question.name == GAP else truth.progress
-        log_likelihood = np.log(forecast.true_probability(question))
-        confidence, correct = forecast.confidence(), forecast.correctness(question)
+        truth, progress = observation.truth, observation.truth.approach if question.name == GAP else observation.truth.progress
+        p, other, is_true = forecast.probability, forecast.each_other, np.arange(len(question.answers)) == question.truth
+        confidence = max(p.max(), other)
+        likeliest = (p >= confidence - TIE).sum() + question.unlisted * (other >= confidence - TIE)
+        correct = (p[question.truth] >= confidence - TIE) / likeliest
+        brier = ((p - is_true) ** 2).sum() + question.unlisted * other**2  # Brier 1950
+        log_likelihood = np.log(p[question.truth])
         scored.append((number, progress, truth.left_s, question.possible, log_likelihood, confidence, correct, brier))
     return Scores(*np.array(scored, dtype=float).reshape(-1, len(Scores._fields)).T)
 
@@ -109,22 +127,21 @@ def summarise(scores: Scores) -> dict[str, Any]:
 
     The expected calibration error is the mean distance of confidence and share correct over the bins (Naeini et al. 2015).
     """
-    reliability = compute_reliability(scores)
+    reliability, tenths, leads = compute_reliability(scores), find_tenths(scores.progress), []
     errors = [each['count'] * abs(each['confidence'] - each['right']) for each in reliability if each['count']]
-    leads = []  # from when on the likeliest answer is correct to the end of a recording; 1 and 0 where the last one is wrong
     for recording in np.unique(scores.recording):
-        rows = np.flatnonzero(scores.recording == recording)
-        wrong = np.flatnonzero(scores.correct[rows] < 1.0)
-        leading = rows[int(wrong[-1]) + 1 :] if len(wrong) else rows
-        leads.append((scores.progress[leading[0]], scores.left_s[leading[0]]) if len(leading) else (1.0, 0.0))
+        # from when on the likeliest answer is correct to the end of a recording; 1 and 0 where the last one is wrong
+        own = scores.take(scores.recording == recording)
+        leading = own.take(np.cumprod(own.correct[::-1] == 1.0)[::-1] == 1)
+        leads.append((leading.progress[0], leading.left_s[0]) if len(leading.progress) else (1.0, 0.0))
     leads_from, leads_before_s = np.array(leads).T
     return {
-        **_compute_means(scores, np.ones(len(scores.recording), dtype=bool)),
+        **scores.average(),
         'expected_calibration_error': sum(errors) / len(scores.confidence),
         'right_from_half_way': find_mean(scores.correct[scores.progress >= 0.5]),
         'leads_for_good_from': find_mean(leads_from),
         'leads_for_good_before_s': find_mean(leads_before_s),
-        'by_tenth': [_compute_means(scores, find_tenths(scores.progress) == number) for number in range(TENTHS)],
+        'by_tenth': [scores.take(tenths == number).average() for number in range(TENTHS)],
         'reliability': reliability,
     }
 
@@ -145,26 +162,14 @@ def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
         {
             'from': each / BINS,
             'to': (each + 1) / BINS,
-            'count': int(inside.sum()),
-            'confidence': find_mean(scores.confidence[inside]),
-            'right': find_mean(scores.correct[inside]),
-            'interval': compute_mean_interval(scores.correct[inside], scores.recording[inside]) if inside.any() else None,
+            'count': len(own.correct),
+            'confidence': find_mean(own.confidence),
+            'right': find_mean(own.correct),
+            'interval': compute_mean_interval(own.correct, own.recording) if len(own.correct) else None,
         }
         for each in range(BINS)
-        for inside in [number == each]
+        for own in [scores.take(number == each)]
     ]
-
-
-def _compute_means(scores: Scores, chosen: NDArray[np.bool_]) -> dict[str, Any]:
-    uniform = -np.log(scores.possible)
-    return {
-        'predictions': int(chosen.sum()),
-        'log_likelihood': find_mean(scores.log_likelihood[chosen]),
-        'uniform': find_mean(uniform[chosen]),
-        'gain': find_mean((scores.log_likelihood - uniform)[chosen]),
-        'brier': find_mean(scores.brier[chosen]),
-        'right': find_mean(scores.correct[chosen]),
-    }
 
 
 def find_mean(values: Array) -> float | None:
@@ -193,37 +198,34 @@ def score_other_goal(
 
     announced, left_out: the same recordings with all goals and without the right one; prior: `likelihood.other_goal`.
     """
-    without = {each.name: {seen.stamp_ns: seen.other for seen in each.observations} for each in left_out}
+    without = {(each.name, seen.stamp_ns): seen.other for each in left_out for seen in each.observations}
     rows = []
     for recording in announced:
-        stamps = without.get(recording.name, {})
-        seen = [each for each in recording.observations if each.stamp_ns in stamps]
-        half = next((row for row, each in enumerate(seen) if each.truth.progress >= 0.5), len(seen) - 1)
-        rows += [(each.other, stamps[each.stamp_ns], row == half) for row, each in enumerate(seen)]
+        seen = [each for each in recording.observations if (recording.name, each.stamp_ns) in without]
+        half = next((each for each in seen if each.truth.progress >= 0.5), seen[-1] if seen else None)
+        rows += [(each.other, without[recording.name, each.stamp_ns], each is half) for each in seen]
     if not rows or not prior:
         return None
+    from scipy.stats import mannwhitneyu  # not before: worker processes do without its 30 MB
+
+    def measure_area(chosen: NDArray[np.bool_]) -> float:
+        """Return the probability that a share where it is right is larger than one where it is wrong, a tie counting half."""
+        return float(mannwhitneyu(right[chosen], wrong[chosen]).statistic) / int(chosen.sum()) ** 2
+
     wrong, right, is_half = np.array(rows, dtype=float).T
-    half_way = is_half > 0.0
     # the calibration error over bins of the share, where the right ones have the weight `prior` in all
     share, weight = np.concatenate([wrong, right]), np.repeat([(1.0 - prior) / len(wrong), prior / len(right)], len(wrong))
     number = np.minimum((share * BINS).astype(int), BINS - 1)
     expected = np.bincount(number, weight * share, BINS)
     happened = np.bincount(number[len(wrong) :], weight[len(wrong) :], BINS)
     return {
-        'area_under_curve_half_way': _measure_area(wrong[half_way], right[half_way]),
-        'area_under_curve': _measure_area(wrong, right),
+        'area_under_curve_half_way': measure_area(is_half == 1.0),
+        'area_under_curve': measure_area(is_half >= 0.0),
         'calibration_error': float(np.abs(expected - happened).sum()),
         'loss': float(-np.log1p(-wrong).mean()),
         'share': float(wrong.mean()),
         'share_left_out': float(right.mean()),
     }
-
-
-def _measure_area(wrong: Array, right: Array) -> float:
-    """Return the probability that a share where it is right is larger than one where it is wrong, a tie counting half."""
-    from scipy.stats import mannwhitneyu  # not before: worker processes do without its 30 MB
-
-    return float(mannwhitneyu(right, wrong).statistic) / (len(wrong) * len(right))
 
 
 def describe_other_goal(scores: Mapping[str, Any]) -> str:
