@@ -65,7 +65,7 @@ class Misled(Assistance):
 
 
 def test_a_wrong_way_costs_what_the_operator_needs_more_than_alone():
-    (pair,) = make_pairs(['noisy'], ['misled'], 1, 3)
+    ((_, pair),) = make_pairs(['noisy'], ['misled'], 1, 3)
     measures = run_pair(pair, QUICK, {'none': Assistance, 'misled': Misled}).measures
     for harm, name in (('wrong_way_s', 'completion_s'), ('wrong_way_effort', 'effort')):
         assert measures['misled'][harm] == measures['misled'][name] - measures['none'][name] > 0.0

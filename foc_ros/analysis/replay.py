@@ -13,7 +13,6 @@ from pathlib import Path
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import ONLINE, Config
-from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import MessageError, RecordingError, warn
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.pipeline import Pipeline
@@ -45,14 +44,12 @@ class Step:
 class Replay:
     """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
 
-    Transforms of the recording are applied as the node applies those of tf2, by the log times of the messages. budget_s: time
-    limit of each prediction [s], with which results depend on the speed of the machine; None for none. Raises RecordingError or
-    InputError where the class library cannot be used.
+    Transforms of the recording are applied as the node applies those of tf2, by the log times of the messages. Raises
+    RecordingError or InputError where the class library cannot be used.
     """
 
-    def __init__(self, config: Config, budget_s: float | None = None) -> None:
+    def __init__(self, config: Config) -> None:
         self.pipeline = Pipeline(config, load_library(config.homotopy.library))
-        self._budget_s = budget_s
         self.intake = Intake(self.pipeline)
         self._held: dict[str, deque[Item]] = defaultdict(deque)
         self._begin_recording()
@@ -93,7 +90,7 @@ class Replay:
         """Process the messages in their order and yield the effect of each."""
         for item, status in self.take(items):
             is_hand = item.role == HAND
-            prediction = self.pipeline.predict(Deadline(self._budget_s)) if is_hand and self.pipeline.is_due else None
+            prediction = self.pipeline.predict() if is_hand and self.pipeline.is_due else None
             sample = self.intake.sample if is_hand and status is not None and status.is_taken else None
             yield Step(item, sample, prediction, self.pipeline.scene)
 

@@ -176,12 +176,14 @@ def run_simulation(
         raise InputError('--recordings', f'recordings of people for the operator {HUMAN_PATHS}', 'none')
     found = find_recordings(recordings) if recordings is not None and HUMAN_PATHS in operators else {}
     write_report = study.load_report('simulation')
+    from foc_ros.analysis.parallel import collect_all
     from foc_ros.analysis.simulation.operators import read_tasks
-    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, simulate, summarise
+    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, run_pair, summarise
 
     tasks = read_tasks(found.values(), study.params) if found else []
     with study.open_workers():
-        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params, {**RULES, **(rivals or {})})
+        run = partial(run_pair, config=study.params, rules={**RULES, **(rivals or {})})
+        results = collect_all(run, make_pairs(operators, assistance, trials, seed, tasks), 'simulate')
     cells = summarise(results, seed)
     write_report(cells, results, study.params)
     study.show({'cells': cells, 'seed': seed}, make_tables(cells), (), SIMULATION_PAGE)

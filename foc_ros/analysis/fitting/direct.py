@@ -95,8 +95,8 @@ def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> Findings:
     # no tracker of hands is better than 10 um
     tried = {POSITION_STDDEV: np.geomspace(1e-5, 0.1, 13), JERK_DENSITY: np.geomspace(1e-3, 1e4, 22)}
     coarse = tabulate_innovations(hands, config.estimator, *([given[name], *tried[name]] for name in given))
-    columns, undetermined = coarse.determine(given)
-    best, finer = coarse.settings[coarse.find_best(columns)], {name: [value] for name, value in given.items()}
+    left, undetermined = coarse.determine(given)
+    best, finer = left.best, {name: [value] for name, value in given.items()}
     for name in finer.keys() - undetermined:
         finer[name] += np.clip(best[name] * np.geomspace(0.46, 2.16, 25), tried[name][0], tried[name][-1]).tolist()
     fine, how = tabulate_innovations(hands, config.estimator, *finer.values()), 'innovations of the filter'

@@ -77,7 +77,7 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> F
     rule = Baseline('foc', partial(forecast_shares, power_rule_shares), tuple(rules))
     rows = collect_all(partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], 'likelihood')
     table = SettingTable(np.array(rows), settings)
-    found, columns = table.estimate(given, 'likelihood of the classes taken')
+    found, left = table.estimate(given, 'likelihood of the classes taken')
     missed = float(np.mean([question.truth not in question.given for each in questions for _, question in each]))
     if missed > 0.1:
         words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
@@ -85,11 +85,11 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> F
     uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
     names = [each.name for each in recordings]
     found.scores['ways'] = scores = {'uniform': float(np.mean(uniform))}
-    scores |= {how: table.score(each) for how, each in table.list_choices(given, columns, names).items()}
+    scores |= {how: left.score(each) for how, each in left.list_choices(given, names).items()}
     if is_cross_validated(recordings):
         taken = [each[0][1].answers[each[0][1].truth] if each else name for each, name in zip(questions, names, strict=True)]
         if len(set(taken)) > 1:
-            scores['without its way'] = table.score(table.choose_held_out(columns, taken))
+            scores['without its way'] = left.score(left.choose_held_out(taken))
     return found
 
 
@@ -115,12 +115,12 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Fin
         known = [each for each in densities if each is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(settings), np.nan))
     table = SettingTable(np.array(rows), settings)
-    found, columns = table.estimate(given, 'density of true positions')
-    chosen = {'motor noise alone': np.zeros(len(recordings), dtype=np.intp)}
-    chosen |= table.list_choices(given, columns, [each.name for each in recordings])
+    found, left = table.estimate(given, 'density of true positions')
+    chosen = {'motor noise alone': [NO_WIDENING] * len(recordings)}
+    chosen |= left.list_choices(given, [each.name for each in recordings])
     found.scores = {'positions': {name: table.score(each) for name, each in chosen.items()}, 'inside_90': {}, 'inside_all_90': {}}
     for name, each in chosen.items():
-        for kind, share in compute_coverage(recordings, config, [widenings[column] for column in each]).items():
+        for kind, share in compute_coverage(recordings, config, each).items():
             found.scores[kind][name] = share
     return found
 
@@ -154,18 +154,18 @@ def widen_covariances(observation: Observation, widenings: Iterable[Sequence[flo
 
 
 def compute_coverage(
-    recordings: Sequence[ObservedRecording], config: Config, widenings: Sequence[Sequence[float]]
+    recordings: Sequence[ObservedRecording], config: Config, chosen: Sequence[Setting]
 ) -> dict[str, float | None]:
     """Return the shares of true positions of moving hands after 0.5 s inside 90 % ellipses and regions.
 
-    inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; widenings (n,): for
-    each recording, so that each can be judged by one that it did not influence.
+    inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; chosen (n,): the
+    widening of each recording, so that each can be judged by one that it did not influence.
     """
     moving = []
-    for recording, widening in zip(recordings, widenings, strict=True):
+    for recording, setting in zip(recordings, chosen, strict=True):
         for each in recording.observations:
             if each.movement_age_s > 0.0:
-                widened = widen_covariances(each, [widening], config)[0]
+                widened = widen_covariances(each, [tuple(setting.values())], config)[0]
                 moving.append(replace(each, candidates=replace(each.candidates, covariance=widened)))
     if not moving:
         return {'inside_90': None, 'inside_all_90': None}

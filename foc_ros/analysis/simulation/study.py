@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from foc_ros.analysis.evaluation.scores import find_mean
 from foc_ros.analysis.intervals import compute_mean_interval
-from foc_ros.analysis.parallel import collect_all
 from foc_ros.analysis.simulation import FOC, HUMAN_PATHS, NONE, OPERATORS
 from foc_ros.analysis.simulation.operators import DT, SimulatedArm, Task, draw_task
 from foc_ros.core.classes.sides import find_path_sides
@@ -182,19 +180,13 @@ class PairResult:
     trials: Mapping[str, Trial]
 
 
-def simulate(pairs: Sequence[Pair], config: Config, rules: Rules = RULES) -> list[PairResult]:
-    """Run all pairs with a progress bar; raise RecordingError where one fails. The results do not depend on the workers."""
-    items = [(f'{pair.operator} {pair.number}', pair) for pair in pairs]
-    return collect_all(partial(run_pair, config=config, rules=rules), items, 'simulate')
-
-
 def make_pairs(
     operators: Sequence[str], assistance: Sequence[str], trials: int, seed: int, tasks: Sequence[Task] = ()
-) -> list[Pair]:
-    """Return the pairs of a study, all with the rule `none`; tasks: of `human_paths`, used one after the other."""
+) -> list[tuple[str, Pair]]:
+    """Return the pairs of a study with their names, all with the rule `none`; tasks: of `human_paths`, one after the other."""
     rules = tuple(dict.fromkeys([NONE, *assistance]))
     return [
-        Pair(name, seed, number, rules, tasks[number % len(tasks)] if name == HUMAN_PATHS else None)
+        (f'{name} {number}', Pair(name, seed, number, rules, tasks[number % len(tasks)] if name == HUMAN_PATHS else None))
         for name in operators
         for number in range(trials)
     ]
