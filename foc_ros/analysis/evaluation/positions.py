@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,18 +170,9 @@ def _choose_taken(recordings: Sequence[ObservedRecording]) -> list[Array]:
     return found
 
 
-class SingerSetting(NamedTuple):
-    """Standard deviations of the acceleration [m/s^2] and of a measured position [m], decay time of the acceleration [s]."""
-
-    acceleration_stddev: float
-    position_stddev: float
-    decay_s: float
-
-
-SINGER_SETTINGS = tuple(
-    SingerSetting(*each) for each in product(np.geomspace(0.05, 6.4, 8).tolist(), (2e-4, 1e-3), (0.1, 0.3, 1.0))
-)
-"""The settings that are tried."""
+SINGER_SETTINGS = np.array([*product(np.geomspace(0.05, 6.4, 8), (2e-4, 1e-3), (0.1, 0.3, 1.0))])
+"""The settings that are tried, (s, 3): standard deviations of the acceleration [m/s^2] and of a measured position [m], and decay
+time of the acceleration [s]."""
 
 
 def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array, ahead_s: Array) -> tuple[Array, Array]:
@@ -190,40 +181,35 @@ def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array
     stamps_ns (n,), rising, and positions (n, 2) [m] of the samples. Returns the mean (m, s, h, 2) [m] and the variance (m, s, h)
     [m^2] per axis under each of the s `SINGER_SETTINGS`; each forecast uses the samples up to its stamp.
     """
-    accelerations, noises, _ = np.array(SINGER_SETTINGS).T
-    state, covariance = np.zeros((len(SINGER_SETTINGS), 3, 2)), np.zeros((len(SINGER_SETTINGS), 3, 3))
-    state[:, 0], covariance[:, 0, 0] = positions[0], noises**2
+    accelerations, noises, _ = SINGER_SETTINGS.T
+    mean, covariance = np.zeros((len(noises), 3, 2)), np.zeros((len(noises), 3, 3))
+    mean[:, 0], covariance[:, 0, 0] = positions[0], noises**2
     covariance[:, 1, 1], covariance[:, 2, 2] = 1.0, accelerations**2  # a velocity of 1 m/s
-    wanted, means, variances, last_ns = set(at_ns.tolist()), [], [], int(stamps_ns[0])
-    ahead = [_discretise(float(each)) for each in ahead_s]
+    wanted, found, last_ns, ahead = set(at_ns.tolist()), [], int(stamps_ns[0]), [_discretise(float(each)) for each in ahead_s]
     for stamp_ns, position in zip(stamps_ns.tolist(), positions, strict=True):
         if stamp_ns > last_ns:
-            state, covariance = _propagate(state, covariance, _discretise((stamp_ns - last_ns) / NANOSECONDS))
+            transition, added = _discretise((stamp_ns - last_ns) / NANOSECONDS)
+            mean, covariance = transition @ mean, transition @ covariance @ transition.swapaxes(1, 2) + added
             gain = covariance[:, :, 0] / (covariance[:, 0, 0] + noises**2)[:, None]
-            state = state + gain[:, :, None] * (position - state[:, 0])[:, None]
+            mean = mean + gain[:, :, None] * (position - mean[:, 0])[:, None]
             kept = np.eye(3) - gain[:, :, None] * np.eye(3)[0]
             # Joseph form: the covariance stays positive
             covariance = kept @ covariance @ kept.swapaxes(1, 2) + noises[:, None, None] ** 2 * gain[:, :, None] * gain[:, None]
             last_ns = stamp_ns
         if stamp_ns in wanted:
             wanted.remove(stamp_ns)
-            later = [_propagate(state, covariance, each) for each in ahead]
-            means.append(np.stack([each[:, 0] for each, _ in later], axis=1))
-            variances.append(np.stack([each[:, 0, 0] for _, each in later], axis=1))
-    return np.array(means), np.array(variances)
-
-
-def _propagate(state: Array, covariance: Array, model: tuple[Array, Array]) -> tuple[Array, Array]:
-    transition, added = model
-    return transition @ state, transition @ covariance @ transition.swapaxes(1, 2) + added
+            rows = [(transition[:, 0], added[:, 0, 0]) for transition, added in ahead]  # of the position
+            later = [(row[:, None] @ mean, (row[:, None] @ covariance @ row[..., None])[:, 0, 0] + more) for row, more in rows]
+            found.append([np.stack(each, axis=1) for each in zip(*later, strict=True)])
+    means, variances = (np.array(each) for each in zip(*found, strict=True))
+    return means[:, :, :, 0], variances
 
 
 @lru_cache(maxsize=4096)
 def _discretise(dt: float) -> tuple[Array, Array]:
     """Return transition and added covariance (s, 3, 3) over dt [s] for each setting, by Van Loan (1978)."""
-    rate = np.zeros((len(SINGER_SETTINGS), 6, 6))
-    accelerations, _, decays = np.array(SINGER_SETTINGS).T
-    drift = np.zeros((len(SINGER_SETTINGS), 3, 3))
+    accelerations, _, decays = SINGER_SETTINGS.T
+    drift, rate = np.zeros((len(decays), 3, 3)), np.zeros((len(decays), 6, 6))
     drift[:, 0, 1] = drift[:, 1, 2] = 1.0
     drift[:, 2, 2] = -1.0 / decays
     rate[:, :3, :3], rate[:, 3:, 3:] = -drift, drift.swapaxes(1, 2)
