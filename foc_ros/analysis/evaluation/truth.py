@@ -145,40 +145,21 @@ def find_ground_truth(
     now = int(np.searchsorted(path.stamps_ns, stamp_ns))
     seconds = (path.stamps_ns[now:] - stamp_ns) / NANOSECONDS
     centres = obstacles.centre + seconds[:, None, None] * obstacles.velocity
-    row_position, position = locate_rows(obstacles.centre @ direction, row), path.positions @ direction
+    is_before = (path.positions @ direction)[:, None] < locate_rows(obstacles.centre @ direction, row)
+    crosses = is_before[:-1] & ~is_before[1:]  # whether each row is crossed after each sample, (m - 1, r)
+    crossed = [int(np.flatnonzero(each)[-1]) + 1 for each in crosses.T if each.any()]
+    last = max((each for each in crossed if each <= now), default=0)
+    following = min((each for each in crossed if each > now), default=0)
+    whole = path.travelled[following] - path.travelled[last] if following else np.nan  # nan: no row is to come
     return GroundTruth(
-        sides=find_sides(path.positions[now:], centres),
-        is_ahead=np.append(find_rows_ahead(row_position, position[now:]), False)[row],
+        sides=np.where(compute_swept_angles(path.positions[now:], centres) < 0.0, LEFT, RIGHT).astype(np.int8),
+        is_ahead=np.append(crosses[now:].any(axis=0), False)[row],
         goal=path.goal if np.array_equal(goals, path.goals) else None,
         positions=path.interpolate(stamp_ns, np.array(TIMES_S)),
         progress=float(path.progress[now]),
-        approach=_compute_approach(row_position, path, position, now),
+        approach=float((path.travelled[now] - path.travelled[last]) / whole) if whole != 0.0 else 0.0,
         left_s=(path.end_ns - stamp_ns) / NANOSECONDS,
     )
-
-
-def find_rows_ahead(row_position: Array, position: Array) -> Bools:
-    """Tell which rows (r,), at row_position (r,) [m], the rest of a path, (m,) [m], still has to pass."""
-    is_before = position[:, None] < row_position
-    return np.asarray((is_before[:-1] & ~is_before[1:]).any(axis=0))
-
-
-def find_sides(path: Array, centres: Array) -> Sides:
-    """Return the sides (n,) of obstacles, at centres (m, n, 2) [m], on which a path (m, 2) [m] runs, by its swept angle."""
-    return np.where(compute_swept_angles(path, centres) < 0.0, LEFT, RIGHT).astype(np.int8)
-
-
-def _compute_approach(row_position: Array, path: RecordedPath, position: Array, now: int) -> float:
-    """Return the share of the distance from the last row, or the start, to the next one, that sample `now` has travelled."""
-    is_passed = find_rows_ahead(row_position, position)
-    crosses = [(position[:-1] < each) & (position[1:] >= each) for each in row_position[is_passed]]
-    passed = [int(np.flatnonzero(each)[-1]) + 1 for each in crosses]
-    following = min((each for each in passed if each > now), default=None)
-    if following is None:
-        return float('nan')
-    last = max((each for each in passed if each <= now), default=0)
-    distance = path.travelled[following] - path.travelled[last]
-    return float((path.travelled[now] - path.travelled[last]) / distance) if distance > 0.0 else 0.0
 
 
 def find_open_gaps(obstacles: Obstacles, row: Rows, direction: Array, hand_radius: float) -> tuple[Sides, ...]:
