@@ -22,7 +22,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from joblib.externals.loky import get_reusable_executor
 
@@ -36,6 +36,8 @@ CONNECT_S = 10.0
 """Time within which a scheduler and its first worker have to answer [s]."""
 ONE_THREAD = {f'{name}_NUM_THREADS': '1' for name in ('OMP', 'OPENBLAS', 'MKL', 'BLIS', 'VECLIB', 'NUMEXPR')}
 """Environment of a worker process, beside which others work."""
+MOST_AT_WORK = 64
+"""Items that are computed one after the other where a worker was lost; with more workers, this may have to be repeated."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +47,8 @@ class Failure:
     reason: str
 
 
-class Workers(NamedTuple):
-    """open: returns the executor, a new one where the last one has broken; most: items that may be at work at the same time."""
-
-    open: Callable[[], Executor]
-    most: int
-
-
-_WORKERS: ContextVar[Workers | None] = ContextVar('workers', default=None)
+_open_executor: ContextVar[Callable[[], Executor] | None] = ContextVar('executor', default=None)
+"""Returns the executor, a new one where the last one has broken; None: this process computes."""
 
 
 @contextmanager
@@ -62,16 +58,15 @@ def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
     Raises InputError where there is no such cluster.
     """
     with ExitStack() as stack:
-        workers = None
+        open_executor: Callable[[], Executor] | None = None
         if scheduler is not None:
-            client = stack.enter_context(_connect(scheduler))
             # not pure: a call that is repeated would return the old task with its error
-            workers = Workers(partial(client.get_executor, pure=False), sum(client.nthreads().values()))
+            open_executor = partial(stack.enter_context(_connect(scheduler)).get_executor, pure=False)
         elif count > 1:
             given = {'initializer': _end_with, 'initargs': (os.getpid(),), 'env': ONE_THREAD}
-            workers = Workers(partial(get_reusable_executor, count, **given), count)
+            open_executor = partial(get_reusable_executor, count, **given)
             stack.callback(lambda: get_reusable_executor(count, **given).shutdown(kill_workers=True))
-        stack.callback(_WORKERS.reset, _WORKERS.set(workers))
+        stack.callback(_open_executor.reset, _open_executor.set(open_executor))
         yield
 
 
@@ -84,15 +79,15 @@ def run(function: Callable[[T], R], items: Sequence[tuple[str, T]]) -> Iterator[
     function: importable by name where the workers are, and without a state of its own; items: names with arguments that can be
     pickled. Raises RecordingError where the workers cannot go on.
     """
-    workers, futures = _WORKERS.get(), list[Answer[R]]()
+    submitted: list[Answer[R]] = []
     for number, (name, item) in enumerate(items):
-        if workers is None:
+        if _open_executor.get() is None:
             result, texts = call_guarded(function, item)
         else:
-            futures = futures or [_submit(workers, function, each) for _, each in items]
-            if _find_error(futures[number]) is not None:
-                _submit_lost(workers, function, items, futures)
-            result, texts = futures[number].result()
+            submitted = submitted or [_submit(function, each) for _, each in items]
+            if _find_error(submitted[number]) is not None:
+                _submit_lost(function, items, submitted)
+            result, texts = submitted[number].result()
         for text in texts:
             warn(f'{name}: {text}')
         yield name, result
@@ -102,24 +97,26 @@ Answer = Future[tuple[R | Failure, list[str]]]
 """The result of an item and its warnings, or the error of a worker that was lost."""
 
 
-def _submit(workers: Workers, function: Callable[[T], R], item: T) -> Answer[R]:
+def _submit(function: Callable[[T], R], item: T) -> Answer[R]:
+    open_executor = _open_executor.get()
+    assert open_executor is not None
     try:
-        return workers.open().submit(call_guarded, function, item)
+        return open_executor().submit(call_guarded, function, item)
     except BrokenExecutor as error:  # it broke just now
         lost: Answer[R] = Future()
         lost.set_exception(error)
         return lost
 
 
-def _submit_lost(workers: Workers, function: Callable[[T], R], items: Sequence[tuple[str, T]], futures: list[Answer[R]]) -> None:
+def _submit_lost(function: Callable[[T], R], items: Sequence[tuple[str, T]], submitted: list[Answer[R]]) -> None:
     """Submit again what was lost with a worker, at first what may have been at work, which fails if it is lost once more."""
-    wait(futures)
-    lost = [number for number, each in enumerate(futures) if _find_error(each) is not None]
+    wait(submitted)
+    lost = [number for number, each in enumerate(submitted) if _find_error(each) is not None]
     for place, number in enumerate(lost):
-        futures[number] = _submit(workers, function, items[number][1])
-        if place < workers.most and (error := _find_error(futures[number])) is not None:
-            futures[number] = Future()
-            futures[number].set_result((Failure(f'its worker process was lost ({type(error).__name__})'), []))
+        submitted[number] = _submit(function, items[number][1])
+        if place < MOST_AT_WORK and (error := _find_error(submitted[number])) is not None:
+            submitted[number] = Future()
+            submitted[number].set_result((Failure(f'its worker process was lost ({type(error).__name__})'), []))
 
 
 def _find_error(answer: Answer[Any]) -> BaseException | None:
