@@ -1,9 +1,12 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Scores of forecasts against the true answers, and what is chosen by held-out scores.
+"""Scores of forecasts against the true answers, what is chosen by held-out scores, and bootstrap intervals.
 
 Every setting is tried on every recording once, and each recording is scored with the setting best for the others, so that what it
 says about itself never helps it.
+
+**Intervals** are by bootstrap (Efron 1979, doi:10.1214/aos/1176344552); equal data give equal ones. What is drawn are recordings
+or trials, because predictions within one recording are not independent.
 
 **A goal that nobody announced** is tried out: each recording is replayed again with its goal left out of the list. The share
 `other` is then right in the second replay and wrong in the first. It is judged by the area under the curve of the receiver
@@ -14,16 +17,14 @@ costs where the goal is on the list, the mean of -log(1 - other).
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.analysis.csv_recordings import TableRecording
-from foc_ros.analysis.intervals import compute_mean_interval
-from foc_ros.analysis.recordings import Recording
+from foc_ros.analysis.recordings import Recording, TableRecording
 from foc_ros.analysis.scenes import NO_GOAL
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.types import Array
@@ -32,6 +33,9 @@ from .baselines import Baseline, Forecast
 from .observations import GAP, Observation, ObservedRecording, Question, Questions
 
 TENTHS, BINS = 10, 10
+RESAMPLES, SEED = 1000, 1
+CENTRAL = (2.5, 97.5)
+"""Percentiles of an interval of 95 %."""
 TIE = 1e-12
 
 
@@ -236,3 +240,22 @@ def describe_other_goal(scores: Mapping[str, Any]) -> str:
         f'{scores["area_under_curve"]:.2f} of all; calibration error {scores["calibration_error"]:.3f}; '
         f'loss {scores["loss"]:.3f} nat.'
     )
+
+
+def draw_rows(n: int, seed: int = SEED, resamples: int = RESAMPLES) -> NDArray[np.intp]:
+    """Return the rows, out of n, that are drawn in each resample, (resamples, n)."""
+    return np.random.default_rng(seed).integers(0, n, (resamples, n))
+
+
+def resample(statistic: Callable[[NDArray[np.intp]], float], n: int) -> Array:
+    """Return a statistic of the rows, out of n, that are drawn in each resample, (RESAMPLES,)."""
+    return np.array([float(statistic(rows)) for rows in draw_rows(n)])
+
+
+def compute_mean_interval(values: Array, group: NDArray[Any], seed: int = SEED, resamples: int = RESAMPLES) -> list[float]:
+    """Return the interval of 95 % [low, high] of the mean of values (m,), at least one, of which groups (m,) are drawn."""
+    _, number = np.unique(group, return_inverse=True)
+    sums, counts = np.bincount(number, values), np.bincount(number)
+    drawn = draw_rows(len(counts), seed, resamples)
+    ends: list[float] = np.percentile(sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1), CENTRAL).tolist()
+    return ends

@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.scores import choose_held_out
-from foc_ros.analysis.intervals import CENTRAL, resample
+from foc_ros.analysis.evaluation.scores import CENTRAL, choose_held_out, resample
 from foc_ros.core.config import list_parameters
 from foc_ros.core.types import Array
 

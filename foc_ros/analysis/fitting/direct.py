@@ -33,8 +33,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
+from foc_ros.analysis.evaluation.scores import resample
 from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedHand
-from foc_ros.analysis.intervals import resample
 from foc_ros.core.config import Config, EstimatorConfig, flatten
 from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.hand.duration import estimate_times_to_go

@@ -25,8 +25,8 @@ from scipy.special import stdtrit
 
 from foc_ros.analysis.evaluation.baselines import Forecast, power_rule_shares
 from foc_ros.analysis.evaluation.observations import GAP, ask_all, ask_main, observe
+from foc_ros.analysis.evaluation.scores import SEED, resample
 from foc_ros.analysis.evaluation.truth import RecordedHand
-from foc_ros.analysis.intervals import SEED, resample
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import ARRIVALS, Config, flatten, replace_values

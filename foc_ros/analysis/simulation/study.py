@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.scores import find_mean
-from foc_ros.analysis.intervals import compute_mean_interval
+from foc_ros.analysis.evaluation.scores import compute_mean_interval, find_mean
 from foc_ros.analysis.simulation import FOC, HUMAN_PATHS, NONE, OPERATORS
 from foc_ros.analysis.simulation.operators import DT, SimulatedArm, Task, draw_task
 from foc_ros.core.classes.sides import find_path_sides
