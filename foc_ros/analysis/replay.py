@@ -31,8 +31,8 @@ from foc_ros.ros.transforms import Transforms, TransformTree
 class Step:
     """One recorded message and its effect.
 
-    item: the message; sample: its hand sample, None for other messages and for a rejected one; prediction: made from the sample,
-    None where none was due or possible; scene: the scene of the prediction.
+    item: the message; sample: as of `Replay.take`; prediction: made from the sample, None where none was due or possible; scene:
+    the scene of the prediction.
     """
 
     item: Item
@@ -62,10 +62,10 @@ class Replay:
         self._reasons: dict[tuple[str, str], str] = {}
         self._counts_before = Counter(self.intake.counts)
 
-    def take(self, items: Iterable[Item]) -> Iterator[tuple[Item, SampleStatus | None]]:
-        """Pass the messages to the pipeline in the order in which the node does, without predicting.
+    def take(self, items: Iterable[Item]) -> Iterator[tuple[Item, HandSample | None]]:
+        """Pass the messages to the pipeline in the order in which the node does, without predicting; yield each with its sample.
 
-        Yield each with its status, which is None for transforms and for what cannot be decoded.
+        The sample is None for other messages than hand poses and for rejected ones.
         """
         for item in items:
             now_s = item.log_ns / NANOSECONDS
@@ -88,10 +88,8 @@ class Replay:
 
     def steps(self, items: Iterable[Item]) -> Iterator[Step]:
         """Process the messages in their order and yield the effect of each."""
-        for item, status in self.take(items):
-            is_hand = item.role == HAND
-            prediction = self.pipeline.predict() if is_hand and self.pipeline.is_due else None
-            sample = self.intake.sample if is_hand and status is not None and status.is_taken else None
+        for item, sample in self.take(items):
+            prediction = self.pipeline.predict() if item.role == HAND and self.pipeline.is_due else None
             yield Step(item, sample, prediction, self.pipeline.scene)
 
     def forget_scene(self) -> None:
@@ -120,7 +118,7 @@ class Replay:
             left_out.append(f'{late} messages before the first hand pose left out: they are in another frame than it')
         return '; '.join([*refused, *left_out])
 
-    def _release(self, role: str, now_s: float) -> Iterator[tuple[Item, SampleStatus | None]]:
+    def _release(self, role: str, now_s: float) -> Iterator[tuple[Item, HandSample | None]]:
         for arrival in self._transforms.release(role, now_s):
             try:
                 status = self.intake.take_arrival(role, arrival)
@@ -128,7 +126,8 @@ class Replay:
                 self.intake.refuse(role, MessageError('message', f'the fields of {TYPES[role]}', error))
                 status = None
             self._note(role, status)
-            yield self._held[role].popleft(), status
+            is_taken = role == HAND and status is not None and status.is_taken
+            yield self._held[role].popleft(), self.intake.sample if is_taken else None
 
     def _note(self, role: str, status: SampleStatus | None) -> None:
         """Count a message, and why it was refused if it was."""

@@ -23,7 +23,6 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
-from foc_ros.io.topics import HAND
 
 TIMES_S = tuple(0.125 * step for step in range(1, 9))
 """Times ahead at which predicted positions are compared with the true ones [s]."""
@@ -100,12 +99,10 @@ class RecordedHand:
 def read_hand(recording: Recording, config: Config) -> RecordedHand:
     """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
     replayed, samples = Replay(config), list[HandSample]()
-    for item, status in replayed.take(recording.items()):
-        sample = replayed.intake.sample
-        if item.role == HAND and status is not None and status.is_taken and sample is not None:
-            if samples and sample.stamp_ns <= samples[-1].stamp_ns:  # the recording begins anew
-                samples.clear()
-            samples.append(sample)
+    for sample in (sample for _, sample in replayed.take(recording.items()) if sample is not None):
+        if samples and sample.stamp_ns <= samples[-1].stamp_ns:  # the recording begins anew
+            samples.clear()
+        samples.append(sample)
     scene = replayed.pipeline.scene
     if scene.goals is None or not len(scene.goals):
         raise RecordingError(f'{recording.name}: {replayed.pipeline.not_ready_reason() or "no goal received"}')
