@@ -189,7 +189,7 @@ def write_fit(
 def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
     colour, _ = get_class_style(0)
     for row, each in enumerate(drawn.values()):
-        ends = [end / each['given'] for end in each['interval'] if end is not None and end > 0.0]
+        ends = [end / each['given'] for end in each['interval'] if end > 0.0]
         axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
         axes.plot(each['value'] / each['given'], row, marker='o', color=colour)
     axes.axvline(1.0, color='0.4', linewidth=1.0)
