@@ -166,7 +166,10 @@ class SettingTable:
     def estimate(self, given: Setting, how: str) -> tuple[Findings, SettingTable]:
         """Return the values that are best for all recordings, with intervals, and what is undetermined; and the settings left."""
         left, undetermined = self.determine(given)
-        values, best, found = np.nan_to_num(left.values), left.best, Findings(undetermined=undetermined)
+        found = Findings(undetermined=undetermined)
+        if len(undetermined) == len(given):  # which may be among none of the settings
+            return found, left
+        values, best = np.nan_to_num(left.values), left.best
         drawn = resample(lambda rows: int(values[rows].sum(axis=0).argmax()), len(values)).astype(int)
         for name in [each for each in given if each not in undetermined]:
             resampled = [left.settings[each][name] for each in drawn]
