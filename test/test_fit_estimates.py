@@ -181,7 +181,8 @@ class KnownReplays:
 
     def search(self, settings):
         self.settings = settings
-        return race.search_settings('kind', settings, self)  # type: ignore[arg-type]
+        found = race.search_settings('kind', settings, self)  # type: ignore[arg-type]
+        return replace_values(settings[0], found.values), found
 
     def score(self, settings, names, words):
         self.rounds.append((len(settings), len(names)))

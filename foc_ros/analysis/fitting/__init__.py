@@ -84,11 +84,11 @@ def is_cross_validated(recordings: Sequence[object]) -> bool:
     return len(recordings) >= 3
 
 
-def clip_to_bounds(name: str, value: float, least: float = 0.0) -> float:
-    """Return a value within the bounds of a parameter, and not below `least`; rounded, so that a file reads well."""
+def clip_to_bounds(name: str, value: float) -> float:
+    """Return a value within the bounds of a parameter, rounded, so that a file reads well."""
     bound = BOUNDS[name]
     assert bound.low is not None and bound.high is not None
-    return float(f'{min(max(value, bound.low, least), bound.high):.6g}')
+    return float(f'{min(max(value, bound.low), bound.high):.6g}')
 
 
 def list_settings(values: Mapping[str, Iterable[float]]) -> tuple[Setting, ...]:

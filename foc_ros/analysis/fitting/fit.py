@@ -103,21 +103,16 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
 
 def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower_eta: bool) -> None:
     """Fit the parameters that need replays."""
-
-    def take_best(kind: str, settings: Sequence[Config]) -> None:
-        fit.config, found = search_settings(kind, settings, replays)
-        fit.take(found)
-
     if not any(len(each.obstacles) for each in hands):
         reason = 'no recording has an obstacle, without which neither margins nor noise show'
         fit.found.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
     elif fit.config.foc.strategy != 'fixed':
         # with strategy `fixed` eta has no effect, and lambda holds for the noise as it is
-        take_best('noise', make_noise_settings(fit.config))
-        take_best('eta', make_eta_settings(fit.config, may_lower_eta))
+        fit.take(search_settings('noise', make_noise_settings(fit.config), replays))
+        fit.take(search_settings('eta', make_eta_settings(fit.config, may_lower_eta), replays))
         if not may_lower_eta:
             fit.found.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
-    take_best('movement', make_movement_settings(hands, fit.config))
+    fit.take(search_settings('movement', make_movement_settings(hands, fit.config), replays))
 
 
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:

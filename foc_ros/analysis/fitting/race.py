@@ -160,8 +160,8 @@ def _average_by_recording(found: Sequence[Mapping[Key, float]], most: float, nam
     return np.array([np.bincount(recording, row, len(names)) / counts for row in table])
 
 
-def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[Config, Findings]:
-    """Return the best of some settings, of which the first is the given one, and what is new in it."""
+def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> Findings:
+    """Return what is new in the best of some settings, of which the first is the given one."""
     finalists, scores, first_scores = race(kind, settings, replays)
     winners = resample(lambda rows: rank(scores[:, :, rows])[0], scores.shape[2]).astype(int)
     best = rank(scores)[0]
@@ -174,7 +174,7 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> 
             f'{kind}: the setting that explains the classes best predicts positions worse: the mean log-density of the true ones '
             f'falls by {loss:.2g} nat'
         )
-    return finalists[best], found
+    return found
 
 
 def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequence[Config]) -> Findings:
