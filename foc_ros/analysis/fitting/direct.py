@@ -53,8 +53,8 @@ CONSTANTS = {model: tuple(f'duration.{name}' for name in names) for model, names
 """By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""
-FACTORS = tuple(2.0 ** (np.arange(-40, 41) / 16.0))
-"""Factors on the given values that are tried, 0.18 to 5.7, each 4 % larger than the one before."""
+FACTORS = tuple(2.0 ** (np.arange(-80, 81) / 32.0))
+"""Factors on the given values that are tried, 0.18 to 5.7, each 2 % larger than the one before."""
 WAIT = 'duration.wait_s'
 
 
