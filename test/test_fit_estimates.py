@@ -244,7 +244,7 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
     tmp_path, monkeypatch, capsys, answer, options, is_written
 ):
     worse = 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm\n'
-    output, fit, asked = tmp_path / 'operator.yaml', Fit(SEARCH_CONFIG), []
+    output, fit, asked = tmp_path / 'operator.yaml', Fit(config=SEARCH_CONFIG), []
 
     def ask(question):
         assert worse in capsys.readouterr().err and not output.exists()
@@ -277,8 +277,8 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
     ],
 )
 def test_a_lower_coverage_is_told_in_one_sentence(held_out, before, after, words):
-    fit = Fit(SEARCH_CONFIG, comparison={'inside_90': {'before': before, 'after': after}})
-    fit.found.scores = {'inside_all_90': dict(zip(('as given', 'without the recording'), held_out, strict=True))}
+    fit = Fit(config=SEARCH_CONFIG, comparison={'inside_90': {'before': before, 'after': after}})
+    fit.scores = {'inside_all_90': dict(zip(('as given', 'without the recording'), held_out, strict=True))}
     found = find_lower_coverage(fit)
     assert len(found) == (words is not None) and all(each.endswith(words) for each in found)
 

@@ -55,22 +55,21 @@ Rows = list[tuple[str, ...]]
 
 
 @dataclass
-class Fit:
-    """The state of a fit: the configuration with what was found so far.
+class Fit(Findings):
+    """The findings of all steps so far, and the configuration with them.
 
     recordings: how many are used; failed recordings with reasons; comparison: of given and fitted parameters.
     """
 
-    config: Config
-    found: Findings = field(default_factory=Findings)
+    config: Config = field(default_factory=Config)
     recordings: int = 0
     failed: dict[str, str] = field(default_factory=dict)
     comparison: dict[str, dict[str, float | None]] = field(default_factory=dict)
 
-    def take(self, found: Findings) -> None:
-        """Take what a step found into the configuration."""
-        self.found.take(found)
-        self.config = replace_values(self.config, found.values)
+    def take(self, later: Findings) -> None:
+        """Take what a later step found, also into the configuration."""
+        super().take(later)
+        self.config = replace_values(self.config, later.values)
 
 
 def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lower_eta: bool = False) -> Fit:
@@ -78,7 +77,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
 
     may_lower_eta: whether obstacles may be avoided with less certainty than the configuration wants.
     """
-    fit = Fit(config)
+    fit = Fit(config=config)
     hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), 'read')
     if not hands:
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
@@ -86,18 +85,18 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     for step in (fit_estimator, fit_fading, fit_duration, fit_wait):
         fit.take(step(hands, fit.config))
     if config.foc.strategy == 'fixed':
-        fit.found.warnings.append('foc.tau, foc.lam: kept as they are; examples/plan_recovery finds them from movements')
+        fit.warnings.append('foc.tau, foc.lam: kept as they are; examples/plan_recovery finds them from movements')
     duration_s = float(np.median([each.times[-1] for each in hands]))
     rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
     thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
     _search(hands, fit, Replays(usable, thinned | UNSCALED), may_lower_eta)
     _fit_to_one_replay(usable, fit, thinned | UNSCALED)
     given = flatten(config)
-    fit.found.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
+    fit.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
     fit.config = replace_values(fit.config, UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
     fit.comparison = compare_configs(compared, (config, fit.config), thinned)
-    fit.found.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
+    fit.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
     return fit
 
 
@@ -105,13 +104,13 @@ def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower
     """Fit the parameters that need replays."""
     if not any(len(each.obstacles) for each in hands):
         reason = 'no recording has an obstacle, without which neither margins nor noise show'
-        fit.found.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
+        fit.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
     elif fit.config.foc.strategy != 'fixed':
         # with strategy `fixed` eta has no effect, and lambda holds for the noise as it is
         fit.take(search_settings('noise', make_noise_settings(fit.config), replays))
         fit.take(search_settings('eta', make_eta_settings(fit.config, may_lower_eta), replays))
         if not may_lower_eta:
-            fit.found.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
+            fit.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
     fit.take(search_settings('movement', make_movement_settings(hands, fit.config), replays))
 
 
@@ -125,7 +124,7 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
     for step in (fit_likelihood, fit_widening):
         fit.take(step(observed, fit.config))
     if not is_cross_validated(observed):
-        fit.found.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
+        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
 
 
 def compare_configs(
@@ -179,7 +178,7 @@ def find_worse_positions(comparison: Mapping[str, Mapping[str, float | None]]) -
 
 def find_lower_coverage(fit: Fit) -> list[str]:
     """Return a sentence where the coverage falls by 1 %: of held-out predictions if there are any, else of all."""
-    shares = fit.found.scores.get('inside_all_90', {})
+    shares = fit.scores.get('inside_all_90', {})
     changes = {'of recordings held out ': (shares.get('as given'), shares.get('without the recording'))}
     if 'inside_90' in fit.comparison:
         changes[''] = (fit.comparison['inside_90']['before'], fit.comparison['inside_90']['after'])
@@ -192,19 +191,19 @@ def find_lower_coverage(fit: Fit) -> list[str]:
 
 def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
     """Return a fit as plain values; node: the commands that run the node with it, without and with a ROS installation."""
-    before, found, options = flatten(given), fit.found, f'--ros-args --params-file {output}'
+    before, options = flatten(given), f'--ros-args --params-file {output}'
     return {
         'recordings': fit.recordings,
         'failed': fit.failed,
         'parameters': {
             name: {'value': each.value, 'interval': [each.low, each.high], 'how': each.how, 'given': before[name]}
-            for name, each in found.estimates.items()
+            for name, each in fit.estimates.items()
         },
-        'chosen': {name: {'value': value, 'given': before[name]} for name, value in found.chosen.items()},
-        'undetermined': {name: {'given': before[name], 'why': why} for name, why in found.undetermined.items()},
-        'scores': found.scores,
+        'chosen': {name: {'value': value, 'given': before[name]} for name, value in fit.chosen.items()},
+        'undetermined': {name: {'given': before[name], 'why': why} for name, why in fit.undetermined.items()},
+        'scores': fit.scores,
         'comparison': fit.comparison,
-        'warnings': found.warnings,
+        'warnings': fit.warnings,
         'output': str(output),
         'node': [f'python -m foc_ros node {options}', f'ros2 run foc_ros foc_node {options}'],
     }
