@@ -114,25 +114,20 @@ class Summary:
 
 def facts(answer: Mapping[str, Any]) -> dict[str, str]:
     """Return the answer of a summary in words, for a table or a report."""
-    times = answer['prediction_ms']
+    times, compromised, estimated = answer['prediction_ms'], answer['compromised'], answer['estimated']
     unsolved = {f'{name} ({Status(name).remedy})': count for name, count in answer['failures'].items() if count}
     return {
         'recording': f'{answer["duration_s"]:.1f} s',
         'hand poses': str(answer['samples']),
         'predictions': f'{answer["predictions"]}, {answer["solved"]} with a solved candidate',
         'rejected': _list_counts(answer['refused']),
-        'candidates compromised': _list_with_note(answer['compromised'], Status.COMPROMISED.remedy),
-        'candidates estimated': _list_with_note(answer['estimated'], 'unlikely or late'),
+        'candidates compromised': f'{compromised} ({Status.COMPROMISED.remedy})' if compromised else 'none',
+        'candidates estimated': f'{estimated} (unlikely or late)' if estimated else 'none',
         'candidates not solved': _list_counts(unsolved),
         'obstacles cleared by height': f'{answer["cleared_by_height"]} over all predictions',
         **({'demonstrations learned': str(answer['learned'])} if 'learned' in answer else {}),
         'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
     }
-
-
-def _list_with_note(count: int, note: str) -> str:
-    """Return a count with a note, which is left out where nothing was counted."""
-    return f'{count} ({note})' if count else _list_counts({})
 
 
 def _list_counts(counts: Mapping[str, int]) -> str:
