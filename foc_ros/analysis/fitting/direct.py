@@ -27,13 +27,12 @@ distribution, which does not depend on how long the hand has waited already.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import minimize
 
-from foc_ros.analysis.evaluation.scores import resample
+from foc_ros.analysis.evaluation.scores import CENTRAL, resample
 from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedHand
 from foc_ros.core.config import Config, EstimatorConfig, flatten
 from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
@@ -53,8 +52,8 @@ CONSTANTS = {model: tuple(f'duration.{name}' for name in names) for model, names
 """By model, the constants that determine durations by dotted name, each with its power in a factor on all durations."""
 NARROW_BITS = 0.5
 """Standard deviation of the index of difficulty below which intercept and slope are not told apart [bit]."""
-FACTORS = tuple(2.0 ** (np.arange(-80, 81) / 32.0))
-"""Factors on the given values that are tried, 0.18 to 5.7, each 2 % larger than the one before."""
+FACTORS = tuple(2.0 ** (np.arange(-10, 11) / 4.0))
+"""Factors on the given values, 0.18 to 5.7, among which the best is sought first."""
 WAIT = 'duration.wait_s'
 
 
@@ -141,38 +140,50 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
     names = CONSTANTS[config.duration.model]
     if not samples:
         return Findings(undetermined=dict.fromkeys(names, 'no recording has a movement that ends near a goal'))
-    given = {name: float(flatten(config)[name]) for name in names}
+    given = np.array([flatten(config)[name] for name in names], dtype=float)
 
-    def compute_errors(values: Iterable[float]) -> Array:
+    def compute_errors(values: Array) -> Array:
         """Return the mean absolute error of the time to go in each recording, (n,) [s]."""
         leaves = (name.partition('.')[2] for name in names)
-        duration = clip_values(config.duration, dict(zip(leaves, values, strict=True)))
+        duration = clip_values(config.duration, dict(zip(leaves, values.tolist(), strict=True)))
         errors = (
             [abs(estimate_times_to_go(hand, goal[None], duration)[0] - left) for hand, goal, left in each] for each in samples
         )
         return np.array([np.mean(each) for each in errors])
 
-    settings = [{name: factor * value for name, value in given.items()} for factor in FACTORS]
-    errors = np.array([compute_errors(each.values()) for each in settings])
-    found, left = SettingTable.from_errors(errors.T, settings).estimate(given, 'time to go')
-    if found.undetermined:
-        return Findings(undetermined=found.undetermined)
+    tried = [given * factor for factor in FACTORS]
+    errors = np.array([compute_errors(each) for each in tried])
+    settings = [dict(zip(names, each.tolist(), strict=True)) for each in tried]
+    _, undetermined = SettingTable.from_errors(errors.T, settings).determine(settings[FACTORS.index(1.0)])
+    if undetermined:
+        return Findings(undetermined=undetermined)
+    best, found = _find_best_factor(errors), Findings()
+    value = given * best
     if len(names) > 1:
         distances = np.array([np.hypot(*(each[0][1] - each[0][0].onset_position)) for each in samples])  # type: ignore[operator]
         deviation_bits = float(np.log2(distances / config.duration.target_width + 1.0).std())
         if deviation_bits > NARROW_BITS:
-            best = [*left.best.values()]
-            value = np.abs(minimize(lambda each: float(compute_errors(np.abs(each)).mean()), best, method='Nelder-Mead').x)
-            for each, ratio in zip([*found.estimates.values()], value / best, strict=True):
-                ends = {'low': ratio * each.low, 'high': ratio * each.high}
-                found.estimates[each.name] = replace(each, value=clip_to_bounds(each.name, ratio * each.value), **ends)
+            value = np.abs(minimize(lambda each: float(compute_errors(np.abs(each)).mean()), value, method='Nelder-Mead').x)
         else:
             found.warnings.append(
                 'duration.fitts_a_s, duration.fitts_b_s: the movements are too alike to tell intercept and slope apart '
                 f'(indices of difficulty with a standard deviation of {deviation_bits:.2g} bit, {NARROW_BITS:g} are needed): '
                 'their ratio is kept'
             )
+    factors = np.percentile(resample(lambda rows: _find_best_factor(errors[:, rows]), errors.shape[1]) / best, CENTRAL)
+    for name, each in zip(names, value.tolist(), strict=True):
+        found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, each), each * factors, 'time to go')
     return found
+
+
+def _find_best_factor(errors: Array) -> float:
+    """Return the best factor by errors (f, n), by a parabola through the best of `FACTORS` and its neighbours."""
+    mean = errors.mean(axis=1)
+    index = int(np.clip(mean.argmin(), 1, len(FACTORS) - 2))
+    before, here, after = mean[index - 1 : index + 2]
+    bend = before - 2.0 * here + after
+    shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return float(FACTORS[index] * np.exp(np.log(FACTORS[1] / FACTORS[0]) * np.clip(shift, -1.0, 1.0)))
 
 
 def fit_wait(hands: Sequence[RecordedHand], config: Config) -> Findings:
