@@ -122,7 +122,7 @@ class _GoalAssistance(Assistance):
 
     def __init__(self, task: Task, config: Config) -> None:
         super().__init__(task, config)
-        self._inference = GoalInference(task.goals, task.path.position[0])
+        self._inference = GoalInference(task.goals, task.path[0, 0])
 
     def compute_force(self, step: int, position: Array, velocity: Array, acceleration: Array) -> Array:  # noqa: ARG002
         """Return the force of the rule for the present probabilities of the goals."""

@@ -18,9 +18,8 @@ import numpy as np
 from page import ROOT, SHARED, format_table, write_blocks
 
 from foc_ros.analysis.evaluation.baselines import Baseline, forecast_published
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe_in_order
+from foc_ros.analysis.evaluation.observations import GOAL, PATH_CLASS, ObservedRecording, ask_all, observe_in_order
 from foc_ros.analysis.evaluation.positions import compute_position_scores
-from foc_ros.analysis.evaluation.questions import GOAL, PATH_CLASS, ask_all
 from foc_ros.analysis.evaluation.scores import Scores, leave_goals_out, score_forecasts, score_other_goal, summarise
 from foc_ros.analysis.evaluation.truth import HORIZONS_S
 from foc_ros.analysis.parallel import collect_all, open_workers
@@ -92,7 +91,7 @@ def format_goals(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
     """
     scores = score(recordings, GOAL)
     point = np.round(scores.progress * 10.0)
-    found = summarise(Scores(*(each[np.isin(point, POINTS)] for each in scores)))
+    found = summarise(scores.take(np.isin(point, POINTS)))
     gain, right = (
         np.array([values[point == each].mean() for each in POINTS])
         for values in (scores.log_likelihood + np.log(scores.possible), scores.correct)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
-from foc_ros.analysis.evaluation.truth import TIMES_S, GroundTruth, RecordedPath, find_open_gaps
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, TIMES_S, GroundTruth, RecordedPath, find_open_gaps
 from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.classes.sides import BranchTimes
 from foc_ros.core.obstacle_table import make_obstacles
@@ -30,11 +30,11 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=N
         likelihood=even if likelihood is None else np.array(likelihood, dtype=float),
         length=np.arange(1.0, k + 1.0),
         time_s=np.ones(k),
-        is_named=np.ones((k, n), dtype=bool),
+        named=frozenset(str(i) for i in range(n)),
         sides=np.array(sides, dtype=np.int8).reshape(k, n),
         mean=np.zeros((k, H, 2)),
-        covariance=np.tile(np.eye(2), (k, H, 1, 1)),
-        duration_sensitivity=np.zeros((k, H, 2)),
+        covariance=np.tile(np.eye(2), (k, len(HORIZONS_S), 1, 1)),
+        duration_sensitivity=np.zeros((k, len(HORIZONS_S), 2)),
         branch_times=BranchTimes(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
         decisions=Decisions(np.arange(solved.sum()), np.arange(solved.sum()), np.zeros(solved.sum(), dtype=np.intp)),
     )

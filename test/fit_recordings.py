@@ -8,8 +8,8 @@ import evaluation_samples
 import numpy as np
 import pytest
 
+from foc_ros.analysis.evaluation.truth import RecordedHand, RecordedPath
 from foc_ros.analysis.fitting import fit, race
-from foc_ros.analysis.fitting.direct import RecordedHand
 from foc_ros.core.obstacle_table import Obstacles
 
 OBSTACLE = (0.15, 0.0, 0.03)
@@ -39,7 +39,7 @@ def write_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float 
 
 
 def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> RecordedHand:
-    return RecordedHand(name, np.round(times * 1e9).astype(np.int64), positions, obstacles, goals)
+    return RecordedHand(name, RecordedPath(np.round(times * 1e9).astype(np.int64), positions, goals), obstacles)
 
 
 def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -228,11 +228,10 @@ def test_times_that_repeat_are_named(tmp_path, capsys):
     ],
 )
 def test_other_separators_and_decimal_commas_are_read(tmp_path, separator, comma, change):
-    usual = read_tables(write_folder(tmp_path / 'usual'))['a'].read_movement()
+    usual = read_tables(write_folder(tmp_path / 'usual'))['a']
     folder = write_folder(tmp_path / 'other', separator, comma)
     for file in folder.iterdir():
         file.write_text(change(file.read_text()))
-    (found,) = read_tables(folder).values()
-    movement = found.read_movement()
+    (movement,) = read_tables(folder).values()
     assert movement.name == ('a, b' if comma else 'a')
     assert movement.stamps_ns == usual.stamps_ns and np.array_equal(movement.positions, usual.positions)

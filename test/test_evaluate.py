@@ -14,9 +14,8 @@ from homotopy_scenes import AVOIDING
 
 from foc_ros.analysis.evaluation import Forecast, register_baseline
 from foc_ros.analysis.evaluation.baselines import BASELINES
-from foc_ros.analysis.evaluation.observations import observe
-from foc_ros.analysis.evaluation.questions import GAP, PATH_CLASS, ask, ask_all, find_relevant_obstacles
-from foc_ros.analysis.evaluation.questions import GOAL as GOAL_QUESTION
+from foc_ros.analysis.evaluation.observations import GAP, PATH_CLASS, ask, ask_all, find_relevant_obstacles, observe
+from foc_ros.analysis.evaluation.observations import GOAL as GOAL_QUESTION
 from foc_ros.analysis.evaluation.report import find_gaps, find_label_mismatches
 from foc_ros.analysis.evaluation.scores import leave_goals_out
 from foc_ros.analysis.recordings import find_recordings

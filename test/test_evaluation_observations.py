@@ -7,12 +7,18 @@ import pytest
 from bag_helpers import TYPES
 from evaluation_samples import reach, write_tables
 
-from foc_ros.analysis.csv_recordings import EPOCH_NS
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
-from foc_ros.analysis.evaluation.observations import observe, observe_in_order
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
+from foc_ros.analysis.evaluation.observations import (
+    GAP,
+    GOAL,
+    PATH_CLASS,
+    ask,
+    find_relevant_obstacles,
+    observe,
+    observe_in_order,
+)
 from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth
-from foc_ros.analysis.recordings import find_recordings
+from foc_ros.analysis.recordings import EPOCH_NS, find_recordings
 from foc_ros.core import tracks
 from foc_ros.core.classes.rows import find_rows
 from foc_ros.core.config import Config, replace_values

@@ -14,14 +14,14 @@ from foc_ros.analysis.evaluation.baselines import (
     boltzmann_shares,
     compute_straight_costs,
     compute_straight_positions,
+    forecast_uniform,
     guess_constant_velocity,
     guess_nearest_gap,
     guess_shortest_path,
     power_rule_shares,
-    published_shares,
 )
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.evaluation.positions import SINGER_SETTINGS, compute_position_scores, find_denser_share, forecast_singer
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.evaluation.report import make_verdict
 from foc_ros.analysis.evaluation.scores import (
     Scores,
@@ -62,16 +62,16 @@ def ask_class(observed):
 
 def test_every_possible_answer_keeps_some_probability_and_all_sum_to_one():
     observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]))
-    forecast = Forecast.from_shares(published_shares(observed), ask_class(observed))
+    forecast = Forecast.from_shares(observed.candidates.likelihood, ask_class(observed))
     np.testing.assert_allclose(forecast.probability, (1.0 - UNCERTAINTY) * np.array([0.8, 0.2]) + UNCERTAINTY / 2.0)
-    np.testing.assert_allclose(Forecast.uniform(ask_class(observed)).probability, [0.5, 0.5])
+    np.testing.assert_allclose(forecast_uniform(observed, ask_class(observed), None).probability, [0.5, 0.5])
     np.testing.assert_allclose(Forecast.from_answer((R,), 0.6, ask_class(observed)).probability, [0.2, 0.8])
     observed = observation(make_candidates([[L, R, L], [R, L, L]], likelihood=[0.3, 0.7]), **TWO_ROWS, true_sides=(R, R, R))
     question = ask_class(observed)
-    by_shares = Forecast.from_shares(published_shares(observed), question)
+    by_shares = Forecast.from_shares(observed.candidates.likelihood, question)
     # no candidate gives the true answer
     assert by_shares.true_probability(question) == pytest.approx(UNCERTAINTY / 6.0)
-    for forecast in (by_shares, Forecast.uniform(question), Forecast.from_answer((R, L, L), 0.4, question)):
+    for forecast in (by_shares, forecast_uniform(observed, question, None), Forecast.from_answer((R, L, L), 0.4, question)):
         assert forecast.probability.sum() + question.unlisted * forecast.each_other == pytest.approx(1.0)
 
 
@@ -85,7 +85,7 @@ def make_scores(confidence, right, recording=None, progress=None, left_s=None):
 def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness():
     observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]), progress=0.5, approach=0.6)
     question, p = ask_class(observed), (1.0 - UNCERTAINTY) * 0.8 + UNCERTAINTY / 2.0
-    forecasts = Forecast.from_shares(published_shares(observed), question), Forecast.uniform(question)
+    forecasts = Forecast.from_shares(observed.candidates.likelihood, question), forecast_uniform(observed, question, None)
     found = score_forecasts((0, observed, question, each) for each in forecasts)
     np.testing.assert_allclose(found.log_likelihood, np.log([p, 0.5]))
     np.testing.assert_allclose(found.confidence, [p, 0.5])
@@ -93,7 +93,7 @@ def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness():
     np.testing.assert_allclose(found.brier, [2.0 * (1.0 - p) ** 2, 0.5])
     assert found.progress.tolist() == found.left_s.tolist() == [0.5, 0.5]
     gap = ask(GAP, observed, frozenset('0'))
-    assert score_forecasts([(0, observed, gap, Forecast.uniform(gap))]).progress.tolist() == [0.6]
+    assert score_forecasts([(0, observed, gap, forecast_uniform(observed, gap, None))]).progress.tolist() == [0.6]
 
 
 def test_the_calibration_error_is_the_distance_of_confidence_and_share_correct():

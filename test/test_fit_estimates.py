@@ -12,7 +12,7 @@ from evaluation_samples import TWO_CLASSES, H, observation, recorded
 from evaluation_samples import reach as resting_reach
 from fit_recordings import GOALS, reach, recorded_hand, write_tables
 
-from foc_ros.analysis.evaluation.truth import TIMES_S
+from foc_ros.analysis.evaluation.truth import HORIZONS, TIMES_S
 from foc_ros.analysis.fitting import SettingTable, race
 from foc_ros.analysis.fitting.direct import FADING, fit_duration, fit_estimator, fit_fading, fit_wait
 from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage
@@ -181,7 +181,8 @@ class KnownReplays:
 
     def search(self, settings):
         self.settings = settings
-        return race.search_settings('kind', settings, self)  # type: ignore[arg-type]
+        found = race.search_settings('kind', settings, self)  # type: ignore[arg-type]
+        return replace_values(settings[0], found.values), found
 
     def score(self, settings, names, words):
         self.rounds.append((len(settings), len(names)))
@@ -243,7 +244,7 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
     tmp_path, monkeypatch, capsys, answer, options, is_written
 ):
     worse = 'predicted positions 0.5 s ahead become worse with the fitted parameters: from 63 to 96 mm\n'
-    output, fit, asked = tmp_path / 'operator.yaml', Fit(SEARCH_CONFIG), []
+    output, fit, asked = tmp_path / 'operator.yaml', Fit(config=SEARCH_CONFIG), []
 
     def ask(question):
         assert worse in capsys.readouterr().err and not output.exists()
@@ -276,7 +277,7 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
     ],
 )
 def test_a_lower_coverage_is_told_in_one_sentence(held_out, before, after, words):
-    fit = Fit(SEARCH_CONFIG, comparison={'inside_90': {'before': before, 'after': after}})
+    fit = Fit(config=SEARCH_CONFIG, comparison={'inside_90': {'before': before, 'after': after}})
     fit.scores = {'inside_all_90': dict(zip(('as given', 'without the recording'), held_out, strict=True))}
     found = find_lower_coverage(fit)
     assert len(found) == (words is not None) and all(each.endswith(words) for each in found)
@@ -285,7 +286,9 @@ def test_a_lower_coverage_is_told_in_one_sentence(held_out, before, after, words
 S = np.array(TIMES_S)
 TO_GOAL = 10 * S**3 - 15 * S**4 + 6 * S**5
 LATE = 9.0 * (S**3 * (1 - S) ** 2)[:, None] * [1.0, 0.0]
-CANDIDATES = replace(TWO_CLASSES, covariance=np.tile(1e-8 * np.eye(2), (2, H, 1, 1)), duration_sensitivity=np.stack([LATE, LATE]))
+CANDIDATES = replace(
+    TWO_CLASSES, covariance=np.tile(1e-8 * np.eye(2), (2, 3, 1, 1)), duration_sensitivity=np.stack([LATE, LATE])[:, HORIZONS]
+)
 
 
 def _make_recordings(endpoint, spread):
@@ -303,9 +306,9 @@ def _make_recordings(endpoint, spread):
 def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoint, spread):
     recordings = _make_recordings(endpoint, spread)
     # 0.4, the given value, would be as good as 0.3 to within 2 nat
-    found, scores = fit_widening(recordings, replace_values(Config(), {'duration.spread': 0.9}))
+    found = fit_widening(recordings, replace_values(Config(), {'duration.spread': 0.9}))
     assert found.undetermined == {} or set(found.undetermined) == {'foc.process_noise'}
-    found = found.estimates
+    found, scores = found.estimates, found.scores
     assert found['foc.endpoint_stddev'].value == pytest.approx(endpoint, rel=0.4)
     assert found['duration.spread'].value == pytest.approx(spread, abs=0.11)
     for each in found.values():

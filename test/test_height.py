@@ -323,6 +323,8 @@ def test_json_has_the_height_where_it_is_predicted():
 
 
 def test_a_replay_counts_what_was_cleared():
-    answer = Summary(samples=3, predictions=2, solved=2, cleared_by_height=5).answer({}, 1.0)
+    summary = Summary()
+    summary.counts.update(samples=3, predictions=2, solved=2, cleared_by_height=5)
+    answer = summary.answer({}, 1.0)
     assert answer['cleared_by_height'] == 5
     assert facts(answer)['obstacles cleared by height'] == '5 over all predictions'

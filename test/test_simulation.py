@@ -22,7 +22,7 @@ from foc_ros.ros.parameters import dump_parameter_file
 
 GOALS = np.array([[0.3, 0.1], [0.3, -0.1]])
 QUICK = Config(budget_s=0.0).with_values({'foc.steps': 20, 'homotopy.max_candidates': 2, 'rate_hz': 10.0})
-AT_REST = (np.zeros(2), np.zeros(2))
+AT_REST = np.zeros((2, 2))
 
 
 def cross(goal_row=0):
@@ -34,10 +34,10 @@ def cross(goal_row=0):
 @pytest.mark.parametrize('operator', OPERATORS[:-1])
 def test_operators_intend_what_their_names_say(operator):
     task = draw_task(operator, np.random.default_rng(4))
-    assert np.hypot(*(task.path.position[-1] - task.goal)) < 1e-9
+    assert np.hypot(*(task.path[:, 0][-1] - task.goal)) < 1e-9
     is_announced = bool((np.hypot(*(task.goals - task.goal).T) < 1e-9).any())
     assert is_announced == (operator != UNANNOUNCED_GOAL) == (task.goal_row >= 0)
-    jumps = np.hypot(*np.diff(task.path.position, axis=0).T) / DT
+    jumps = np.hypot(*np.diff(task.path[:, 0], axis=0).T) / DT
     assert jumps.max() < 1.5, 'the path is continuous'
 
 
@@ -65,7 +65,7 @@ class Misled(Assistance):
 
 
 def test_a_wrong_way_costs_what_the_operator_needs_more_than_alone():
-    (pair,) = make_pairs(['noisy'], ['misled'], 1, 3)
+    ((_, pair),) = make_pairs(['noisy'], ['misled'], 1, 3)
     measures = run_pair(pair, QUICK, {'none': Assistance, 'misled': Misled}).measures
     for harm, name in (('wrong_way_s', 'completion_s'), ('wrong_way_effort', 'effort')):
         assert measures['misled'][harm] == measures['misled'][name] - measures['none'][name] > 0.0

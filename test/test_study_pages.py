@@ -35,9 +35,11 @@ ANSWER = {
     'recordings': 2,
     'parameters': {
         'likelihood.beta': {'value': 0.5, 'interval': [0.4, 0.7], 'how': 'classes taken', 'given': 1.0},
-        'foc.noise_x': {'value': 0.08, 'interval': [None, None], 'how': 'spread', 'given': 0.05},
+        'foc.noise_x': {'value': 0.08, 'interval': [0.06, 0.1], 'how': 'spread', 'given': 0.05},
         'duration.intercept_s': {'value': 0.0, 'interval': [0.0, 0.1], 'how': 'durations', 'given': 0.0},
     },
+    'chosen': {'duration.arrival': {'value': 'passing', 'given': 'rest'}},
+    'undetermined': {'foc.eta': {'given': 0.9, 'why': 'flat'}},
     'scores': {'ways': {'given': -1.0, 'fitted': -0.75, 'held out': None}},
     'comparison': {'error_m 0.5': {'before': 0.063, 'after': 0.096}, 'inside_90': {'before': 0.5, 'after': 0.8}},
     'warnings': ['<b>few</b> recordings'],
@@ -52,7 +54,7 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path):
     page = (tmp_path / 'new' / 'fit.html').read_text(encoding='utf-8')
     assert '<title>Fit: hers &amp; his</title>' in page
     assert '<tr><th>likelihood.beta</th><td>1</td><td>0.5</td><td>0.4 to 0.7</td><td>classes taken</td></tr>' in page
-    assert '<td>- to -</td>' in page
+    assert '<td>0.06 to 0.1</td>' in page
     assert '<tr><th>log-likelihood of the class taken [nat]</th><td>fitted</td><td>-0.750</td></tr>' in page
     row = '<th>error of positions 0.5 s ahead [mm]</th><td>63.0</td><td>96.0</td><td>worse</td>'
     assert row in page and 'Better with the fitted parameters: positions in the region of 90 %' in page

@@ -1,25 +1,42 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The recordings of a folder, bags or CSV tables alike, as streams of recorded messages; and tables converted to bags."""
+"""The recordings of a folder, bags or CSV tables alike, as streams of recorded messages; and tables converted to bags.
+
+A table of motion capture gives the messages that a tracker and a perception node would have sent.
+"""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from heapq import merge
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from foc_ros.core.errors import FocError, InputError, RecordingError, collect, collect_all, join_errors
-from foc_ros.io.bags import BagReader, BagWriter, Item, check_bag, is_bag_file
+import numpy as np
+
+from foc_ros.core.errors import FocError, InputError, RecordingError, collect, join_errors, warn
+from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.io import topics
+from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter, Item, check_bag, is_bag_file
+from foc_ros.io.csv_tables import Column, Row, parse_rows, read_rows
 from foc_ros.io.terminal import show_progress
+from foc_ros.ros.messages.encode_inputs import encode_boxes, encode_goals, encode_hand_pose, encode_obstacles
+from foc_ros.ros.messages.types import RosbagsTypes
 
-from .csv_recordings import Movement, read_movements, recorded_messages, warn_of_far_scenes
-from .scenes import FindScene, RecordedScene, read_box_scenes, read_scenes
+from .scenes import POSITION, FindScene, RecordedScene, check_not_empty, read_box_scenes, read_recording, read_scenes
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
 SCENES, TRIALS = 'scenes.csv', 'trials.csv'
+FRAME = 'world'
+EPOCH_NS = NANOSECONDS
+"""Stamp of t_s = 0. It is not 0, which means `not set` in a message."""
+LENGTH_UNITS = {'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6}
+Doubt = tuple[str, str, str]
+"""What is doubted, what is wrong with it, and the reason."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +55,11 @@ class BagRecording:
 
 @dataclass(frozen=True)
 class TableRecording:
-    """One recording of a table; movement: the movement, or the error of its rows; other recordings are not affected."""
+    """One recording of a table: stamps [ns] that never fall, positions (n, 3) [m], and the scene."""
 
     name: str
-    movement: Movement | RecordingError
+    stamps_ns: tuple[int, ...]
+    positions: Array
     scene: RecordedScene
 
     @property
@@ -49,19 +67,42 @@ class TableRecording:
         """Row of the goal that was reached, None where no table says it."""
         return self.scene.goal
 
-    def read_movement(self) -> Movement:
-        """Return the movement of the hand; raises RecordingError."""
-        if isinstance(self.movement, RecordingError):
-            raise self.movement
-        return self.movement
+    def items(self) -> Iterator[Item]:
+        """Yield the messages that `convert` writes, in the order of their stamps."""
+        types, boxes, scene = RosbagsTypes(TYPESTORE), self.scene.find_boxes(self.positions), self.scene
+
+        def list_scenes() -> Iterator[tuple[int, str, Any]]:
+            # twice a second, for the first time before the first hand pose
+            for stamp_ns in range(self.stamps_ns[0] - NANOSECONDS // 10, self.stamps_ns[-1] + 1, NANOSECONDS // 2):
+                if boxes:
+                    yield stamp_ns, topics.MARKERS, encode_boxes(types, stamp_ns, FRAME, boxes)
+                else:
+                    yield stamp_ns, topics.CLOUD, encode_obstacles(types, stamp_ns, FRAME, scene.obstacles)
+                if scene.goals is not None:
+                    yield stamp_ns, topics.GOALS, encode_goals(types, stamp_ns, FRAME, scene.goals)
+
+        poses = (
+            (stamp_ns, topics.HAND, encode_hand_pose(types, stamp_ns, FRAME, position))
+            for stamp_ns, position in zip(self.stamps_ns, self.positions, strict=True)
+        )
+        for stamp_ns, role, message in merge(list_scenes(), poses, key=lambda each: each[0]):
+            yield Item(role, f'/{role}', stamp_ns, message, b'')
+
+
+@dataclass(frozen=True)
+class BrokenRecording:
+    """A recording whose rows of a table cannot be used; other recordings are not affected."""
+
+    name: str
+    error: RecordingError
+    goal: ClassVar[None] = None
 
     def items(self) -> Iterator[Item]:
-        """Yield the messages that `convert` would write; raises RecordingError."""
-        for stamp_ns, topic, message in recorded_messages(self.read_movement(), self.scene):
-            yield Item(topic.removeprefix('/'), topic, stamp_ns, message, b'')
+        """Raise the error of the rows."""
+        raise self.error
 
 
-Recording = BagRecording | TableRecording
+Recording = BagRecording | TableRecording | BrokenRecording
 
 
 def find_recordings(data: Path) -> dict[str, Recording]:
@@ -94,32 +135,14 @@ def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recordin
     return groups
 
 
-def read_tables(data: Path) -> dict[str, TableRecording]:
-    """Return the recordings of a folder of tables by name; raises RecordingError, see :func:`_read_with_scenes`."""
-
-    def read() -> FindScene:
-        trials, obstacles = data / TRIALS, data / OBSTACLES
-        if (data / SCENES).exists():
-            return read_box_scenes(data / SCENES, trials if trials.exists() else None)
-        return read_scenes(obstacles if obstacles.exists() else None, data / GOALS)
-
-    return _read_with_scenes(data / RECORDINGS, read, data)
-
-
-def _read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> dict[str, TableRecording]:
-    """Return the recordings of a table with their scenes; data: what a warning names.
-
-    Raises one RecordingError for the errors of all tables if a table has no scenes or no recording that can be used.
-    """
-    errors: list[FocError] = []
-    find = collect(errors, read)
-    movements = read_movements(file, errors)
-    failures = [each for each in movements.values() if isinstance(each, RecordingError)]
-    if find is None or errors or len(failures) == len(movements):
-        raise join_errors([*errors, *failures])
-    found = {name: TableRecording(name, movement, find(name)) for name, movement in movements.items()}
-    warn_of_far_scenes(data, [(each.movement, each.scene) for each in found.values() if isinstance(each.movement, Movement)])
-    return found
+def read_tables(data: Path) -> dict[str, TableRecording | BrokenRecording]:
+    """Return the recordings of a folder of tables by name; raises RecordingError, see :func:`read_with_scenes`."""
+    scenes, trials, obstacles = data / SCENES, data / TRIALS, data / OBSTACLES
+    if scenes.exists():
+        read = partial(read_box_scenes, scenes, trials if trials.exists() else None)
+    else:
+        read = partial(read_scenes, obstacles if obstacles.exists() else None, data / GOALS)
+    return read_with_scenes(data / RECORDINGS, read, data)
 
 
 def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, output: Path) -> str:
@@ -130,23 +153,133 @@ def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, outp
     """
     if obstacles is None and not table.is_dir():
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
-    found = read_tables(table) if obstacles is None else _read_with_scenes(table, partial(read_scenes, obstacles, goals), table)
-    movements = collect_all(TableRecording.read_movement, [(each,) for each in found.values()])
-    bags: dict[Path, Movement] = {}
-    for movement in movements:
-        name = re.sub(r'[^A-Za-z0-9._-]', '_', movement.name).lstrip('.-') or '_'  # valid on any file system
+    found = read_tables(table) if obstacles is None else read_with_scenes(table, partial(read_scenes, obstacles, goals), table)
+    broken = [each.error for each in found.values() if isinstance(each, BrokenRecording)]
+    if broken:
+        raise join_errors(broken)
+    recordings = [each for each in found.values() if isinstance(each, TableRecording)]
+    bags: dict[Path, TableRecording] = {}
+    for each in recordings:
+        name = re.sub(r'[^A-Za-z0-9._-]', '_', each.name).lstrip('.-') or '_'  # valid on any file system
         if (bag := output / name) in bags:
-            raise RecordingError(f'recordings {bags[bag].name!r} and {movement.name!r} would both be written to {name}')
-        bags[bag] = movement
+            raise RecordingError(f'recordings {bags[bag].name!r} and {each.name!r} would both be written to {name}')
+        bags[bag] = each
     for bag in bags:
         if bag.exists():
             raise RecordingError(f'{bag}: exists already and is not overwritten; choose another --output')
-    for bag, movement in show_progress(bags.items(), 'convert', len(bags)):
+    for bag, each in show_progress(bags.items(), 'convert', len(bags)):
         with BagWriter(bag) as writer:
-            for stamp_ns, topic, message in recorded_messages(movement, found[movement.name].scene):
-                writer.write(topic, message, stamp_ns)
-    hands = sum(len(each.stamps_ns) for each in movements)
-    scenes = [(each, found[each.name].scene) for each in movements]
-    numbers = [len(scene.find_boxes(each.positions) or scene.obstacles) for each, scene in scenes]
+            for item in each.items():
+                writer.write(item.topic, item.message, item.log_ns)
+    hands = sum(len(each.stamps_ns) for each in recordings)
+    numbers = [len(each.scene.find_boxes(each.positions) or each.scene.obstacles) for each in recordings]
     count = ' to '.join(str(each) for each in sorted({min(numbers), max(numbers)}))
     return f'{len(bags)} bags with {hands} hand poses and {count} obstacles written to {output}'
+
+
+def read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> dict[str, TableRecording | BrokenRecording]:
+    """Return the recordings of a table in the order of their first rows, with the scenes that are read; data: for warnings.
+
+    Raises one RecordingError for the errors of all tables if a table has no scenes or no recording that can be used.
+    """
+    errors: list[FocError] = []
+    find, found = collect(errors, read), dict[str, list[Row]]()
+    known, rows = len(errors), read_rows(file, ('recording', 't_s', 'x_m', 'y_m'), ('z_m',))
+    collect(errors, parse_rows, rows, lambda row: found.setdefault(read_recording(row), []).append(row))
+    if len(errors) == known:
+        collect(errors, check_not_empty, file, found)
+    _warn_once_for_each(file, ((name, doubt) for name, rows in found.items() if (doubt := _find_doubt(rows))))
+    samples = {name: _parse_samples(rows) for name, rows in found.items()}
+    failures = [each for each in samples.values() if isinstance(each, RecordingError)]
+    if find is None or errors or len(failures) == len(found):
+        raise join_errors([*errors, *failures])
+    recordings: dict[str, TableRecording | BrokenRecording] = {}
+    for name, each in samples.items():
+        if isinstance(each, RecordingError):
+            recordings[name] = BrokenRecording(name, each)
+        else:
+            stamps_ns = tuple(EPOCH_NS + round(t_s * NANOSECONDS) for t_s in each[:, 0].tolist())
+            recordings[name] = TableRecording(name, stamps_ns, each[:, 1:], find(name))
+    _warn_of_far_scenes(data, [each for each in recordings.values() if isinstance(each, TableRecording)])
+    return recordings
+
+
+def _parse_samples(table: Iterable[Row]) -> Array | RecordingError:
+    """Return time [s] and position [m] of each row (n, 4), or the error of a cell out of bounds or of time that runs backward."""
+    samples: list[list[float]] = []
+
+    def parse(row: Row) -> None:
+        # a stamp has 31 bits for seconds; in a recording of more than a day, two clocks are mixed up
+        bounds = (samples[-1][0], samples[0][0] + 86400.0) if samples else (0.0, 2e9)
+        samples.append(row.read_numbers(Column('t_s', *bounds), *POSITION))
+
+    try:
+        parse_rows(table, parse)
+    except RecordingError as error:
+        return error
+    return np.array(samples)
+
+
+def _find_doubt(rows: Sequence[Row]) -> Doubt | None:
+    """Find times or positions that cannot be in s and m, or that repeat, also in rows that cannot be used because of that."""
+    columns = [column for column in ('t_s', 'x_m', 'y_m', 'z_m') if column in rows[0].cells]
+    numbers = np.array([[row.parse_number(column) for column in columns] for row in rows])
+    steps = np.diff(numbers[np.isfinite(numbers).all(axis=1)], axis=0)
+    forward, repeated = steps[steps[:, 0] > 0.0], int((steps[:, 0] == 0.0).sum())
+    if len(steps) < 2:
+        return None
+    if 2 * repeated >= len(steps):
+        return 't_s', 'repeats', f'{repeated} of {len(steps)} rows have the time of the row before'
+    if not len(forward):
+        return None
+    step_s = float(np.median(forward[:, 0]))
+    if not 1e-4 <= step_s <= 1.0:  # of a tracker
+        units = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
+        words = f'seems to be in {_find_nearest_unit(units, step_s, 0.01)}'
+        return 't_s', words, f'the median time between two poses is {step_s:.3g} s'
+    speed = float(np.quantile(np.linalg.norm(forward[:, 1:], axis=1) / forward[:, 0], 0.99))
+    if speed <= 20.0:  # beyond that of any hand
+        return None
+    return 'the position', f'seems to be in {_find_nearest_unit(LENGTH_UNITS, speed, 0.5)}', f'the hand moves at {speed:.3g} m/s'
+
+
+def _warn_of_far_scenes(file: Path, recordings: Iterable[TableRecording]) -> None:
+    """Warn of recordings whose goals or obstacles are all too far from the hand, or too large, to be in m; once for each kind.
+
+    Positions that are in another unit themselves give no second warning here: their movement is larger by the same factor.
+    """
+    doubts: list[tuple[str, Doubt]] = []
+    for each in recordings:
+        low, high = each.positions.min(axis=0), each.positions.max(axis=0)
+        extent = max(float(np.linalg.norm(high - low)), 0.1)
+        for kind, rows in (('goals', each.scene.goals), ('obstacles', each.scene.obstacles)):
+            places = np.array([row[:3] for row in (() if rows is None else rows)]).reshape(-1, 3)
+            gap = float(np.linalg.norm(places - np.clip(places, low, high), axis=1).min(initial=math.inf))
+            if max(10.0, 20.0 * extent) < gap < math.inf:
+                words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, gap, extent)}'
+                reason = f'the nearest is {gap:.3g} m from the movement of the hand'
+                doubts.append((each.name, (f'the {kind}', words, reason)))
+            elif kind == 'obstacles' and (least := _find_least_size(each.scene)) > max(1.0, 10.0 * extent):
+                words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, least, 0.1 * extent)}'
+                doubts.append((each.name, ('the sizes of the obstacles', words, f'the smallest is {least:.3g} m')))
+    _warn_once_for_each(file, doubts)
+
+
+def _find_least_size(scene: RecordedScene) -> float:
+    """Return the radius or the larger length of the smallest obstacle [m], 0 if there is none."""
+    return min((max(row[3], *row[6:8]) for row in scene.obstacles), default=0.0)
+
+
+def _warn_once_for_each(file: Path, doubts: Iterable[tuple[str, Doubt]]) -> None:
+    """Warn once of what is doubted in several recordings, given with their names."""
+    grouped: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for name, (what, words, reason) in doubts:
+        grouped.setdefault((what, words), []).append((name, reason))
+    for (what, words), ((name, reason), *rest) in grouped.items():
+        others = f' and {len(rest)} others' if rest else ''
+        warn(f'{file}: {what} of recording {name}{others} {words}: {reason}')
+
+
+def _find_nearest_unit(units: Mapping[str, float], value: float, usual: float) -> str:
+    """Return the unit in which a value is nearest to a usual one, by their ratio."""
+    return min(units, key=lambda each: abs(math.log(value * units[each] / usual)))

@@ -10,9 +10,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from foc_ros.core.config import Config
-from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import MessageError
+from foc_ros.analysis.recordings import Recording
+from foc_ros.core.classes.library import Demonstration
+from foc_ros.core.config import ONLINE, Config
+from foc_ros.core.errors import MessageError, RecordingError, warn
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
@@ -30,8 +31,8 @@ from foc_ros.ros.transforms import Transforms, TransformTree
 class Step:
     """One recorded message and its effect.
 
-    item: the message; sample: its hand sample, None for other messages and for a rejected one; prediction: made from the sample,
-    None where none was due or possible; scene: the scene of the prediction.
+    item: the message; sample: as of `Replay.take`; prediction: made from the sample, None where none was due or possible; scene:
+    the scene of the prediction.
     """
 
     item: Item
@@ -43,14 +44,12 @@ class Step:
 class Replay:
     """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
 
-    Transforms of the recording are applied as the node applies those of tf2, by the log times of the messages. budget_s: time
-    limit of each prediction [s], with which results depend on the speed of the machine; None for none. Raises RecordingError or
-    InputError where the class library cannot be used.
+    Transforms of the recording are applied as the node applies those of tf2, by the log times of the messages. Raises
+    RecordingError or InputError where the class library cannot be used.
     """
 
-    def __init__(self, config: Config, budget_s: float | None = None) -> None:
+    def __init__(self, config: Config) -> None:
         self.pipeline = Pipeline(config, load_library(config.homotopy.library))
-        self._budget_s = budget_s
         self.intake = Intake(self.pipeline)
         self._held: dict[str, deque[Item]] = defaultdict(deque)
         self._begin_recording()
@@ -63,10 +62,10 @@ class Replay:
         self._reasons: dict[tuple[str, str], str] = {}
         self._counts_before = Counter(self.intake.counts)
 
-    def take(self, items: Iterable[Item]) -> Iterator[tuple[Item, SampleStatus | None]]:
-        """Pass the messages to the pipeline in the order in which the node does, without predicting.
+    def take(self, items: Iterable[Item]) -> Iterator[tuple[Item, HandSample | None]]:
+        """Pass the messages to the pipeline in the order in which the node does, without predicting; yield each with its sample.
 
-        Yield each with its status, which is None for transforms and for what cannot be decoded.
+        The sample is None for other messages than hand poses and for rejected ones.
         """
         for item in items:
             now_s = item.log_ns / NANOSECONDS
@@ -89,10 +88,8 @@ class Replay:
 
     def steps(self, items: Iterable[Item]) -> Iterator[Step]:
         """Process the messages in their order and yield the effect of each."""
-        for item, status in self.take(items):
-            is_hand = item.role == HAND
-            prediction = self.pipeline.predict(Deadline(self._budget_s)) if is_hand and self.pipeline.is_due else None
-            sample = self.intake.sample if is_hand and status is not None and status.is_taken else None
+        for item, sample in self.take(items):
+            prediction = self.pipeline.predict() if item.role == HAND and self.pipeline.is_due else None
             yield Step(item, sample, prediction, self.pipeline.scene)
 
     def forget_scene(self) -> None:
@@ -121,7 +118,7 @@ class Replay:
             left_out.append(f'{late} messages before the first hand pose left out: they are in another frame than it')
         return '; '.join([*refused, *left_out])
 
-    def _release(self, role: str, now_s: float) -> Iterator[tuple[Item, SampleStatus | None]]:
+    def _release(self, role: str, now_s: float) -> Iterator[tuple[Item, HandSample | None]]:
         for arrival in self._transforms.release(role, now_s):
             try:
                 status = self.intake.take_arrival(role, arrival)
@@ -129,7 +126,8 @@ class Replay:
                 self.intake.refuse(role, MessageError('message', f'the fields of {TYPES[role]}', error))
                 status = None
             self._note(role, status)
-            yield self._held[role].popleft(), status
+            is_taken = role == HAND and status is not None and status.is_taken
+            yield self._held[role].popleft(), self.intake.sample if is_taken else None
 
     def _note(self, role: str, status: SampleStatus | None) -> None:
         """Count a message, and why it was refused if it was."""
@@ -198,3 +196,22 @@ class GuidanceReplay:
             if output.status is GuidanceStatus.STALE and not output.force.any() and not output.authority:
                 self._next_ns = max(self._next_ns, end_ns)
                 self._state = replace(self._state, t=(self._next_ns - self._first_ns) / NANOSECONDS)
+
+
+def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration, ...]:
+    """Return the movements of a recording that end at a goal (`foc_ros.core.learning.movements`), the last ones.
+
+    Raises RecordingError where the recording cannot be read or contains none.
+    """
+    replayed = Replay(config.with_values({'experience.learning': ONLINE, 'homotopy.library': ''}))
+    for _ in replayed.take(recording.items()):
+        pass
+    movements = replayed.pipeline.learnt.movements.finish()
+    losses = replayed.describe_losses()
+    if not movements.learnt:
+        standing = f'no movement: the hand was never faster than {config.estimator.onset_speed:g} m/s'
+        unused = losses or replayed.pipeline.not_ready_reason()
+        raise RecordingError(f'{recording.name}: {movements.refusal or unused or standing}')
+    if losses:
+        warn(losses)
+    return movements.learnt

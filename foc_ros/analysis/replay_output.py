@@ -8,7 +8,6 @@ import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -71,33 +70,30 @@ def _write_element(file: TextIO, element: object) -> None:
     file.write((',\n' if file.tell() else '\n') + json.dumps(element, allow_nan=False))
 
 
-@dataclass
 class Summary:
-    """Counts over the steps of one replay.
+    """Counts over the steps of one replay, and the wall time of each prediction [s].
 
-    samples: hand poses read; solved: predictions with a candidate that has a likelihood; compromised, estimated: candidates with
-    one; cleared_by_height: obstacles that a predicted height cleared, over all predictions; seconds: wall time of each
-    prediction.
+    Counted are the hand poses read, the predictions, those with a candidate that has a likelihood, the candidates with one that
+    are compromised or estimated, and the obstacles that a predicted height cleared, over all predictions.
     """
 
-    samples: int = 0
-    predictions: int = 0
-    solved: int = 0
-    compromised: int = 0
-    estimated: int = 0
-    cleared_by_height: int = 0
-    seconds: list[float] = field(default_factory=list)
+    def __init__(self) -> None:
+        self.seconds: list[float] = []
+        names = ('samples', 'predictions', 'solved', 'compromised', 'estimated', 'cleared_by_height')
+        self.counts = Counter(dict.fromkeys(names, 0))
 
     def add(self, step: Step) -> None:
         """Count one step."""
-        self.samples += step.item.role == HAND
+        self.counts['samples'] += step.item.role == HAND
         if step.prediction is not None:
-            self.predictions += 1
-            self.solved += bool(step.prediction.candidates_with_likelihood)
-            for each in step.prediction.candidates_with_likelihood:
-                self.compromised += each.status is Status.COMPROMISED
-                self.estimated += each.is_estimated
-            self.cleared_by_height += sum(step.prediction.cleared)
+            likely = step.prediction.candidates_with_likelihood
+            self.counts.update(
+                predictions=1,
+                solved=bool(likely),
+                compromised=sum(each.status is Status.COMPROMISED for each in likely),
+                estimated=sum(each.is_estimated for each in likely),
+                cleared_by_height=sum(step.prediction.cleared),
+            )
             self.seconds.append(step.prediction.solve_s)
 
     def answer(self, counts: Mapping[str, int], duration_s: float) -> dict[str, Any]:
@@ -108,14 +104,9 @@ class Summary:
         failures = Counter({name.removeprefix(FAILED): count for name, count in counts.items() if name.startswith(FAILED)})
         p50, p99 = (1e3 * np.percentile(self.seconds, (50, 99))).tolist() if self.seconds else (None, None)
         return {
-            'samples': self.samples,
-            'predictions': self.predictions,
-            'solved': self.solved,
+            **self.counts,
             'refused': {name: count for name, count in sorted(counts.items()) if not name.startswith(FAILED)},
-            'compromised': self.compromised,
-            'estimated': self.estimated,
             'failures': dict(sorted(failures.items())),
-            'cleared_by_height': self.cleared_by_height,
             'prediction_ms': {'p50': p50, 'p99': p99},
             'duration_s': duration_s,
         }
@@ -123,25 +114,20 @@ class Summary:
 
 def facts(answer: Mapping[str, Any]) -> dict[str, str]:
     """Return the answer of a summary in words, for a table or a report."""
-    times = answer['prediction_ms']
+    times, compromised, estimated = answer['prediction_ms'], answer['compromised'], answer['estimated']
     unsolved = {f'{name} ({Status(name).remedy})': count for name, count in answer['failures'].items() if count}
     return {
         'recording': f'{answer["duration_s"]:.1f} s',
         'hand poses': str(answer['samples']),
         'predictions': f'{answer["predictions"]}, {answer["solved"]} with a solved candidate',
         'rejected': _list_counts(answer['refused']),
-        'candidates compromised': _list_with_note(answer['compromised'], Status.COMPROMISED.remedy),
-        'candidates estimated': _list_with_note(answer['estimated'], 'unlikely or late'),
+        'candidates compromised': f'{compromised} ({Status.COMPROMISED.remedy})' if compromised else 'none',
+        'candidates estimated': f'{estimated} (unlikely or late)' if estimated else 'none',
         'candidates not solved': _list_counts(unsolved),
         'obstacles cleared by height': f'{answer["cleared_by_height"]} over all predictions',
         **({'demonstrations learned': str(answer['learned'])} if 'learned' in answer else {}),
         'time per prediction': '-' if times['p50'] is None else f'{times["p50"]:.1f} ms median, {times["p99"]:.1f} ms p99',
     }
-
-
-def _list_with_note(count: int, note: str) -> str:
-    """Return a count with a note, which is left out where nothing was counted."""
-    return f'{count} ({note})' if count else _list_counts({})
 
 
 def _list_counts(counts: Mapping[str, int]) -> str:

@@ -196,7 +196,7 @@ def replay(
             if report is not None:
                 show_address(report / 'index.html')
     losses = list(filter(None, [played.describe_losses(), played.intake.describe_still_hand()]))
-    if summary.solved:
+    if summary.counts['solved']:
         warn_all('replay', losses)
         return 0
     reason = '; '.join([*losses, played.pipeline.not_ready_reason() or 'see the candidates not solved'])

@@ -8,6 +8,7 @@ import json as json_format
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +36,12 @@ def learn(data: Data, /, *, output: Path, params: options.Params = options.DEFAU
     recordings = find_recordings(data)
     if len(recordings) > MOST_WAYS:
         raise InputError(f'{data}', f'at most {MOST_WAYS} recordings', len(recordings))
-    from foc_ros.analysis.learn import learn_recordings
+    from foc_ros.analysis.parallel import collect
+    from foc_ros.analysis.replay import learn_recording
     from foc_ros.io.class_library import save_library
 
-    learnt, failed = learn_recordings(recordings, params)
+    movements, failed = collect(partial(learn_recording, config=params), list(recordings.items()), 'learn')
+    learnt = [each for found in movements for each in found]
     if not learnt:
         raise RecordingError(f'{data}: no recording could be learnt: {next(iter(failed.values()))}')
     save_library(output, learnt)
@@ -173,12 +176,14 @@ def run_simulation(
         raise InputError('--recordings', f'recordings of people for the operator {HUMAN_PATHS}', 'none')
     found = find_recordings(recordings) if recordings is not None and HUMAN_PATHS in operators else {}
     write_report = study.load_report('simulation')
+    from foc_ros.analysis.parallel import collect_all
     from foc_ros.analysis.simulation.operators import read_tasks
-    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, simulate, summarise
+    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, run_pair, summarise
 
     tasks = read_tasks(found.values(), study.params) if found else []
     with study.open_workers():
-        results = simulate(make_pairs(operators, assistance, trials, seed, tasks), study.params, {**RULES, **(rivals or {})})
+        run = partial(run_pair, config=study.params, rules={**RULES, **(rivals or {})})
+        results = collect_all(run, make_pairs(operators, assistance, trials, seed, tasks), 'simulate')
     cells = summarise(results, seed)
     write_report(cells, results, study.params)
     study.show({'cells': cells, 'seed': seed}, make_tables(cells), (), SIMULATION_PAGE)

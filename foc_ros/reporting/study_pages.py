@@ -13,7 +13,7 @@ import numpy as np
 
 from foc_ros.analysis.evaluation import report as evaluation
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED, UNIFORM
-from foc_ros.analysis.evaluation.questions import GAP, GOAL, PATH_CLASS
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.scores import TENTHS
 from foc_ros.analysis.fitting import fit as fitting
 from foc_ros.analysis.recordings import Recording
@@ -189,7 +189,7 @@ def write_fit(
 def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
     colour, _ = get_class_style(0)
     for row, each in enumerate(drawn.values()):
-        ends = [end / each['given'] for end in each['interval'] if end is not None and end > 0.0]
+        ends = [end / each['given'] for end in each['interval'] if end > 0.0]
         axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
         axes.plot(each['value'] / each['given'], row, marker='o', color=colour)
     axes.axvline(1.0, color='0.4', linewidth=1.0)
@@ -261,14 +261,14 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
 
 
 def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> None:
-    everything = np.concatenate([task.path.position, task.goals, *(each.position for each in trials.values())])
+    everything = np.concatenate([task.path[:, 0], task.goals, *(each.position for each in trials.values())])
     (left, low), (right, high) = (everything.min(axis=0) - 0.04).tolist(), (everything.max(axis=0) + 0.04).tolist()
     draw_scene(axes, task.obstacles, task.goals, (left, right, low, high))
-    axes.plot(*task.path.position.T, color='black', linestyle='--', linewidth=1.0, label='intended')
+    axes.plot(*task.path[:, 0].T, color='black', linestyle='--', linewidth=1.0, label='intended')
     for number, (rule, trial) in enumerate(trials.items()):
         look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
         axes.plot(*trial.position.T, label=rule, **look)
-        touching = trial.position[trial.find_collisions(task)]
+        touching = trial.position[trial.measure_clearances(task) < 0.0]
         axes.plot(*touching.T, linestyle='', marker='x', markersize=4, color=look['color'])
         if rule == FOC:
             rows = np.linspace(0, len(trial.position) - 1, 24).astype(int)

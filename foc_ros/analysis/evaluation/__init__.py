@@ -6,7 +6,6 @@ A baseline is added by :func:`register_baseline`.
 """
 
 from foc_ros.analysis.evaluation.baselines import Baseline, Forecast, register_baseline
-from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording
-from foc_ros.analysis.evaluation.questions import Question
+from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, Question
 
 __all__ = ['Baseline', 'Forecast', 'Observation', 'ObservedRecording', 'Question', 'register_baseline']

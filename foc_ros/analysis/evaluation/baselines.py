@@ -13,14 +13,16 @@ A baseline is added from outside by :func:`register_baseline`; the built-in ones
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import BPoly
+from scipy.special import softmax
 
 from foc_ros.core.config import WHOLE_WAY_S, LikelihoodConfig
 from foc_ros.core.goals import compute_straight_effort
@@ -29,11 +31,9 @@ from foc_ros.core.registry import Registry
 from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import Array, Record
 
-from .observations import Observation, ObservedRecording
-from .questions import GOAL, Answer, Question
+from .observations import GOAL, Answer, Observation, ObservedRecording, Question
 
 UNCERTAINTY = 0.01
-TIE = 1e-12
 PUBLISHED, REFITTED, PLAIN, UNIFORM, BOLTZMANN = 'foc', 'foc, held out', 'foc, plain rule', 'uniform', 'Boltzmann'
 CONFIDENCES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
@@ -58,7 +58,7 @@ class Forecast(Record):
     @classmethod
     def from_answer(cls, answer: Answer, confidence: float, question: Question) -> Forecast:
         """Give one answer a confidence in [0, 1 - UNCERTAINTY]."""
-        named = np.array([1.0 if each == answer else 0.0 for each in question.answers])
+        named = np.array([float(each == answer) for each in question.answers])
         return cls.from_answer_shares(named, question, 1.0 - confidence)
 
     @classmethod
@@ -67,95 +67,64 @@ class Forecast(Record):
         each = rest / question.possible
         return cls((1.0 - rest) * shares + each * question.is_possible, each)
 
-    @classmethod
-    def uniform(cls, question: Question) -> Forecast:
-        """Give all possible answers the same probability."""
-        return cls.from_answer_shares(np.zeros(len(question.answers)), question, 1.0)
-
     def true_probability(self, question: Question) -> float:
         """Return the probability of the true answer."""
         return float(self.probability[question.truth])
-
-    def confidence(self) -> float:
-        """Return the probability of the likeliest answer."""
-        return float(max(self.probability.max(), self.each_other))
-
-    def correctness(self, question: Question) -> float:
-        """Return 1 where the likeliest answer is true, else 0; each of several equally likely answers counts its part."""
-        is_likeliest = self.probability >= self.confidence() - TIE
-        unlisted = question.unlisted if self.each_other >= self.confidence() - TIE else 0
-        return float(is_likeliest[question.truth] / (is_likeliest.sum() + unlisted))
-
-
-def published_shares(observation: Observation, _: None = None) -> Array:
-    """Return the shares (k,) of the candidates by the likelihoods that the node publishes."""
-    return observation.candidates.likelihood
 
 
 def power_rule_shares(observation: Observation, config: LikelihoodConfig) -> Array:
     """Return the shares (k,) that the node would publish to a known operator with other parameters of the likelihood."""
     candidates = observation.candidates
-    solved = np.flatnonzero(candidates.has_likelihood)
-    branch_times, shortfalls = candidates.branch_times.take(solved), candidates.safety_shortfall[solved]
-    time_s = float(candidates.time_s[solved].min()) if len(solved) else 0.0
-    decided = branch_times, shortfalls, candidates.decisions, time_s, OWN_SPREAD
+    solved = candidates.has_likelihood
+    time_s = float(candidates.time_s[solved].min()) if solved.any() else 0.0
+    decided = candidates.branch_times.take(np.flatnonzero(solved)), candidates.safety_shortfall[solved], candidates.decisions
     goals = ClassGoals(candidates.goal[solved]) if len(observation.goals) > 1 else None
-    shares = compute_likelihoods(candidates.cost_to_go[solved], config, *decided, goals)
-    return _share_among_solved(observation, shares)
+    shares = np.zeros(len(candidates))
+    shares[solved] = compute_likelihoods(candidates.cost_to_go[solved], config, *decided, time_s, OWN_SPREAD, goals)
+    return shares
 
 
 def boltzmann_shares(observation: Observation, inverse_temperature: float) -> Array:
     """Return the maximum-entropy rule exp(-b J), (k,); b: inverse temperature [s^5/m^2]."""
-    cost = observation.candidates.cost_to_go[observation.candidates.has_likelihood]
-    weights = np.exp(-inverse_temperature * (cost - cost.min()))
-    return _share_among_solved(observation, weights / weights.sum())
-
-
-def _share_among_solved(observation: Observation, solved: Array) -> Array:
-    """Return shares (k,) of all candidates from those of the ones that take part; the others have none."""
-    shares = np.zeros(len(observation.candidates))
-    shares[observation.candidates.has_likelihood] = solved
+    candidates = observation.candidates
+    costs, shares = candidates.cost_to_go[candidates.has_likelihood], np.zeros(len(candidates))
+    shares[candidates.has_likelihood] = softmax(-inverse_temperature * costs)
     return shares
 
 
 def compute_straight_costs(observation: Observation) -> Array:
     """Return the cost [m^2/s^5] of the movement to each goal, (g,): the integral of squared jerk."""
-    return compute_straight_effort(_find_state(observation), observation.goals, _find_times(observation))
+    state, times_s = _find_movement(observation)
+    return compute_straight_effort(state, observation.goals, times_s)
 
 
 def compute_straight_positions(observation: Observation, goal: int, seconds: Array) -> Array:
     """Return the positions (h, 2) [m] of the movement to a goal some seconds (h,) from now; at the goal once it has ended."""
-    end, time_s = np.zeros((3, 2)), float(_find_times(observation)[goal])
-    end[0] = observation.goals[goal]
-    quintic = BPoly.from_derivatives([0.0, time_s], [_find_state(observation), end])
-    return np.asarray(quintic(np.minimum(seconds, time_s)))
+    state, times_s = _find_movement(observation)
+    quintic = BPoly.from_derivatives([0.0, times_s[goal]], [state, [observation.goals[goal], np.zeros(2), np.zeros(2)]])
+    return np.asarray(quintic(np.minimum(seconds, times_s[goal])))
 
 
-def _find_state(observation: Observation) -> Array:
-    """Return position, velocity and acceleration (3, 2); at rest the last two are noise, and 0 as in the predictor."""
-    state = observation.hand.reshape(3, 2).copy()
+def _find_movement(observation: Observation) -> tuple[Array, Array]:
+    """Return position, velocity and acceleration (3, 2) of the hand, and the time (g,) [s] of its movement to each goal.
+
+    At rest velocity and acceleration are noise, and 0 as in the predictor. The time is that of the predictor, the longest of all
+    where it found no path.
+    """
+    candidates, state = observation.candidates, observation.hand.reshape(3, 2).copy()
     if observation.movement_age_s == 0.0:
         state[1:] = 0.0
-    return state
-
-
-def _find_times(observation: Observation) -> Array:
-    """Return the time (g,) [s] that the predictor gave the movement to each goal, the longest of all where it found no path."""
-    candidates = observation.candidates
-    of_goal = [candidates.time_s[candidates.goal == goal] for goal in range(len(observation.goals))]
-    return np.array([each[0] if len(each) else candidates.time_s.max() for each in of_goal])
+    times_s = np.full(len(observation.goals), candidates.time_s.max())
+    times_s[candidates.goal[::-1]] = candidates.time_s[::-1]  # its first candidate decides
+    return state, times_s
 
 
 ForecastFunction = Callable[[Observation, Question, Any], Forecast]
 SettingsFunction = Callable[[Sequence[ObservedRecording], LikelihoodConfig], tuple[Any, ...]]
 
 
-@dataclass(frozen=True)
-class Baseline:
-    """A predictor and the settings among which cross-validation chooses for each recording.
-
-    name: as in the tables and in `evaluate --json`; forecast: see :func:`register_baseline`; settings: any values.
-    """
+class Baseline(NamedTuple):
+    """A predictor by its name in tables and JSON, and the settings among which cross-validation chooses for each recording."""
 
     name: str
     forecast: ForecastFunction
@@ -188,40 +157,32 @@ def register_baseline(name: str, forecast: ForecastFunction, settings: Sequence[
 
 def make_baselines(recordings: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[Baseline, ...]:
     """Return all registered predictors; published: the parameters that the recordings were replayed with."""
-    found = []
-    for name in BASELINES:
-        forecast, settings = BASELINES.get(name)
-        found.append(Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings)))
-    return tuple(found)
+    parts = ((name, *BASELINES.get(name)) for name in BASELINES)
+    return tuple(
+        Baseline(name, forecast, tuple(settings(recordings, published) if callable(settings) else settings))
+        for name, forecast, settings in parts
+    )
 
 
 def make_plain_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
     """Return the exponents that are tried by which all choices are made."""
-    return tuple(make_plain(published, beta) for beta in POWERS)
+    return tuple(replace(published, beta=beta, planning_horizon_s=WHOLE_WAY_S) for beta in POWERS)
 
 
 def make_power_rules(_: Sequence[ObservedRecording], published: LikelihoodConfig) -> tuple[LikelihoodConfig, ...]:
     """Return all parameters of the likelihood that are tried: one exponent for all choices, or near and far ones that differ."""
-    tried = product((0.0, 1.5, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 5.0), (1.0, 4.0))
-    ahead = (replace(make_ahead(published, *values), weaving=weaving) for *values, weaving in tried)
-    return (*make_plain_rules((), published), *ahead)
-
-
-def make_plain(likelihood: LikelihoodConfig, beta: float) -> LikelihoodConfig:
-    """Return a likelihood by which all choices are made with one exponent."""
-    return replace(likelihood, beta=beta, planning_horizon_s=WHOLE_WAY_S)
-
-
-def make_ahead(likelihood: LikelihoodConfig, horizon_s: float, lookahead_s: float, beta: float) -> LikelihoodConfig:
-    """Return a likelihood of an operator with a planning horizon."""
-    return replace(likelihood, planning_horizon_s=horizon_s, lookahead_s=lookahead_s, beta=beta)
+    ahead = (
+        replace(published, planning_horizon_s=horizon_s, lookahead_s=lookahead_s, beta=beta, weaving=weaving)
+        for horizon_s, lookahead_s, beta, weaving in product((0.0, 1.5, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 5.0), (1.0, 4.0))
+    )
+    return (*make_plain_rules((), published), published, *ahead)
 
 
 def make_boltzmann_rates(recordings: Sequence[ObservedRecording], _: LikelihoodConfig) -> tuple[float, ...]:
     """Return the inverse temperatures [s^5/m^2] that are tried, in parts of one over the median effort to go."""
     tables = [each.candidates for recording in recordings for each in recording.observations]
     effort = float(np.median([table.cost_to_go[table.has_likelihood].min() for table in tables]))
-    return tuple(float(rate) / effort for rate in np.geomspace(0.01, 100.0, 25))
+    return tuple((np.geomspace(0.01, 100.0, 25) / effort).tolist())
 
 
 def forecast_shares(
@@ -234,25 +195,22 @@ def forecast_shares(
 def forecast_published(observation: Observation, question: Question, _: None) -> Forecast:
     """Forecast by the shares that the node publishes; those of ways and gaps are given that the goal was announced."""
     announced = 1.0 if question.name == GOAL else 1.0 - observation.other
-    return Forecast.from_shares(published_shares(observation) / announced, question)
+    return Forecast.from_shares(observation.candidates.likelihood / announced, question)
 
 
 def forecast_uniform(_: Observation, question: Question, __: None) -> Forecast:
     """Give all possible answers the same probability."""
-    return Forecast.uniform(question)
+    return Forecast.from_answer_shares(np.zeros(len(question.answers)), question, 1.0)
 
 
 def forecast_straight_minimum_jerk(observation: Observation, question: Question, setting: tuple[float, float]) -> Forecast:
     """Weigh straight movements to the goals by the ratios of their efforts; setting: exponent, and confidence in the whole."""
     beta, confidence = setting
-    shares = compute_likelihoods(compute_straight_costs(observation), LikelihoodConfig(beta=beta))
-    by_answer = np.zeros(len(question.answers))
-    for goal, share in enumerate(shares):
-        toward_goal = observation.goals[goal] - observation.hand[:2]
+    shares, by_answer = compute_likelihoods(compute_straight_costs(observation), LikelihoodConfig(beta=beta)), Counter[Answer]()
+    for goal, toward_goal in enumerate(observation.goals - observation.hand[:2]):
         answer = (goal,) if question.name == GOAL else _answer_of_line(observation, question, toward_goal)
-        if answer in question.answers:
-            by_answer[question.answers.index(answer)] += share
-    return Forecast.from_answer_shares(by_answer, question, 1.0 - confidence)
+        by_answer[answer] += shares[goal]
+    return Forecast.from_answer_shares(np.array([by_answer[each] for each in question.answers]), question, 1.0 - confidence)
 
 
 def forecast_answer(

@@ -1,9 +1,18 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Observations: what was predicted in a recording, beside what really came.
+"""Observations: what was predicted in a recording, beside what really came, and the questions that are put to them.
 
 A recording is replayed once. How costs become likelihoods can then be tried on the observations without a predictor. Scores and
-fits need nothing else.
+fits need nothing else. The questions:
+
+- `way`: in which homotopy class will the hand pass the obstacles still ahead?
+- `gap`: the same for the next row of obstacles only.
+- `goal`: which goal will it reach?
+
+In a row of m obstacles (`rows`) a path that does not turn back takes one of m + 1 gaps, so that rows of m_1, m_2, ... obstacles
+leave (m_1 + 1)(m_2 + 1)... homotopy classes. A gap that is too narrow for the hand is none. A question is put only where at least
+two answers are possible. Candidates may also weave through a row; such an answer can be given, but a uniform guess does not count
+it.
 """
 
 from __future__ import annotations
@@ -29,7 +38,15 @@ from foc_ros.core.plant.covariance import compute_duration_sensitivity
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record
 
-from .truth import TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
+from .truth import HORIZONS_S, TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
+
+EXACT = 1e-18
+"""Variance that is added to that of a position, which may be known [m^2]: that of a nanometre."""
+
+PATH_CLASS, GAP, GOAL = 'way', 'gap', 'goal'
+Answer = tuple[int, ...]
+"""Sides of the obstacles in question, LEFT or RIGHT, in their order; or the row of a goal."""
+Questions = list[tuple['Observation', 'Question']]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +55,11 @@ class CandidateTable(Record):
 
     labels; goal (k,): row of the goals; has_likelihood (k,): whether each takes part; cost_to_go (k,) [m^2/s^5]: integral of the
     squared control, comparable between goals; safety_shortfall (k,): by how much the safety factor is below the wanted one;
-    likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; is_named
-    (k, n): whether the obstacle is in the label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
-    (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2]: of the position at `TIMES_S`; duration_sensitivity (k, h, 2) [m]: by how much
-    the position lags behind for each share of the time to go that the movement takes longer; branch_times: when the candidates
+    likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; named:
+    obstacles in any label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
+    (k, h, 2) [m]: the positions at `TIMES_S`; covariance (k, 3, 2, 2) [m^2], positive definite: of those at `HORIZONS_S`;
+    duration_sensitivity (k, 3, 2) [m]: by how much these lag behind for each share of the time to go that the movement takes
+    longer; branch_times: when the candidates
     part; decisions: of those that take part.
     """
 
@@ -53,7 +71,7 @@ class CandidateTable(Record):
     likelihood: Array
     length: Array
     time_s: Array
-    is_named: Bools
+    named: frozenset[str]
     sides: Sides
     mean: Array
     covariance: Array
@@ -135,8 +153,7 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
         warn(losses)
     goals = made[-1][0].scene.goals
     assert goals is not None
-    stamps, positions = ([getattr(each, name) for each in samples] for name in ('stamp_ns', 'position'))
-    path = RecordedPath(np.array(stamps), np.array(positions), goals, recording.goal)
+    path = RecordedPath.from_samples(samples, goals, recording.goal)
     found = [make_observation(step, hand, path, adapted) for step, hand, adapted in made if hand.stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
@@ -209,7 +226,6 @@ def _tabulate_candidates(
         known = {} if each.has_likelihood else dict(each.candidate.sides)
         row[:] = [known.get(identity, side) for identity, side in zip(obstacles.ids, row, strict=True)]
     goal, grown = np.array([each.candidate.goal for each in predicted], dtype=np.intp), obstacles.grow(config.scene.hand_radius)
-    named = [[identity in dict(each.candidate.sides) for identity in obstacles.ids] for each in predicted]
     return CandidateTable(
         labels=tuple(each.candidate.label for each in predicted),
         goal=goal,
@@ -219,7 +235,7 @@ def _tabulate_candidates(
         likelihood=np.array([each.likelihood for each in predicted]),
         length=np.array([each.candidate.length for each in predicted]),
         time_s=np.array([each.times[-1] for each in solutions]),
-        is_named=np.array(named, dtype=bool).reshape(len(predicted), len(obstacles)),
+        named=frozenset(identity for each in predicted for identity, _ in each.candidate.sides),
         sides=sides,
         mean=np.array(
             [
@@ -228,7 +244,7 @@ def _tabulate_candidates(
                 for each in solutions
             ]
         ),
-        covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]),
+        covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]) + EXACT * np.eye(2),
         duration_sensitivity=np.array(
             [interpolate_steps(compute_duration_sensitivity(each, passing)[:, :2], each.dt) for each in solutions]
         ),
@@ -238,6 +254,73 @@ def _tabulate_candidates(
 
 
 def interpolate_steps(values: Array, dt: float) -> Array:
-    """Return values (N + 1, ...) at steps of dt [s] at `TIMES_S` (h, ...), linear between steps; the last one afterwards."""
+    """Return values (N + 1, ...) at steps of dt [s] at `HORIZONS_S` (3, ...), linear between; the last one afterwards."""
     times = dt * np.arange(len(values))
-    return np.asarray(make_interp_spline(times, values, k=1)(np.minimum(TIMES_S, times[-1])))
+    return np.asarray(make_interp_spline(times, values, k=1)(np.minimum(HORIZONS_S, times[-1])))
+
+
+@dataclass(frozen=True, eq=False)
+class Question(Record):
+    """One question to one prediction.
+
+    name; obstacles (a,): rows of those in question; possible: number of possible answers; answers: those that a candidate gives,
+    and the true one; given (k,): index of the answer of each candidate; is_possible: whether each answer is one of the possible
+    ones; truth: index of the true answer.
+    """
+
+    name: str
+    obstacles: NDArray[np.intp]
+    possible: int
+    answers: tuple[Answer, ...]
+    given: NDArray[np.intp]
+    is_possible: NDArray[np.bool_]
+    truth: int
+
+    @property
+    def unlisted(self) -> int:
+        """Number of possible answers that no candidate gives and that are not the true one."""
+        return max(self.possible - int(self.is_possible.sum()), 0)
+
+
+def ask_all(recording: ObservedRecording, name: str) -> Questions:
+    """Return a question with every observation of a recording to which it can be put."""
+    relevant = find_relevant_obstacles(recording)
+    pairs = ((observation, ask(name, observation, relevant)) for observation in recording.observations)
+    return [(observation, question) for observation, question in pairs if question is not None]
+
+
+def ask_main(recording: ObservedRecording) -> Questions:
+    """Return the questions that one set of parameters is fitted to: path classes, or goals where no path class is in question."""
+    return ask_all(recording, PATH_CLASS) or ask_all(recording, GOAL)
+
+
+def find_relevant_obstacles(recording: ObservedRecording) -> frozenset[str]:
+    """Return the obstacles that are in the label of any candidate of a recording."""
+    return frozenset[str]().union(*(each.candidates.named for each in recording.observations))
+
+
+def ask(name: str, observation: Observation, relevant: frozenset[str]) -> Question | None:
+    """Return a question about the relevant obstacles, None where fewer than two answers are possible or the truth is unknown."""
+    truth, candidates = observation.truth, observation.candidates
+    if name == GOAL:
+        count = len(observation.goals)
+        if truth.goal is None or count < 2:
+            return None
+        answers, given = tuple((goal,) for goal in range(count)), candidates.goal.astype(np.intp)
+        return Question(GOAL, np.zeros(0, dtype=np.intp), count, answers, given, np.ones(count, dtype=bool), truth.goal)
+    is_relevant = np.array([identity in relevant for identity in observation.ids], dtype=bool)
+    ahead = np.flatnonzero(truth.is_ahead & is_relevant)
+    if name == GAP and len(ahead):
+        ahead = ahead[observation.row[ahead] == observation.row[ahead].min()]
+    indices: dict[Answer, int] = {}
+    rows = [indices.setdefault(tuple(sides), len(indices)) for sides in candidates.sides[:, ahead].tolist()]
+    true = indices.setdefault(tuple(truth.sides[ahead].tolist()), len(indices))
+    listed, row = np.array([*indices]), observation.row[ahead]
+    possible, is_possible = 1, np.ones(len(listed), dtype=bool)
+    for number in np.unique(row):
+        gaps = np.unique(observation.gaps[number][:, ahead[row == number]], axis=0)
+        possible *= len(gaps)
+        is_possible &= (listed[:, None, row == number] == gaps).all(axis=2).any(axis=1)
+    if possible < 2:
+        return None
+    return Question(name, ahead, possible, tuple(indices), np.array(rows, dtype=np.intp), is_possible, true)

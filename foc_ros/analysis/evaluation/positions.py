@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,16 +31,13 @@ from scipy.special import logsumexp
 from foc_ros.core.types import NANOSECONDS, Array
 
 from .baselines import compute_straight_costs, compute_straight_positions
-from .observations import Observation, ObservedRecording
-from .questions import ask_main
+from .observations import Observation, ObservedRecording, ask_main
 from .scores import choose_held_out
 from .truth import HORIZONS, HORIZONS_S, TIMES_S
 
 LEVELS = (0.5, 0.9)
 """Probabilities of the ellipses and regions."""
 TIMES = np.array(TIMES_S)
-EXACT = 1e-18
-"""Variance of a position that is known [m^2]: that of a nanometre."""
 RINGS, SPOKES = 25, 4
 """Rings of a Gaussian, and points of a ring. A region is exact at 50 and 90 %, because the border lies between two rings."""
 Shares = dict[str, float | None]
@@ -56,11 +53,11 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
     times up to the horizon; recordings that end before a horizon do not count.
     """
     observations = [each for recording in recordings for each in recording.observations]
-    leading, taken = [_find_leading(each) for each in observations], _find_taken(recordings)
-    covariances = [each.candidates.covariance for each in observations]
+    means = [each.candidates.mean for each in observations]
+    leading, mixture = [_choose_leading(each) for each in observations], [each.candidates.mixture for each in observations]
     predicted = {
-        'most likely': [each.candidates.mean[row] for each, row in zip(observations, leading, strict=True)],
-        'likelihood-weighted': [np.tensordot(each.candidates.mixture, each.candidates.mean, 1) for each in observations],
+        'most likely': [np.tensordot(*each, 1) for each in zip(leading, means, strict=True)],
+        'likelihood-weighted': [np.tensordot(*each, 1) for each in zip(mixture, means, strict=True)],
         'constant velocity': [
             each.hand[:2] + TIMES[:, None] * (each.hand[2:4] if each.movement_age_s > 0.0 else np.zeros(2))
             for each in observations
@@ -69,9 +66,7 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
             compute_straight_positions(each, int(compute_straight_costs(each).argmin()), TIMES) for each in observations
         ],
     }
-    mixtures = [(each, each.candidates.mixture, covariance) for each, covariance in zip(observations, covariances, strict=True)]
-    densities = np.array([compute_log_densities(*each) for each in mixtures])
-    denser = np.array([compute_denser_shares(*each) for each in mixtures])
+    densities = [compute_log_densities(each, each.candidates.mixture, each.candidates.covariance) for each in observations]
     true, errors = np.array([each.truth.positions for each in observations]), {}
     for name, each in predicted.items():
         distance = np.hypot(*(np.array(each) - true).transpose(2, 0, 1))
@@ -79,10 +74,10 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
         errors[name] = {'average': average(mean[:, HORIZONS]), 'final': average(distance[:, HORIZONS])}
     return {
         'displacement_m': errors,
-        'nlpd': {'foc': average(-densities), 'Singer Kalman': average(score_singer(recordings))},
-        'inside': {f'{level:g}': find_inside(observations, leading, covariances, level) for level in LEVELS},
-        'inside_taken': {f'{level:g}': find_inside(observations, taken, covariances, level) for level in LEVELS},
-        'inside_all': {f'{level:g}': average(np.where(np.isfinite(denser), denser < level, np.nan)) for level in LEVELS},
+        'nlpd': {'foc': average(-np.array(densities)), 'Singer Kalman': average(score_singer(recordings))},
+        'inside': measure_inside(observations, leading),
+        'inside_taken': measure_inside(observations, _choose_taken(recordings)),
+        'inside_all': measure_inside(observations, mixture),
     }
 
 
@@ -92,36 +87,25 @@ def average(values: Array) -> Shares:
     return {name: float(np.nanmean(each)) if np.isfinite(each).any() else None for name, each in columns.items()}
 
 
-def find_inside(observations: Sequence[Observation], rows: Sequence[int], covariances: Sequence[Array], level: float) -> Shares:
-    """Return the share of true positions inside the ellipses of a probability, by horizon.
+def measure_inside(observations: Sequence[Observation], weights: Sequence[Array]) -> dict[str, Shares]:
+    """Return the share of true positions inside the smallest region of each of `LEVELS`, by horizon.
 
-    rows (m,): the candidate of each observation; covariances: of its candidates (k, h, 2, 2) [m^2].
+    weights: those (k,) of the candidates in the region of each observation. The region of one candidate is its ellipse.
     """
-    inside = []
-    for each, row, covariance in zip(observations, rows, covariances, strict=True):
-        offset = (each.truth.positions - each.candidates.mean[row])[HORIZONS]
-        scaled = np.linalg.solve(covariance[row, HORIZONS] + EXACT * np.eye(2), offset[..., None])[..., 0]
-        squared = (offset * scaled).sum(axis=-1)
-        # chi-square distribution of two degrees of freedom
-        inside.append(np.where(np.isfinite(squared), squared <= -2.0 * np.log(1.0 - level), np.nan))
-    return average(np.array(inside))
+    given = (
+        (each.candidates.mean[:, HORIZONS], each.candidates.covariance, each.truth.positions[HORIZONS]) for each in observations
+    )
+    denser = np.array([find_denser_share(weight, *each) for weight, each in zip(weights, given, strict=True)])
+    return {f'{level:g}': average(np.where(np.isfinite(denser), denser < level, np.nan)) for level in LEVELS}
 
 
 def compute_log_densities(observation: Observation, shares: Array, covariance: Array) -> Array:
     """Return the log-density (..., 3) of the true positions at the horizons [nat, metres], nan where the movement has ended.
 
-    shares (k,): weights of the candidates; covariance (..., k, h, 2, 2) [m^2]: of their positions.
+    shares (k,): weights of the candidates; covariance (..., k, 3, 2, 2) [m^2]: of their positions.
     """
-    counted = np.flatnonzero(shares > 0.0)
-    offset = (observation.truth.positions - observation.candidates.mean[counted])[:, HORIZONS]
-    rows, times = np.ix_(counted, HORIZONS)
-    return log_mixture_density(shares[counted], offset, covariance[..., rows, times, :, :] + EXACT * np.eye(2))
-
-
-def compute_denser_shares(observation: Observation, shares: Array, covariance: Array) -> Array:
-    """Return the probability (3,) of all that is denser than the true positions at the horizons; as `compute_log_densities`."""
-    mean, truth = observation.candidates.mean[:, HORIZONS], observation.truth.positions[HORIZONS]
-    return find_denser_share(shares, mean, covariance[:, HORIZONS] + EXACT * np.eye(2), truth)
+    offset = (observation.truth.positions - observation.candidates.mean)[:, HORIZONS]
+    return log_mixture_density(shares, offset, covariance)
 
 
 def find_denser_share(weight: Array, mean: Array, covariance: Array, position: Array) -> Array:
@@ -146,8 +130,8 @@ def log_mixture_density(weight: Array, offset: Array, covariance: Array) -> Arra
     x, y, xx, yy, xy = *np.moveaxis(offset, -1, 0), covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
     determinant = xx * yy - xy**2
     distance = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
-    logs = np.log(weight)[:, None] - 0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi)
-    return np.asarray(logsumexp(logs, axis=-2))
+    logs = -0.5 * (distance + np.log(determinant)) - np.log(2.0 * np.pi)
+    return np.asarray(logsumexp(logs, axis=-2, b=weight[:, None]))
 
 
 def _make_points() -> Array:
@@ -160,38 +144,35 @@ def _make_points() -> Array:
 POINTS = _make_points()
 
 
-def _find_leading(observation: Observation) -> int:
-    """Return the row of the most likely candidate, as published."""
+def choose_row(row: int, count: int) -> Array:
+    """Return weights (count,) of which one is 1, and the others are 0."""
+    weights: Array = np.eye(count)[row]
+    return weights
+
+
+def _choose_leading(observation: Observation) -> Array:
+    """Return weights (k,) that choose the most likely candidate, as published."""
     candidates, label = observation.candidates, observation.most_likely
-    return candidates.labels.index(label) if label else int(candidates.likelihood.argmax())
+    return choose_row(candidates.labels.index(label) if label else int(candidates.likelihood.argmax()), len(candidates))
 
 
-def _find_taken(recordings: Sequence[ObservedRecording]) -> list[int]:
-    """Return the row of the likeliest candidate of the true answer; of the most likely candidate where none gives it."""
-    rows = []
+def _choose_taken(recordings: Sequence[ObservedRecording]) -> list[Array]:
+    """Return weights that choose the likeliest candidate of the true answer; the most likely candidate where none gives it."""
+    found = []
     for recording in recordings:
         questions = {observation.stamp_ns: question for observation, question in ask_main(recording)}
         for each in recording.observations:
-            question = questions.get(each.stamp_ns)
+            question, likelihood = questions.get(each.stamp_ns), each.candidates.likelihood
             if question is not None and (is_true := question.given == question.truth).any():
-                rows.append(int(np.where(is_true, each.candidates.likelihood, -1.0).argmax()))
+                found.append(choose_row(int(np.where(is_true, likelihood, -1.0).argmax()), len(likelihood)))
             else:
-                rows.append(_find_leading(each))
-    return rows
+                found.append(_choose_leading(each))
+    return found
 
 
-class SingerSetting(NamedTuple):
-    """Standard deviations of the acceleration [m/s^2] and of a measured position [m], decay time of the acceleration [s]."""
-
-    acceleration_stddev: float
-    position_stddev: float
-    decay_s: float
-
-
-SINGER_SETTINGS = tuple(
-    SingerSetting(*each) for each in product(np.geomspace(0.05, 6.4, 8).tolist(), (2e-4, 1e-3), (0.1, 0.3, 1.0))
-)
-"""The settings that are tried."""
+SINGER_SETTINGS = np.array([*product(np.geomspace(0.05, 6.4, 8), (2e-4, 1e-3), (0.1, 0.3, 1.0))])
+"""The settings that are tried, (s, 3): standard deviations of the acceleration [m/s^2] and of a measured position [m], and decay
+time of the acceleration [s]."""
 
 
 def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array, ahead_s: Array) -> tuple[Array, Array]:
@@ -200,40 +181,35 @@ def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array
     stamps_ns (n,), rising, and positions (n, 2) [m] of the samples. Returns the mean (m, s, h, 2) [m] and the variance (m, s, h)
     [m^2] per axis under each of the s `SINGER_SETTINGS`; each forecast uses the samples up to its stamp.
     """
-    accelerations, noises, _ = np.array(SINGER_SETTINGS).T
-    state, covariance = np.zeros((len(SINGER_SETTINGS), 3, 2)), np.zeros((len(SINGER_SETTINGS), 3, 3))
-    state[:, 0], covariance[:, 0, 0] = positions[0], noises**2
+    accelerations, noises, _ = SINGER_SETTINGS.T
+    mean, covariance = np.zeros((len(noises), 3, 2)), np.zeros((len(noises), 3, 3))
+    mean[:, 0], covariance[:, 0, 0] = positions[0], noises**2
     covariance[:, 1, 1], covariance[:, 2, 2] = 1.0, accelerations**2  # a velocity of 1 m/s
-    wanted, means, variances, last_ns = set(at_ns.tolist()), [], [], int(stamps_ns[0])
-    ahead = [_discretise(float(each)) for each in ahead_s]
+    wanted, found, last_ns, ahead = set(at_ns.tolist()), [], int(stamps_ns[0]), [_discretise(float(each)) for each in ahead_s]
     for stamp_ns, position in zip(stamps_ns.tolist(), positions, strict=True):
         if stamp_ns > last_ns:
-            state, covariance = _propagate(state, covariance, _discretise((stamp_ns - last_ns) / NANOSECONDS))
+            transition, added = _discretise((stamp_ns - last_ns) / NANOSECONDS)
+            mean, covariance = transition @ mean, transition @ covariance @ transition.swapaxes(1, 2) + added
             gain = covariance[:, :, 0] / (covariance[:, 0, 0] + noises**2)[:, None]
-            state = state + gain[:, :, None] * (position - state[:, 0])[:, None]
+            mean = mean + gain[:, :, None] * (position - mean[:, 0])[:, None]
             kept = np.eye(3) - gain[:, :, None] * np.eye(3)[0]
             # Joseph form: the covariance stays positive
             covariance = kept @ covariance @ kept.swapaxes(1, 2) + noises[:, None, None] ** 2 * gain[:, :, None] * gain[:, None]
             last_ns = stamp_ns
         if stamp_ns in wanted:
             wanted.remove(stamp_ns)
-            later = [_propagate(state, covariance, each) for each in ahead]
-            means.append(np.stack([each[:, 0] for each, _ in later], axis=1))
-            variances.append(np.stack([each[:, 0, 0] for _, each in later], axis=1))
-    return np.array(means), np.array(variances)
-
-
-def _propagate(state: Array, covariance: Array, model: tuple[Array, Array]) -> tuple[Array, Array]:
-    transition, added = model
-    return transition @ state, transition @ covariance @ transition.swapaxes(1, 2) + added
+            rows = [(transition[:, 0], added[:, 0, 0]) for transition, added in ahead]  # of the position
+            later = [(row[:, None] @ mean, (row[:, None] @ covariance @ row[..., None])[:, 0, 0] + more) for row, more in rows]
+            found.append([np.stack(each, axis=1) for each in zip(*later, strict=True)])
+    means, variances = (np.array(each) for each in zip(*found, strict=True))
+    return means[:, :, :, 0], variances
 
 
 @lru_cache(maxsize=4096)
 def _discretise(dt: float) -> tuple[Array, Array]:
     """Return transition and added covariance (s, 3, 3) over dt [s] for each setting, by Van Loan (1978)."""
-    rate = np.zeros((len(SINGER_SETTINGS), 6, 6))
-    accelerations, _, decays = np.array(SINGER_SETTINGS).T
-    drift = np.zeros((len(SINGER_SETTINGS), 3, 3))
+    accelerations, _, decays = SINGER_SETTINGS.T
+    drift, rate = np.zeros((len(decays), 3, 3)), np.zeros((len(decays), 6, 6))
     drift[:, 0, 1] = drift[:, 1, 2] = 1.0
     drift[:, 2, 2] = -1.0 / decays
     rate[:, :3, :3], rate[:, 3:, 3:] = -drift, drift.swapaxes(1, 2)

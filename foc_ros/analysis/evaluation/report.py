@@ -20,10 +20,10 @@ from foc_ros.core.types import Array
 from foc_ros.io.csv_tables import read_rows
 
 from .baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
-from .observations import Observation, ObservedRecording
+from .observations import GAP, GOAL, PATH_CLASS, Observation, ObservedRecording, Questions, ask_all
 from .positions import compute_position_scores
-from .questions import GAP, GOAL, PATH_CLASS, Questions, ask_all
 from .scores import TENTHS, Scores, choose_held_out, compare_scores, compute_log_likelihoods, score_forecasts, summarise
+from .truth import HORIZONS_S
 
 FITTED_TO = {PATH_CLASS: PATH_CLASS, GAP: PATH_CLASS, GOAL: GOAL}
 """The question by whose answers the settings of a predictor are chosen, for each question that it is scored by."""
@@ -34,6 +34,15 @@ COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, columns, rows."""
 GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
+TOTALS = {
+    'gain': ('gain', 1.0, 3),
+    'ECE': ('expected_calibration_error', 1.0, 3),
+    'Brier': ('brier', 1.0, 3),
+    'correct [%]': ('right', 100.0, 1),
+    'leads from [%]': ('leads_for_good_from', 100.0, 1),
+    'leads for [s]': ('leads_for_good_before_s', 1.0, 2),
+}
+"""Columns of the table of all predictions: the score, its factor and its digits."""
 REGIONS = {
     'inside': 'ellipse of the most likely candidate',
     'inside_taken': 'ellipse of the candidate taken',
@@ -61,6 +70,7 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
         name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], names, questions) for each in baselines}
         for name, questions in asked.items()
     }
+    best = {key: int(each.sum(axis=0).argmax()) for key, each in table.items()}
     answer = {
         'recordings': len(recordings),
         'predictions': sum(len(recording.observations) for recording in recordings),
@@ -74,7 +84,7 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
             for name in asked
         },
         'settings': {
-            name: {each.name: _make_plain(each.settings[int(table[name, each.name].sum(axis=0).argmax())]) for each in baselines}
+            name: {each.name: _make_plain(each.settings[best[name, each.name]]) for each in baselines}
             for name in asked
             if name != GAP
         },
@@ -190,54 +200,49 @@ def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
     tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
     for name, subject in ((PATH_CLASS, 'Homotopy class'), (GOAL, 'Goal')):
         if name in questions:
-            title = f'{subject}: log-likelihood above uniform [nat]'
-            by_predictor = questions[name].items()
-            lines = [_format_tenths(predictor, each, 'gain') for predictor, each in by_predictor]
-            yield f'{title}, by tenths of the movement', tenths, lines
-            totals = ('', 'gain', 'ECE', 'Brier', 'correct [%]', 'leads from [%]', 'leads for [s]')
-            lines = []
-            for predictor, each in by_predictor:
-                numbers = [_number(each[score], 3) for score in ('gain', 'expected_calibration_error', 'brier')]
-                leads = _percent(each['leads_for_good_from']), _number(each['leads_for_good_before_s'], 2)
-                lines.append((predictor, *numbers, _percent(each['right']), *leads))
-            yield f'{title}, of all', totals, lines
+            title, scores = f'{subject}: log-likelihood above uniform [nat]', questions[name].items()
+            gains = [(predictor, *(_number(tenth['gain'], 1.0, 2) for tenth in each['by_tenth'])) for predictor, each in scores]
+            yield f'{title}, by tenths of the movement', tenths, gains
+            totals = [
+                (predictor, *(_number(each[score], factor, digits) for score, factor, digits in TOTALS.values()))
+                for predictor, each in scores
+            ]
+            yield f'{title}, of all', ('', *TOTALS), totals
     if GAP in questions:
-        by_predictor = questions[GAP].items()
-        yield GAP_TITLE, tenths, [_format_tenths(predictor, each, 'right') for predictor, each in by_predictor]
-        halves: list[tuple[str, ...]] = [(predictor, _percent(each['right_from_half_way'])) for predictor, each in by_predictor]
+        scores = questions[GAP].items()
+        yield (
+            GAP_TITLE,
+            tenths,
+            [(predictor, *(_number(tenth['right'], 100.0, 0) for tenth in each['by_tenth'])) for predictor, each in scores],
+        )
+        halves: list[tuple[str, ...]] = [
+            (predictor, _number(each['right_from_half_way'], 100.0, 1)) for predictor, each in scores
+        ]
         yield 'Gap in the next row', ('', 'correct in the second half [%]'), halves
-    yield from _make_position_tables(answer['positions'])
-    facts = [
+    positions = answer['positions']
+    horizons = [f'{each:g}' for each in HORIZONS_S]
+    columns = ('', *(f'{each} s' for each in horizons))
+    errors = [
+        (name, *(_number(by[each], 1e3, 1) for by in kinds.values() for each in horizons))
+        for name, kinds in positions['displacement_m'].items()
+    ]
+    yield 'Displacement error [mm]', ('', *(f'{kind}\n{each} s' for kind in ('average', 'final') for each in horizons)), errors
+    densities = [(name, *(_number(by[each], 1.0, 2) for each in horizons)) for name, by in positions['nlpd'].items()]
+    yield 'Negative log-density of the true position [nat, metres]', columns, densities
+    inside = [
+        (f'{words}, {100 * float(level):g} %', *(_number(by[each], 100.0, 1) for each in horizons))
+        for name, words in REGIONS.items()
+        for level, by in positions[name].items()
+    ]
+    yield 'True positions inside [%]', columns, inside
+    facts: list[tuple[str, ...]] = [
         ('recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'),
         ('predictions', str(answer['predictions'])),
     ]
     for question, settings in answer['settings'].items():
         known = {name: setting for name, setting in settings.items() if setting is not None}
         facts += [(f'{question}, best setting\n{name}', _format_setting(setting)) for name, setting in known.items()]
-    yield '', ('', ''), [*facts]
-
-
-def _format_tenths(predictor: str, scores: Mapping[str, Any], score: str) -> tuple[str, ...]:
-    shown = [_percent(each[score], 0) if score == 'right' else _number(each[score], 2) for each in scores['by_tenth']]
-    return (predictor, *shown)
-
-
-def _make_position_tables(positions: Mapping[str, Any]) -> Iterator[Table]:
-    horizons = list(positions['inside']['0.5'])
-    errors = [
-        (name, *(_number(each if each is None else 1e3 * each, 1) for by in kinds.values() for each in by.values()))
-        for name, kinds in positions['displacement_m'].items()
-    ]
-    columns = ('', *(f'{kind}\n{each} s' for kind in ('average', 'final') for each in horizons))
-    yield 'Displacement error [mm]', columns, errors
-    densities = [(name, *(_number(by[each], 2) for each in horizons)) for name, by in positions['nlpd'].items()]
-    yield 'Negative log-density of the true position [nat, metres]', ('', *(f'{each} s' for each in horizons)), densities
-    inside = [
-        (f'{words}, {100 * float(level):g} %', *(_percent(by[each]) for each in horizons))
-        for name, words in REGIONS.items()
-        for level, by in positions[name].items()
-    ]
-    yield 'True positions inside [%]', ('', *(f'{each} s' for each in horizons)), inside
+    yield '', ('', ''), facts
 
 
 def _format_setting(setting: Any) -> str:
@@ -248,9 +253,5 @@ def _format_setting(setting: Any) -> str:
     return f'{setting:.4g}' if isinstance(setting, float) else str(setting)
 
 
-def _number(value: float | None, digits: int) -> str:
-    return '-' if value is None else f'{value:.{digits}f}'
-
-
-def _percent(value: float | None, digits: int = 1) -> str:
-    return _number(None if value is None else 100 * value, digits)
+def _number(value: float | None, factor: float, digits: int) -> str:
+    return '-' if value is None else f'{factor * value:.{digits}f}'

@@ -1,9 +1,12 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Scores of forecasts against the true answers, and what is chosen by held-out scores.
+"""Scores of forecasts against the true answers, what is chosen by held-out scores, and bootstrap intervals.
 
 Every setting is tried on every recording once, and each recording is scored with the setting best for the others, so that what it
 says about itself never helps it.
+
+**Intervals** are by bootstrap (Efron 1979, doi:10.1214/aos/1176344552); equal data give equal ones. What is drawn are recordings
+or trials, because predictions within one recording are not independent.
 
 **A goal that nobody announced** is tried out: each recording is replayed again with its goal left out of the list. The share
 `other` is then right in the second replay and wrong in the first. It is judged by the area under the curve of the receiver
@@ -14,34 +17,34 @@ costs where the goal is on the list, the mean of -log(1 - other).
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.analysis.intervals import compute_mean_interval
 from foc_ros.analysis.recordings import Recording, TableRecording
 from foc_ros.analysis.scenes import NO_GOAL
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.types import Array
 
 from .baselines import Baseline, Forecast
-from .observations import Observation, ObservedRecording
-from .questions import GAP, Question, Questions
+from .observations import GAP, Observation, ObservedRecording, Question, Questions
 
 TENTHS, BINS = 10, 10
+RESAMPLES, SEED = 1000, 1
+CENTRAL = (2.5, 97.5)
+"""Percentiles of an interval of 95 %."""
+TIE = 1e-12
 
 
 def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
     """Return the sum of the log-likelihoods of the true answers under each setting of a predictor, (s,)."""
-    return np.array(
-        [
-            sum(np.log([baseline.forecast(*each, setting).true_probability(each[1]) for each in questions]))
-            for setting in baseline.settings
-        ]
+    probabilities = (
+        [baseline.forecast(*each, setting).true_probability(each[1]) for each in questions] for setting in baseline.settings
     )
+    return np.array([np.log(each).sum() for each in probabilities])
 
 
 def choose_held_out(table: Array, groups: Sequence[Hashable]) -> NDArray[np.intp]:
@@ -73,33 +76,39 @@ class Scores(NamedTuple):
     correct: Array
     brier: Array
 
+    def take(self, rows: NDArray[Any]) -> Scores:
+        """Return the scores of some forecasts, by their numbers or by a mask."""
+        return Scores(*(each[rows] for each in self))
+
+    def average(self) -> dict[str, Any]:
+        """Return the number of forecasts and the means of their scores, None where there are none."""
+        uniform = -np.log(self.possible)
+        return {
+            'predictions': len(self.possible),
+            'log_likelihood': find_mean(self.log_likelihood),
+            'uniform': find_mean(uniform),
+            'gain': find_mean(self.log_likelihood - uniform),
+            'brier': find_mean(self.brier),
+            'right': find_mean(self.correct),
+        }
+
 
 def score_forecasts(rows: Iterable[tuple[int, Observation, Question, Forecast]]) -> Scores:
-    """Score forecasts, at least one, given with the number of the recording and what was asked.
+    """Score forecasts, given with the number of the recording and what was asked.
 
     The progress of the gap in the next row counts from row to row, that of other questions over the whole movement.
     """
-    scored = [
-        (
-            number,
-            observation.truth.approach if question.name == GAP else observation.truth.progress,
-            observation.truth.left_s,
-            question.possible,
-            np.log(forecast.true_probability(question)),
-            forecast.confidence(),
-            forecast.correctness(question),
-            compute_brier_score(forecast, question),
-        )
-        for number, observation, question, forecast in rows
-    ]
-    return Scores(*np.array(scored, dtype=float).T)
-
-
-def compute_brier_score(forecast: Forecast, question: Question) -> float:
-    """Return the squared error of the probabilities, summed over all possible answers (Brier 1950)."""
-    truth = np.zeros(len(question.answers))
-    truth[question.truth] = 1.0
-    return float(((forecast.probability - truth) ** 2).sum() + question.unlisted * forecast.each_other**2)
+    scored = []
+    for number, observation, question, forecast in rows:
+        truth, progress = observation.truth, observation.truth.approach if question.name == GAP else observation.truth.progress
+        p, other, is_true = forecast.probability, forecast.each_other, np.arange(len(question.answers)) == question.truth
+        confidence = max(p.max(), other)
+        likeliest = (p >= confidence - TIE).sum() + question.unlisted * (other >= confidence - TIE)
+        correct = (p[question.truth] >= confidence - TIE) / likeliest
+        brier = ((p - is_true) ** 2).sum() + question.unlisted * other**2  # Brier 1950
+        log_likelihood = np.log(p[question.truth])
+        scored.append((number, progress, truth.left_s, question.possible, log_likelihood, confidence, correct, brier))
+    return Scores(*np.array(scored, dtype=float).reshape(-1, len(Scores._fields)).T)
 
 
 def compare_scores(ours: Scores, other: Scores, is_share: bool) -> dict[str, Any]:
@@ -122,22 +131,21 @@ def summarise(scores: Scores) -> dict[str, Any]:
 
     The expected calibration error is the mean distance of confidence and share correct over the bins (Naeini et al. 2015).
     """
-    reliability = compute_reliability(scores)
+    reliability, tenths, leads = compute_reliability(scores), find_tenths(scores.progress), []
     errors = [each['count'] * abs(each['confidence'] - each['right']) for each in reliability if each['count']]
-    leads = []  # from when on the likeliest answer is correct to the end of a recording; 1 and 0 where the last one is wrong
     for recording in np.unique(scores.recording):
-        rows = np.flatnonzero(scores.recording == recording)
-        wrong = np.flatnonzero(scores.correct[rows] < 1.0)
-        leading = rows[int(wrong[-1]) + 1 :] if len(wrong) else rows
-        leads.append((scores.progress[leading[0]], scores.left_s[leading[0]]) if len(leading) else (1.0, 0.0))
+        # from when on the likeliest answer is correct to the end of a recording; 1 and 0 where the last one is wrong
+        own = scores.take(scores.recording == recording)
+        leading = own.take(np.cumprod(own.correct[::-1] == 1.0)[::-1] == 1)
+        leads.append((leading.progress[0], leading.left_s[0]) if len(leading.progress) else (1.0, 0.0))
     leads_from, leads_before_s = np.array(leads).T
     return {
-        **_compute_means(scores, np.ones(len(scores.recording), dtype=bool)),
+        **scores.average(),
         'expected_calibration_error': sum(errors) / len(scores.confidence),
-        'right_from_half_way': _mean(scores.correct[scores.progress >= 0.5]),
-        'leads_for_good_from': _mean(leads_from),
-        'leads_for_good_before_s': _mean(leads_before_s),
-        'by_tenth': [_compute_means(scores, find_tenths(scores.progress) == number) for number in range(TENTHS)],
+        'right_from_half_way': find_mean(scores.correct[scores.progress >= 0.5]),
+        'leads_for_good_from': find_mean(leads_from),
+        'leads_for_good_before_s': find_mean(leads_before_s),
+        'by_tenth': [scores.take(tenths == number).average() for number in range(TENTHS)],
         'reliability': reliability,
     }
 
@@ -158,29 +166,18 @@ def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
         {
             'from': each / BINS,
             'to': (each + 1) / BINS,
-            'count': int(inside.sum()),
-            'confidence': _mean(scores.confidence[inside]),
-            'right': _mean(scores.correct[inside]),
-            'interval': compute_mean_interval(scores.correct[inside], scores.recording[inside]) if inside.any() else None,
+            'count': len(own.correct),
+            'confidence': find_mean(own.confidence),
+            'right': find_mean(own.correct),
+            'interval': compute_mean_interval(own.correct, own.recording) if len(own.correct) else None,
         }
         for each in range(BINS)
-        for inside in [number == each]
+        for own in [scores.take(number == each)]
     ]
 
 
-def _compute_means(scores: Scores, chosen: NDArray[np.bool_]) -> dict[str, Any]:
-    uniform = -np.log(scores.possible)
-    return {
-        'predictions': int(chosen.sum()),
-        'log_likelihood': _mean(scores.log_likelihood[chosen]),
-        'uniform': _mean(uniform[chosen]),
-        'gain': _mean((scores.log_likelihood - uniform)[chosen]),
-        'brier': _mean(scores.brier[chosen]),
-        'right': _mean(scores.correct[chosen]),
-    }
-
-
-def _mean(values: Array) -> float | None:
+def find_mean(values: Array) -> float | None:
+    """Return the mean of values, None where there are none."""
     return float(values.mean()) if len(values) else None
 
 
@@ -192,7 +189,7 @@ def leave_goals_out(recordings: Mapping[str, Recording]) -> dict[str, Recording]
             continue
         goal = each.goal
         if goal is None:
-            goal = find_reached_goal(each.read_movement().positions[:, :2], each.scene.goals[:, :2])[0]
+            goal = find_reached_goal(each.positions[:, :2], each.scene.goals[:, :2])[0]
         if goal is not None:
             found[name] = replace(each, scene=replace(each.scene, goals=np.delete(each.scene.goals, goal, axis=0), goal=NO_GOAL))
     return found
@@ -205,37 +202,34 @@ def score_other_goal(
 
     announced, left_out: the same recordings with all goals and without the right one; prior: `likelihood.other_goal`.
     """
-    without = {each.name: {seen.stamp_ns: seen.other for seen in each.observations} for each in left_out}
+    without = {(each.name, seen.stamp_ns): seen.other for each in left_out for seen in each.observations}
     rows = []
     for recording in announced:
-        stamps = without.get(recording.name, {})
-        seen = [each for each in recording.observations if each.stamp_ns in stamps]
-        half = next((row for row, each in enumerate(seen) if each.truth.progress >= 0.5), len(seen) - 1)
-        rows += [(each.other, stamps[each.stamp_ns], row == half) for row, each in enumerate(seen)]
+        seen = [each for each in recording.observations if (recording.name, each.stamp_ns) in without]
+        half = next((each for each in seen if each.truth.progress >= 0.5), seen[-1] if seen else None)
+        rows += [(each.other, without[recording.name, each.stamp_ns], each is half) for each in seen]
     if not rows or not prior:
         return None
+    from scipy.stats import mannwhitneyu  # not before: worker processes do without its 30 MB
+
+    def measure_area(chosen: NDArray[np.bool_]) -> float:
+        """Return the probability that a share where it is right is larger than one where it is wrong, a tie counting half."""
+        return float(mannwhitneyu(right[chosen], wrong[chosen]).statistic) / int(chosen.sum()) ** 2
+
     wrong, right, is_half = np.array(rows, dtype=float).T
-    half_way = is_half > 0.0
     # the calibration error over bins of the share, where the right ones have the weight `prior` in all
     share, weight = np.concatenate([wrong, right]), np.repeat([(1.0 - prior) / len(wrong), prior / len(right)], len(wrong))
     number = np.minimum((share * BINS).astype(int), BINS - 1)
     expected = np.bincount(number, weight * share, BINS)
     happened = np.bincount(number[len(wrong) :], weight[len(wrong) :], BINS)
     return {
-        'area_under_curve_half_way': _measure_area(wrong[half_way], right[half_way]),
-        'area_under_curve': _measure_area(wrong, right),
+        'area_under_curve_half_way': measure_area(is_half == 1.0),
+        'area_under_curve': measure_area(is_half >= 0.0),
         'calibration_error': float(np.abs(expected - happened).sum()),
         'loss': float(-np.log1p(-wrong).mean()),
         'share': float(wrong.mean()),
         'share_left_out': float(right.mean()),
     }
-
-
-def _measure_area(wrong: Array, right: Array) -> float:
-    """Return the probability that a share where it is right is larger than one where it is wrong, a tie counting half."""
-    from scipy.stats import mannwhitneyu  # not before: worker processes do without its 30 MB
-
-    return float(mannwhitneyu(right, wrong).statistic) / (len(wrong) * len(right))
 
 
 def describe_other_goal(scores: Mapping[str, Any]) -> str:
@@ -246,3 +240,22 @@ def describe_other_goal(scores: Mapping[str, Any]) -> str:
         f'{scores["area_under_curve"]:.2f} of all; calibration error {scores["calibration_error"]:.3f}; '
         f'loss {scores["loss"]:.3f} nat.'
     )
+
+
+def draw_rows(n: int, seed: int = SEED, resamples: int = RESAMPLES) -> NDArray[np.intp]:
+    """Return the rows, out of n, that are drawn in each resample, (resamples, n)."""
+    return np.random.default_rng(seed).integers(0, n, (resamples, n))
+
+
+def resample(statistic: Callable[[NDArray[np.intp]], float], n: int) -> Array:
+    """Return a statistic of the rows, out of n, that are drawn in each resample, (RESAMPLES,)."""
+    return np.array([float(statistic(rows)) for rows in draw_rows(n)])
+
+
+def compute_mean_interval(values: Array, group: NDArray[Any], seed: int = SEED, resamples: int = RESAMPLES) -> list[float]:
+    """Return the interval of 95 % [low, high] of the mean of values (m,), at least one, of which groups (m,) are drawn."""
+    _, number = np.unique(group, return_inverse=True)
+    sums, counts = np.bincount(number, values), np.bincount(number)
+    drawn = draw_rows(len(counts), seed, resamples)
+    ends: list[float] = np.percentile(sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1), CENTRAL).tolist()
+    return ends

@@ -4,19 +4,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foc_ros.analysis.recordings import Recording
+from foc_ros.analysis.replay import Replay
 from foc_ros.analysis.scenes import NO_GOAL
 from foc_ros.core.classes import compute_swept_angles
 from foc_ros.core.classes.rows import WALL, Rows, locate_rows
+from foc_ros.core.config import Config, EstimatorConfig
+from foc_ros.core.errors import RecordingError
+from foc_ros.core.hand.kalman import Update, update
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import LEFT, RIGHT
-from foc_ros.core.types import NANOSECONDS, Array, Record
+from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
 TIMES_S = tuple(0.125 * step for step in range(1, 9))
 """Times ahead at which predicted positions are compared with the true ones [s]."""
@@ -24,6 +30,7 @@ HORIZONS_S = (0.25, 0.5, 1.0)
 """Those of them that are reported."""
 HORIZONS = np.array([TIMES_S.index(horizon) for horizon in HORIZONS_S])
 """Their indices."""
+MIN_SAMPLES = 10
 
 Bools = NDArray[np.bool_]
 Sides = NDArray[np.int8]
@@ -55,10 +62,54 @@ class RecordedPath:
         whole = self.travelled[end]
         self.progress = np.minimum(self.travelled / whole, 1.0) if whole > 0.0 else np.zeros(len(positions))
 
+    @classmethod
+    def from_samples(cls, samples: Sequence[HandSample], goals: Array, goal: int | None = None) -> RecordedPath:
+        """Return the path of samples of the hand."""
+        return cls(np.array([each.stamp_ns for each in samples]), np.array([each.position for each in samples]), goals, goal)
+
     def interpolate(self, stamp_ns: int, seconds: Array) -> Array:
         """Return the positions (h, 2) [m] some seconds (h,) after a stamp, nan beyond the end."""
         times = (self.stamps_ns - stamp_ns) / NANOSECONDS
         return np.column_stack([np.interp(seconds, times, axis, right=np.nan) for axis in self.positions.T])
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedHand:
+    """The hand in a recording, as the estimator receives it: its path, the obstacles at the first stamp, and the frame."""
+
+    name: str
+    path: RecordedPath
+    obstacles: Obstacles
+    frame_id: str = ''
+
+    @property
+    def times(self) -> Array:
+        """Seconds since the first sample, (m,)."""
+        return np.asarray((self.path.stamps_ns - self.path.stamps_ns[0]) / NANOSECONDS)
+
+    def filter(self, config: EstimatorConfig) -> list[Update]:
+        """Return what an estimator makes of each sample: the state, and whether it continues or starts anew."""
+        updates, state = list[Update](), None
+        for stamp_ns, position in zip(self.path.stamps_ns.tolist(), self.path.positions, strict=True):
+            updates.append(update(state, HandSample(stamp_ns, position, frame_id=self.frame_id), config))
+            state = updates[-1].state
+        return updates
+
+
+def read_hand(recording: Recording, config: Config) -> RecordedHand:
+    """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
+    replayed, samples = Replay(config), list[HandSample]()
+    for sample in (sample for _, sample in replayed.take(recording.items()) if sample is not None):
+        if samples and sample.stamp_ns <= samples[-1].stamp_ns:  # the recording begins anew
+            samples.clear()
+        samples.append(sample)
+    scene = replayed.pipeline.scene
+    if scene.goals is None or not len(scene.goals):
+        raise RecordingError(f'{recording.name}: {replayed.pipeline.not_ready_reason() or "no goal received"}')
+    if len(samples) < MIN_SAMPLES:
+        raise RecordingError(f'{recording.name}: expected at least {MIN_SAMPLES} hand poses, got {len(samples)}')
+    path = RecordedPath.from_samples(samples, scene.goals)
+    return RecordedHand(recording.name, path, scene.obstacles(samples[0].stamp_ns), samples[0].frame_id)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,40 +142,21 @@ def find_ground_truth(
     now = int(np.searchsorted(path.stamps_ns, stamp_ns))
     seconds = (path.stamps_ns[now:] - stamp_ns) / NANOSECONDS
     centres = obstacles.centre + seconds[:, None, None] * obstacles.velocity
-    row_position, position = locate_rows(obstacles.centre @ direction, row), path.positions @ direction
+    is_before = (path.positions @ direction)[:, None] < locate_rows(obstacles.centre @ direction, row)
+    crosses = is_before[:-1] & ~is_before[1:]  # whether each row is crossed after each sample, (m - 1, r)
+    crossed = [int(np.flatnonzero(each)[-1]) + 1 for each in crosses.T if each.any()]
+    last = max((each for each in crossed if each <= now), default=0)
+    following = min((each for each in crossed if each > now), default=0)
+    whole = path.travelled[following] - path.travelled[last] if following else np.nan  # nan: no row is to come
     return GroundTruth(
-        sides=find_sides(path.positions[now:], centres),
-        is_ahead=np.append(find_rows_ahead(row_position, position[now:]), False)[row],
+        sides=np.where(compute_swept_angles(path.positions[now:], centres) < 0.0, LEFT, RIGHT).astype(np.int8),
+        is_ahead=np.append(crosses[now:].any(axis=0), False)[row],
         goal=path.goal if np.array_equal(goals, path.goals) else None,
         positions=path.interpolate(stamp_ns, np.array(TIMES_S)),
         progress=float(path.progress[now]),
-        approach=_compute_approach(row_position, path, position, now),
+        approach=float((path.travelled[now] - path.travelled[last]) / whole) if whole != 0.0 else 0.0,
         left_s=(path.end_ns - stamp_ns) / NANOSECONDS,
     )
-
-
-def find_rows_ahead(row_position: Array, position: Array) -> Bools:
-    """Tell which rows (r,), at row_position (r,) [m], the rest of a path, (m,) [m], still has to pass."""
-    is_before = position[:, None] < row_position
-    return np.asarray((is_before[:-1] & ~is_before[1:]).any(axis=0))
-
-
-def find_sides(path: Array, centres: Array) -> Sides:
-    """Return the sides (n,) of obstacles, at centres (m, n, 2) [m], on which a path (m, 2) [m] runs, by its swept angle."""
-    return np.where(compute_swept_angles(path, centres) < 0.0, LEFT, RIGHT).astype(np.int8)
-
-
-def _compute_approach(row_position: Array, path: RecordedPath, position: Array, now: int) -> float:
-    """Return the share of the distance from the last row, or the start, to the next one, that sample `now` has travelled."""
-    is_passed = find_rows_ahead(row_position, position)
-    crosses = [(position[:-1] < each) & (position[1:] >= each) for each in row_position[is_passed]]
-    passed = [int(np.flatnonzero(each)[-1]) + 1 for each in crosses]
-    following = min((each for each in passed if each > now), default=None)
-    if following is None:
-        return float('nan')
-    last = max((each for each in passed if each <= now), default=0)
-    distance = path.travelled[following] - path.travelled[last]
-    return float((path.travelled[now] - path.travelled[last]) / distance) if distance > 0.0 else 0.0
 
 
 def find_open_gaps(obstacles: Obstacles, row: Rows, direction: Array, hand_radius: float) -> tuple[Sides, ...]:

@@ -17,10 +17,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from foc_ros.analysis.evaluation.scores import choose_held_out
-from foc_ros.analysis.intervals import CENTRAL, resample
+from foc_ros.analysis.evaluation.scores import CENTRAL, choose_held_out, resample
 from foc_ros.core.config import list_parameters
 from foc_ros.core.types import Array
 
@@ -47,21 +45,19 @@ class Estimate:
         low, high = np.percentile(resampled, CENTRAL).tolist()
         return cls(name, value, min(low, value), max(high, value), how)
 
-    def as_json(self) -> dict[str, Any]:
-        """Return plain values."""
-        return {'value': self.value, 'interval': [self.low, self.high], 'how': self.how}
-
 
 @dataclass
 class Findings:
     """What one step of a fit found.
 
-    estimates by name; chosen: values that are no numbers; undetermined: why a parameter keeps its given value, by name; warnings.
+    estimates by name; chosen: values that are no numbers; undetermined: why a parameter keeps its given value, by name; scores:
+    as plain values; warnings.
     """
 
     estimates: dict[str, Estimate] = field(default_factory=dict)
     chosen: dict[str, str] = field(default_factory=dict)
     undetermined: dict[str, str] = field(default_factory=dict)
+    scores: dict[str, Any] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
     @property
@@ -79,6 +75,7 @@ class Findings:
         self.chosen |= later.chosen
         undetermined = self.undetermined | later.undetermined
         self.undetermined = {name: why for name, why in undetermined.items() if name not in self.values}
+        self.scores |= later.scores
         self.warnings += later.warnings
 
 
@@ -87,11 +84,11 @@ def is_cross_validated(recordings: Sequence[object]) -> bool:
     return len(recordings) >= 3
 
 
-def clip_to_bounds(name: str, value: float, least: float = 0.0) -> float:
-    """Return a value within the bounds of a parameter, and not below `least`; rounded, so that a file reads well."""
+def clip_to_bounds(name: str, value: float) -> float:
+    """Return a value within the bounds of a parameter, rounded, so that a file reads well."""
     bound = BOUNDS[name]
     assert bound.low is not None and bound.high is not None
-    return float(f'{min(max(value, bound.low, least), bound.high):.6g}')
+    return float(f'{min(max(value, bound.low), bound.high):.6g}')
 
 
 def list_settings(values: Mapping[str, Iterable[float]]) -> tuple[Setting, ...]:
@@ -115,75 +112,66 @@ class SettingTable:
         scale = max(float(errors.mean(axis=0).min()), 1e-9)
         return cls(-errors / scale, tuple(settings))
 
-    def find_best(self, columns: Sequence[int] | NDArray[np.intp]) -> int:
-        """Return the column of some that is best for all recordings, the first of equal ones."""
-        return int(columns[int(np.nansum(self.values[:, columns], axis=0).argmax())])
+    @property
+    def best(self) -> Setting:
+        """The setting that is best for all recordings, the first of equal ones."""
+        return self.settings[int(np.nansum(self.values, axis=0).argmax())]
 
-    def choose_held_out(self, columns: Sequence[int] | NDArray[np.intp], groups: Sequence[Hashable]) -> NDArray[np.intp]:
-        """Return the column of some, for each recording (n,), that is best for the other groups."""
-        return np.array(columns)[choose_held_out(np.nan_to_num(self.values[:, columns]), groups)]
+    def choose_held_out(self, groups: Sequence[Hashable]) -> list[Setting]:
+        """Return the setting for each recording (n,) that is best for the other groups."""
+        return [self.settings[each] for each in choose_held_out(np.nan_to_num(self.values), groups)]
 
-    def list_choices(
-        self, given: Setting, columns: Sequence[int] | NDArray[np.intp], names: Sequence[str]
-    ) -> dict[str, NDArray[np.intp]]:
-        """Return the columns chosen for the recordings (n,), of these names, by how they were chosen from some."""
-        n = len(self.values)
-        choices = {'as given': np.full(n, self.settings.index(given)), 'fitted': np.full(n, self.find_best(columns))}
-        if is_cross_validated(names):
-            choices['without the recording'] = self.choose_held_out(columns, names)
-        return choices
+    def list_choices(self, given: Setting, names: Sequence[str]) -> dict[str, list[Setting]]:
+        """Return the settings chosen for the recordings (n,), of these names, by how they were chosen."""
+        choices = {'as given': [given] * len(names), 'fitted': [self.best] * len(names)}
+        return choices | ({'without the recording': self.choose_held_out(names)} if is_cross_validated(names) else {})
 
-    def score(self, chosen: NDArray[np.intp]) -> float:
-        """Return the mean over the recordings under the column chosen for each of them (n,)."""
-        return float(np.nanmean(self.values[np.arange(len(self.values)), chosen]))
+    def score(self, chosen: Sequence[Setting]) -> float:
+        """Return the mean over the recordings under the setting chosen for each of them (n,)."""
+        return float(np.nanmean([row[self.settings.index(each)] for row, each in zip(self.values, chosen, strict=True)]))
 
-    def determine(self, given: Setting) -> tuple[NDArray[np.intp], dict[str, str]]:
+    def determine(self, given: Setting) -> tuple[SettingTable, dict[str, str]]:
         """Find the parameters that the recordings do not determine.
 
         They keep their given values, one after the other, the flattest first, because one that is kept may determine another.
-        Return the columns that are left, and the reasons by name. The given values are among the settings.
+        Return the settings that are left, and the reasons by name. The given values are among the settings.
         """
-        total, columns, undetermined = np.nansum(self.values, axis=0), np.arange(len(self.settings)), dict[str, str]()
+        left, undetermined = self, dict[str, str]()
         while True:
-            left = [name for name in given if name not in undetermined]
-            found = [(*self._examine(name, given[name], total, columns), name) for name in left]
+            found = [(*left._examine(name, value), name) for name, value in given.items() if name not in undetermined]
             doubted = min((each for each in found if each[1]), default=None)
             if doubted is None:
-                return columns, undetermined
+                return left, undetermined
             _, undetermined[doubted[2]], name = doubted
-            columns = np.array([each for each in columns if self.settings[each][name] == given[name]])
+            columns = [column for column, each in enumerate(left.settings) if each[name] == given[name]]
+            left = SettingTable(left.values[:, columns], tuple(left.settings[column] for column in columns))
 
-    def _examine(self, name: str, given: float, total: Array, columns: NDArray[np.intp]) -> tuple[float, str]:
+    def _examine(self, name: str, given: float) -> tuple[float, str]:
         """Return how much the profile of a parameter varies [nat], and why it is undetermined, empty if it is determined."""
         profile: dict[float, float] = {}
-        for column in columns.tolist():
-            value = self.settings[column][name]
-            profile[value] = max(total[column], profile.get(value, -math.inf))
-        best, least, most = max(profile, key=lambda each: profile[each]), min(profile), max(profile)
-        variation = profile[best] - min(profile.values())
+        for setting, total in zip(self.settings, np.nansum(self.values, axis=0).tolist(), strict=True):
+            profile[setting[name]] = max(total, profile.get(setting[name], -math.inf))
+        best, least, most, bound = max(profile, key=profile.__getitem__), min(profile), max(profile), BOUNDS[name]
+        variation, why = profile[best] - min(profile.values()), ''
         if len(profile) == 1:
-            return variation, ''
-        if variation < FLAT_NAT:
-            return variation, f'all values tried, {least:.3g} to {most:.3g}, explain the recordings within {FLAT_NAT:g} nat'
-        bound = BOUNDS[name]
-        if best in (least, most) and best not in (bound.low, bound.high):
-            return variation, f'{best:.3g}, the end of the values tried, explains the recordings best'
-        if best != given and profile[best] - profile.get(given, -math.inf) < FLAT_NAT:
-            return variation, f'it explains the recordings within {FLAT_NAT:g} nat of the best value tried, {best:.3g}'
-        return variation, ''
+            pass
+        elif variation < FLAT_NAT:
+            why = f'all values tried, {least:.3g} to {most:.3g}, explain the recordings within {FLAT_NAT:g} nat'
+        elif best in (least, most) and best not in (bound.low, bound.high):
+            why = f'{best:.3g}, the end of the values tried, explains the recordings best'
+        elif best != given and profile[best] - profile.get(given, -math.inf) < FLAT_NAT:
+            why = f'it explains the recordings within {FLAT_NAT:g} nat of the best value tried, {best:.3g}'
+        return variation, why
 
-    def estimate(self, given: Setting, how: str) -> tuple[Findings, NDArray[np.intp]]:
-        """Return the values that are best for all recordings, with intervals, and what is undetermined; and the columns left."""
-        columns, undetermined = self.determine(given)
-        if len(undetermined) == len(given):
-            return Findings(undetermined=undetermined), columns
-        best = self.settings[self.find_best(columns)]
-        values = np.nan_to_num(self.values[:, columns])
+    def estimate(self, given: Setting, how: str) -> tuple[Findings, SettingTable]:
+        """Return the values that are best for all recordings, with intervals, and what is undetermined; and the settings left."""
+        left, undetermined = self.determine(given)
+        found = Findings(undetermined=undetermined)
+        if len(undetermined) == len(given):  # which may be among none of the settings
+            return found, left
+        values, best = np.nan_to_num(left.values), left.best
         drawn = resample(lambda rows: int(values[rows].sum(axis=0).argmax()), len(values)).astype(int)
-        resampled = [self.settings[columns[each]] for each in drawn]
-        estimates = {
-            name: Estimate.from_resamples(name, clip_to_bounds(name, best[name]), [each[name] for each in resampled], how)
-            for name in given
-            if name not in undetermined
-        }
-        return Findings(estimates, undetermined=undetermined), columns
+        for name in [each for each in given if each not in undetermined]:
+            resampled = [left.settings[each][name] for each in drawn]
+            found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, best[name]), resampled, how)
+        return found, left

@@ -28,30 +28,22 @@ distribution, which does not depend on how long the hand has waited already.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedPath
-from foc_ros.analysis.intervals import CENTRAL, resample
-from foc_ros.analysis.recordings import Recording
-from foc_ros.analysis.replay import Replay
-from foc_ros.core.config import Config, EstimatorConfig, flatten, replace_values
-from foc_ros.core.errors import RecordingError
+from foc_ros.analysis.evaluation.scores import CENTRAL, resample
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, RecordedHand
+from foc_ros.core.config import Config, EstimatorConfig, flatten
 from foc_ros.core.hand.duration import CONSTANTS as MODEL_CONSTANTS
 from foc_ros.core.hand.duration import estimate_times_to_go
-from foc_ros.core.hand.kalman import Update, compute_gramian, compute_transition, update
+from foc_ros.core.hand.kalman import compute_gramian, compute_transition
 from foc_ros.core.learning.movements import has_covered_distance
-from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.parameter import clip_values
-from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record, SampleStatus
+from foc_ros.core.types import NANOSECONDS, Array, HandState, SampleStatus
 
 from . import Estimate, Findings, SettingTable, clip_to_bounds, list_settings
 
-MIN_SAMPLES = 10
 POSITION_STDDEV, JERK_DENSITY = 'estimator.position_stddev', 'estimator.jerk_density'
 FADING = 'estimator.acceleration_time_s'
 FADING_TIMES_S = (0.0, *np.geomspace(0.01, 0.5, 60).tolist())
@@ -65,59 +57,6 @@ FACTORS = tuple(2.0 ** (np.arange(-10, 11) / 4.0))
 WAIT = 'duration.wait_s'
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedHand(Record):
-    """The hand in a recording, as the estimator receives it, and its scene.
-
-    stamps_ns (m,), rising; positions (m, 2) [m]; obstacles at the first stamp; goals (g, 2) [m]; frame_id.
-    """
-
-    name: str
-    stamps_ns: NDArray[np.int64]
-    positions: Array
-    obstacles: Obstacles
-    goals: Array
-    frame_id: str = ''
-
-    @cached_property
-    def times(self) -> Array:
-        """Seconds since the first sample, (m,)."""
-        return np.asarray((self.stamps_ns - self.stamps_ns[0]) / NANOSECONDS)
-
-    @cached_property
-    def path(self) -> RecordedPath:
-        """The path of the hand, which ends where it is nearest to the goal that it reached."""
-        return RecordedPath(self.stamps_ns, self.positions, self.goals)
-
-    def filter(self, config: EstimatorConfig) -> list[Update]:
-        """Return what an estimator makes of each sample: the state, and whether it continues or starts anew."""
-        updates, state = list[Update](), None
-        for stamp_ns, position in zip(self.stamps_ns.tolist(), self.positions, strict=True):
-            updates.append(update(state, HandSample(stamp_ns, position, frame_id=self.frame_id), config))
-            state = updates[-1].state
-        return updates
-
-
-def read_hand(recording: Recording, config: Config) -> RecordedHand:
-    """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
-    replayed = Replay(config)
-    samples: list[HandSample] = []
-    for _, status in replayed.take(recording.items()):
-        sample = replayed.intake.sample
-        if status is not None and status.is_taken and sample is not None and (not samples or sample is not samples[-1]):
-            samples = samples if not samples or sample.stamp_ns > samples[-1].stamp_ns else []
-            samples.append(sample)
-    goals = replayed.pipeline.scene.goals
-    if goals is None or not len(goals):
-        raise RecordingError(f'{recording.name}: {replayed.pipeline.not_ready_reason() or "no goal received"}')
-    if len(samples) < MIN_SAMPLES:
-        raise RecordingError(f'{recording.name}: expected at least {MIN_SAMPLES} hand poses, got {len(samples)}')
-    stamps_ns = np.array([sample.stamp_ns for sample in samples])
-    positions = np.array([sample.position for sample in samples])
-    obstacles = replayed.pipeline.scene.obstacles(samples[0].stamp_ns)
-    return RecordedHand(recording.name, stamps_ns, positions, obstacles, goals, samples[0].frame_id)
-
-
 def tabulate_innovations(
     hands: Sequence[RecordedHand], given: EstimatorConfig, position_stddevs: Sequence[float], jerk_densities: Sequence[float]
 ) -> SettingTable:
@@ -125,14 +64,14 @@ def tabulate_innovations(
 
     Every filter that is tried starts anew where the given one does not continue, so that all are compared by the same samples.
     """
-    settings = list_settings({POSITION_STDDEV: position_stddevs, JERK_DENSITY: jerk_densities})
+    settings, totals = list_settings({POSITION_STDDEV: position_stddevs, JERK_DENSITY: jerk_densities}), []
     position, jerk = np.array([tuple(each.values()) for each in settings]).T ** 2
-    start, totals = jerk[:, None, None] * compute_gramian(given.gap_s), []
+    start = jerk[:, None, None] * compute_gramian(given.gap_s)
     start[:, 0] = start[:, :, 0] = 0.0
     start[:, 0, 0] = position
     for hand in hands:
         mean, covariance, total, last_ns = np.zeros((len(jerk), 3, 2)), start, np.zeros(len(jerk)), None
-        for stamp_ns, z, updated in zip(hand.stamps_ns.tolist(), hand.positions, hand.filter(given), strict=True):
+        for stamp_ns, z, updated in zip(hand.path.stamps_ns.tolist(), hand.path.positions, hand.filter(given), strict=True):
             if last_ns is None or updated.status is not SampleStatus.ACCEPTED:
                 mean, covariance = np.zeros_like(mean), start
                 mean[:, 0] = z
@@ -156,8 +95,8 @@ def fit_estimator(hands: Sequence[RecordedHand], config: Config) -> Findings:
     # no tracker of hands is better than 10 um
     tried = {POSITION_STDDEV: np.geomspace(1e-5, 0.1, 13), JERK_DENSITY: np.geomspace(1e-3, 1e4, 22)}
     coarse = tabulate_innovations(hands, config.estimator, *([given[name], *tried[name]] for name in given))
-    columns, undetermined = coarse.determine(given)
-    best, finer = coarse.settings[coarse.find_best(columns)], {name: [value] for name, value in given.items()}
+    left, undetermined = coarse.determine(given)
+    best, finer = left.best, {name: [value] for name, value in given.items()}
     for name in finer.keys() - undetermined:
         finer[name] += np.clip(best[name] * np.geomspace(0.46, 2.16, 25), tried[name][0], tried[name][-1]).tolist()
     fine, how = tabulate_innovations(hands, config.estimator, *finer.values()), 'innovations of the filter'
@@ -168,12 +107,12 @@ def fit_fading(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the time in which an acceleration fades."""
     errors, fading = [], np.array(FADING_TIMES_S[1:])
     for hand in hands:
-        states, times = [each.state for each in hand.filter(config.estimator)], hand.times
+        states, times, path = [each.state for each in hand.filter(config.estimator)], hand.times, hand.path
         is_moving, mean = np.array([state.onset_ns is not None for state in states]), np.array([state.mean for state in states])
         own = []  # of the mean velocity until each horizon, for each of FADING_TIMES_S [m/s]
         for horizon in HORIZONS_S:
             known = is_moving & (times + horizon <= times[-1])
-            later = np.column_stack([np.interp(times[known] + horizon, times, axis) for axis in hand.positions.T])
+            later = path.interpolate(int(path.stamps_ns[0]), times[known] + horizon)
             gained = (later - mean[known, :2]) / horizon - mean[known, 2:4]
             share = np.append(horizon / 2.0, fading * (1.0 - fading / horizon * (1.0 - np.exp(-horizon / fading))))
             own.append(np.hypot(*(gained - share[:, None, None] * mean[known, 4:]).transpose(2, 0, 1)).T)
@@ -188,9 +127,9 @@ def fit_fading(hands: Sequence[RecordedHand], config: Config) -> Findings:
 def find_samples(hand: RecordedHand, config: Config) -> list[tuple[HandState, Array, float]]:
     """Return states, goal (2,) [m] and times left [s] of a movement that covered the distance to a goal; none of another one."""
     path = hand.path
-    if path.goal is None or not has_covered_distance(hand.positions, hand.goals[path.goal]):
+    if path.goal is None or not has_covered_distance(path.positions, goal := path.goals[path.goal]):
         return []
-    states, goal = [each.state for each in hand.filter(config.estimator)], hand.goals[path.goal]
+    states = [each.state for each in hand.filter(config.estimator)]
     left = [(state, goal, (path.end_ns - state.stamp_ns) / NANOSECONDS) for state in states if state.onset_ns is not None]
     return [each for each in left if each[2] > 0.1]  # [s]: the end itself is known no better
 
@@ -205,11 +144,11 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
 
     def compute_errors(values: Array) -> Array:
         """Return the mean absolute error of the time to go in each recording, (n,) [s]."""
-        leaves = [name.partition('.')[2] for name in names]
+        leaves = (name.partition('.')[2] for name in names)
         duration = clip_values(config.duration, dict(zip(leaves, values.tolist(), strict=True)))
-        errors = [
+        errors = (
             [abs(estimate_times_to_go(hand, goal[None], duration)[0] - left) for hand, goal, left in each] for each in samples
-        ]
+        )
         return np.array([np.mean(each) for each in errors])
 
     tried = [given * factor for factor in FACTORS]
@@ -247,22 +186,12 @@ def _find_best_factor(errors: Array) -> float:
     return float(FACTORS[index] * np.exp(np.log(FACTORS[1] / FACTORS[0]) * np.clip(shift, -1.0, 1.0)))
 
 
-def fit_other_models(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
-    """Return the configuration with Fitts' law, by which durations depend on distances, and its fitted constants."""
-    if config.duration.model == 'fitts':
-        return []
-    other = replace_values(config, {'duration.model': 'fitts'})
-    return [replace_values(other, fit_duration(hands, other).values)]
-
-
 def fit_wait(hands: Sequence[RecordedHand], config: Config) -> Findings:
     """Return the mean time that a hand waits."""
     means = []
     for hand in hands:
         waits, onset_ns = list[float](), None  # from the samples at rest to the movement that follows, until the goal is reached
-        for state in [each.state for each in reversed(hand.filter(config.estimator))]:
-            if state.stamp_ns > hand.path.end_ns:
-                continue
+        for state in [each.state for each in reversed(hand.filter(config.estimator)) if each.state.stamp_ns <= hand.path.end_ns]:
             if state.onset_ns is not None:
                 onset_ns = state.onset_ns
             elif onset_ns is not None:

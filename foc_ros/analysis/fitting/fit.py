@@ -16,18 +16,19 @@ from typing import Any
 import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import Forecast
-from foc_ros.analysis.evaluation.observations import ObservedRecording, observe
+from foc_ros.analysis.evaluation.observations import GAP, ObservedRecording, ask_all, ask_main, observe
 from foc_ros.analysis.evaluation.positions import compute_position_scores
-from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
-from foc_ros.analysis.evaluation.report import OURS
+from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S, OURS
+from foc_ros.analysis.evaluation.scores import find_mean, score_forecasts
+from foc_ros.analysis.evaluation.truth import RecordedHand, read_hand
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
 from . import Findings, clip_to_bounds, is_cross_validated
-from .direct import RecordedHand, fit_duration, fit_estimator, fit_fading, fit_wait, read_hand
-from .one_replay import COVERAGE_LEVEL, NO_WIDENING, fit_likelihood, fit_widening
+from .direct import fit_duration, fit_estimator, fit_fading, fit_wait
+from .one_replay import NO_WIDENING, fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
 
 PREDICTIONS = 10
@@ -54,24 +55,21 @@ Rows = list[tuple[str, ...]]
 
 
 @dataclass
-class Fit:
-    """The state of a fit: the configuration with what was found so far.
+class Fit(Findings):
+    """The findings of all steps so far, and the configuration with them.
 
-    recordings: how many are used; failed recordings with reasons; scores as plain values; comparison: of given and fitted
-    parameters.
+    recordings: how many are used; failed recordings with reasons; comparison: of given and fitted parameters.
     """
 
-    config: Config
-    found: Findings = field(default_factory=Findings)
+    config: Config = field(default_factory=Config)
     recordings: int = 0
     failed: dict[str, str] = field(default_factory=dict)
-    scores: dict[str, Any] = field(default_factory=dict)
     comparison: dict[str, dict[str, float | None]] = field(default_factory=dict)
 
-    def take(self, found: Findings) -> None:
-        """Take what a step found into the configuration."""
-        self.found.take(found)
-        self.config = replace_values(self.config, found.values)
+    def take(self, later: Findings) -> None:
+        """Take what a later step found, also into the configuration."""
+        super().take(later)
+        self.config = replace_values(self.config, later.values)
 
 
 def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lower_eta: bool = False) -> Fit:
@@ -79,7 +77,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
 
     may_lower_eta: whether obstacles may be avoided with less certainty than the configuration wants.
     """
-    fit = Fit(config)
+    fit = Fit(config=config)
     hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), 'read')
     if not hands:
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
@@ -87,38 +85,33 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     for step in (fit_estimator, fit_fading, fit_duration, fit_wait):
         fit.take(step(hands, fit.config))
     if config.foc.strategy == 'fixed':
-        fit.found.warnings.append('foc.tau, foc.lam: kept as they are; examples/plan_recovery finds them from movements')
+        fit.warnings.append('foc.tau, foc.lam: kept as they are; examples/plan_recovery finds them from movements')
     duration_s = float(np.median([each.times[-1] for each in hands]))
     rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
     thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
     _search(hands, fit, Replays(usable, thinned | UNSCALED), may_lower_eta)
     _fit_to_one_replay(usable, fit, thinned | UNSCALED)
     given = flatten(config)
-    fit.found.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
+    fit.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
     fit.config = replace_values(fit.config, UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
     fit.comparison = compare_configs(compared, (config, fit.config), thinned)
-    fit.found.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
+    fit.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
     return fit
 
 
 def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower_eta: bool) -> None:
     """Fit the parameters that need replays."""
-
-    def take_best(kind: str, settings: Sequence[Config]) -> None:
-        fit.config, found = search_settings(kind, settings, replays)
-        fit.take(found)
-
     if not any(len(each.obstacles) for each in hands):
         reason = 'no recording has an obstacle, without which neither margins nor noise show'
-        fit.found.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
+        fit.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
     elif fit.config.foc.strategy != 'fixed':
         # with strategy `fixed` eta has no effect, and lambda holds for the noise as it is
-        take_best('noise', make_noise_settings(fit.config))
-        take_best('eta', make_eta_settings(fit.config, may_lower_eta))
+        fit.take(search_settings('noise', make_noise_settings(fit.config), replays))
+        fit.take(search_settings('eta', make_eta_settings(fit.config, may_lower_eta), replays))
         if not may_lower_eta:
-            fit.found.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
-    take_best('movement', make_movement_settings(hands, fit.config))
+            fit.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
+    fit.take(search_settings('movement', make_movement_settings(hands, fit.config), replays))
 
 
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:
@@ -129,11 +122,9 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
     for step in (fit_likelihood, fit_widening):
-        found, scores = step(observed, fit.config)
-        fit.take(found)
-        fit.scores.update(scores)
+        fit.take(step(observed, fit.config))
     if not is_cross_validated(observed):
-        fit.found.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
+        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
 
 
 def compare_configs(
@@ -141,14 +132,12 @@ def compare_configs(
 ) -> dict[str, dict[str, float | None]]:
     """Return the measures of two configurations, `before` and `after`, by measure, from the recordings that both predict.
 
-    thinned: parameters of these replays alone. `class_gain`: log-likelihood of the answer taken above uniform [nat]; `gap_right`:
-    share of correct next gaps; `error_m 0.5`: distance of the likelihood-weighted position from the true one 0.5 s ahead [m];
-    `nlpd`: negative log-density of the true positions 0.5 s ahead [nat]; `inside_90`: their share in the region of 90 %.
+    thinned: parameters of these replays alone. The measures are those of `COMPARISON_TITLES`; the position is the
+    likelihood-weighted one.
     """
-    items = list(recordings.items())
     replays = []
     for config, words in zip(configs, ('before', 'after'), strict=True):
-        observed, _ = collect(partial(observe, config=replace_values(config, thinned)), items, words)
+        observed, _ = collect(partial(observe, config=replace_values(config, thinned)), list(recordings.items()), words)
         replays.append({each.name: each for each in observed})
     common = [name for name in recordings if all(name in replay for replay in replays)]
     if not common:
@@ -158,34 +147,33 @@ def compare_configs(
 
 
 def _measure(recordings: Sequence[ObservedRecording]) -> dict[str, float | None]:
-    gains, gaps = [], []
-    for recording in recordings:
-        for observation, question in ask_main(recording):
-            forecast = Forecast.from_shares(observation.candidates.likelihood, question)
-            gains.append(np.log(forecast.true_probability(question)) + np.log(question.possible))
-        for observation, question in ask_all(recording, GAP):
-            gaps.append(Forecast.from_shares(observation.candidates.likelihood, question).correctness(question))
+    classes, gaps = (
+        score_forecasts(
+            (0, observation, question, Forecast.from_shares(observation.candidates.likelihood, question))
+            for recording in recordings
+            for observation, question in ask(recording)
+        )
+        for ask in (ask_main, partial(ask_all, name=GAP))
+    )
     positions = compute_position_scores(recordings)
     return {
-        'class_gain': float(np.mean(gains)) if gains else None,
-        'gap_right': float(np.mean(gaps)) if gaps else None,
+        'class_gain': find_mean(classes.log_likelihood + np.log(classes.possible)),
+        'gap_right': find_mean(gaps.correct),
         **{f'error_m {horizon}': error for horizon, error in positions['displacement_m'][OURS]['final'].items()},
-        'nlpd': positions['nlpd']['foc']['0.5'],
-        'inside_90': positions['inside_all']['0.9']['0.5'],
+        'nlpd': positions['nlpd']['foc'][COVERAGE_S],
+        'inside_90': positions['inside_all'][f'{COVERAGE_LEVEL:g}'][COVERAGE_S],
     }
 
 
 def find_worse_positions(comparison: Mapping[str, Mapping[str, float | None]]) -> list[str]:
     """Return a sentence for each horizon at which the positions become worse, by 5 % and 1 mm."""
-    sentences = []
-    for name, each in comparison.items():
-        before, after = each['before'], each['after']
-        if not name.startswith('error_m') or before is None or after is None:
-            continue
-        if after > 1.05 * before + 0.001:
-            horizon, change = name.split()[1], f'from {1e3 * before:.0f} to {1e3 * after:.0f} mm'
-            sentences.append(f'predicted positions {horizon} s ahead become worse with the fitted parameters: {change}')
-    return sentences
+    errors = ((name.split()[1], each['before'], each['after']) for name, each in comparison.items() if name.startswith('error_m'))
+    return [
+        f'predicted positions {horizon} s ahead become worse with the fitted parameters: '
+        f'from {1e3 * before:.0f} to {1e3 * after:.0f} mm'
+        for horizon, before, after in errors
+        if before is not None and after is not None and after > 1.05 * before + 0.001
+    ]
 
 
 def find_lower_coverage(fit: Fit) -> list[str]:
@@ -203,16 +191,19 @@ def find_lower_coverage(fit: Fit) -> list[str]:
 
 def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
     """Return a fit as plain values; node: the commands that run the node with it, without and with a ROS installation."""
-    before, found, options = flatten(given), fit.found, f'--ros-args --params-file {output}'
+    before, options = flatten(given), f'--ros-args --params-file {output}'
     return {
         'recordings': fit.recordings,
         'failed': fit.failed,
-        'parameters': {name: {**each.as_json(), 'given': before[name]} for name, each in found.estimates.items()},
-        'chosen': {name: {'value': value, 'given': before[name]} for name, value in found.chosen.items()},
-        'undetermined': {name: {'given': before[name], 'why': why} for name, why in found.undetermined.items()},
+        'parameters': {
+            name: {'value': each.value, 'interval': [each.low, each.high], 'how': each.how, 'given': before[name]}
+            for name, each in fit.estimates.items()
+        },
+        'chosen': {name: {'value': value, 'given': before[name]} for name, value in fit.chosen.items()},
+        'undetermined': {name: {'given': before[name], 'why': why} for name, why in fit.undetermined.items()},
         'scores': fit.scores,
         'comparison': fit.comparison,
-        'warnings': found.warnings,
+        'warnings': fit.warnings,
         'output': str(output),
         'node': [f'python -m foc_ros node {options}', f'ros2 run foc_ros foc_node {options}'],
     }
@@ -222,13 +213,11 @@ def format_parameters(answer: Mapping[str, Any]) -> Rows:
     """Return the rows of the parameters in an answer of `fit --json`; of those that are not determined, with the reason."""
     rows: Rows = []
     for name, each in answer['parameters'].items():
-        low, high = ('-' if end is None else f'{end:.3g}' for end in each['interval'])
-        rows.append((name, f'{each["given"]:.3g}', f'{each["value"]:.3g}', f'{low} to {high}', each['how']))
-    rows += [
-        (name, each['given'], each['value'], '', 'predicted positions and classes')
-        for name, each in answer.get('chosen', {}).items()
-    ]
-    for name, each in answer.get('undetermined', {}).items():
+        given, value, low, high = (f'{number:.3g}' for number in (each['given'], each['value'], *each['interval']))
+        rows.append((name, given, value, f'{low} to {high}', each['how']))
+    for name, each in answer['chosen'].items():
+        rows.append((name, each['given'], each['value'], '', 'predicted positions and classes'))
+    for name, each in answer['undetermined'].items():
         given = each['given'] if isinstance(each['given'], str) else f'{each["given"]:.3g}'
         rows.append((name, given, 'kept', '', f'not determined: {each["why"]}'))
     return rows

@@ -9,16 +9,16 @@ them are tried on observations with motor noise alone, by the density of the tru
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
-from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, make_ahead, make_plain, power_rule_shares
-from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, interpolate_steps
-from foc_ros.analysis.evaluation.positions import average, compute_denser_shares, compute_log_densities, find_inside
-from foc_ros.analysis.evaluation.questions import ask_main
+from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, power_rule_shares
+from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, ask_main, interpolate_steps
+from foc_ros.analysis.evaluation.positions import choose_row, compute_log_densities, measure_inside
+from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS
 from foc_ros.analysis.parallel import collect_all
@@ -29,12 +29,12 @@ from foc_ros.core.types import Array
 
 from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
 
-RULES = (
-    *(make_plain(LikelihoodConfig(), beta) for beta in (0.5, 1.0, 2.0, 3.0, 6.0, 12.0)),
-    *(
-        make_ahead(LikelihoodConfig(), horizon, seconds, beta)
-        for horizon, seconds, beta in product((0.0, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0))
-    ),
+RULES = tuple(
+    LikelihoodConfig(beta=beta, planning_horizon_s=horizon_s, lookahead_s=lookahead_s)
+    for horizon_s, lookahead_s, beta in (
+        *product((WHOLE_WAY_S,), (0.0,), (0.5, 1.0, 2.0, 3.0, 6.0, 12.0)),
+        *product((0.0, 2.5), (0.0, 0.5, 1.0), (1.0, 2.0, 3.0, 6.0)),
+    )
 )
 """The likelihoods of which each setting of the race gets its best. By a single one, settings that suit the others would lose."""
 LIKELIHOODS = {
@@ -55,20 +55,18 @@ hand in free motion; scatter of the end [m], of which Fitts' law expects 48 mm f
 NO_WIDENING: Setting = dict.fromkeys(WIDENINGS, 0.0)
 FEW_WIDENINGS = tuple(product((0.0, *PROCESS_NOISES[1::4]), (0.0, 3e-3, 8e-3, 24e-3, 72e-3), (0.0, 0.2, 0.4)))
 """Widenings whose best is good enough to compare predictions that differ in other parameters."""
-COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
-"""Time ahead and probability of the ellipses and regions whose coverage is reported."""
 
 
-def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> tuple[Findings, dict[str, Any]]:
-    """Return the parameters of the likelihood, from one replay of the recordings, and their scores.
+def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
+    """Return the parameters of the likelihood, from one replay of the recordings.
 
     Scores `ways`: mean log-likelihoods by how the setting was chosen, with at least three recordings also held out, by recording
-    and by the class taken. Empty where no class or goal is in question.
+    and by the class taken; none where no class or goal is in question.
     """
     questions = [ask_main(each) for each in recordings]
     if not any(questions):
         reason = 'no recording has an obstacle to pass on one of two sides, or a second goal'
-        return Findings(undetermined=dict.fromkeys(LIKELIHOODS, reason)), {}
+        return Findings(undetermined=dict.fromkeys(LIKELIHOODS, reason))
     before = flatten(config)
     given = {name: float(before[name]) for name in LIKELIHOODS}
     ahead = list_settings({name: (given[name], *tried) for name, tried in LIKELIHOODS.items()})
@@ -79,20 +77,20 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> t
     rule = Baseline('foc', partial(forecast_shares, power_rule_shares), tuple(rules))
     rows = collect_all(partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], 'likelihood')
     table = SettingTable(np.array(rows), settings)
-    found, columns = table.estimate(given, 'likelihood of the classes taken')
+    found, left = table.estimate(given, 'likelihood of the classes taken')
     missed = float(np.mean([question.truth not in question.given for each in questions for _, question in each]))
     if missed > 0.1:
         words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
         found.warnings.append(f'likelihood.beta: in {100 * missed:.0f} % of the predictions {words}')
     uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
     names = [each.name for each in recordings]
-    scores = {'uniform': float(np.mean(uniform))}
-    scores |= {how: table.score(each) for how, each in table.list_choices(given, columns, names).items()}
+    found.scores['ways'] = scores = {'uniform': float(np.mean(uniform))}
+    scores |= {how: left.score(each) for how, each in left.list_choices(given, names).items()}
     if is_cross_validated(recordings):
         taken = [each[0][1].answers[each[0][1].truth] if each else name for each, name in zip(questions, names, strict=True)]
         if len(set(taken)) > 1:
-            scores['without its way'] = table.score(table.choose_held_out(columns, taken))
-    return found, {'ways': scores}
+            scores['without its way'] = left.score(left.choose_held_out(taken))
+    return found
 
 
 def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
@@ -100,8 +98,8 @@ def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
     return compute_log_likelihoods(questions, rule) / len(questions) if questions else np.full(len(rule.settings), np.nan)
 
 
-def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> tuple[Findings, dict[str, Any]]:
-    """Return the parameters that widen the covariance, from a replay with motor noise alone, and scores.
+def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
+    """Return the parameters that widen the covariance, from a replay with motor noise alone.
 
     Scores: mean log-densities and coverage by how the widening was chosen, with at least three recordings also held out.
     """
@@ -110,20 +108,21 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> tup
     settings = list_settings({name: (0.0, given[name], *tried) for name, tried in WIDENINGS.items()})
     widenings, rows = [tuple(each.values()) for each in settings], []
     for recording in recordings:
-        shares = [power_rule_shares(each, config.likelihood) for each in recording.observations]
-        pairs = zip(recording.observations, shares, strict=True)
-        densities = [compute_mean_densities(*pair, config, widenings) for pair in pairs]
+        densities = (
+            compute_mean_densities(each, power_rule_shares(each, config.likelihood), config, widenings)
+            for each in recording.observations
+        )
         known = [each for each in densities if each is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(settings), np.nan))
     table = SettingTable(np.array(rows), settings)
-    found, columns = table.estimate(given, 'density of true positions')
-    chosen = {'motor noise alone': np.zeros(len(recordings), dtype=np.intp)}
-    chosen |= table.list_choices(given, columns, [each.name for each in recordings])
-    coverage = {name: compute_coverage(recordings, config, [widenings[each] for each in chosen[name]]) for name in chosen}
-    return found, {
-        'positions': {name: table.score(each) for name, each in chosen.items()},
-        **{kind: {name: each[kind] for name, each in coverage.items()} for kind in ('inside_90', 'inside_all_90')},
-    }
+    found, left = table.estimate(given, 'density of true positions')
+    chosen = {'motor noise alone': [NO_WIDENING] * len(recordings)}
+    chosen |= left.list_choices(given, [each.name for each in recordings])
+    found.scores = {'positions': {name: table.score(each) for name, each in chosen.items()}, 'inside_90': {}, 'inside_all_90': {}}
+    for name, each in chosen.items():
+        for kind, share in compute_coverage(recordings, config, each).items():
+            found.scores[kind][name] = share
+    return found
 
 
 def compute_mean_densities(
@@ -141,9 +140,9 @@ def compute_mean_densities(
 
 
 def widen_covariances(observation: Observation, widenings: Iterable[Sequence[float]], config: Config) -> Array:
-    """Return the covariance (q, k, h, 2, 2) [m^2] of the candidates' positions at `TIMES_S` with each widening."""
+    """Return the covariance (q, k, 3, 2, 2) [m^2] of the candidates' positions at `HORIZONS_S` with each widening."""
     candidates, late, squares = observation.candidates, observation.candidates.duration_sensitivity, np.array(widenings) ** 2
-    unit = []  # variances by process noise and by scatter of the end, of 1 each, (k, 2, h)
+    unit = []  # variances by process noise and by scatter of the end, of 1 each, (k, 2, 3)
     for time_s in candidates.time_s.tolist():
         kind = time_s / config.foc.steps, config.foc.steps, is_passing(config.duration)
         jerk = TRIPLE_INTEGRATOR.compute_process_covariance(*kind)
@@ -155,28 +154,21 @@ def widen_covariances(observation: Observation, widenings: Iterable[Sequence[flo
 
 
 def compute_coverage(
-    recordings: Sequence[ObservedRecording], config: Config, widenings: Sequence[Sequence[float]]
+    recordings: Sequence[ObservedRecording], config: Config, chosen: Sequence[Setting]
 ) -> dict[str, float | None]:
     """Return the shares of true positions of moving hands after 0.5 s inside 90 % ellipses and regions.
 
-    inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; widenings (n,): for
-    each recording, so that each can be judged by one that it did not influence.
+    inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; chosen (n,): the
+    widening of each recording, so that each can be judged by one that it did not influence.
     """
-    moving = [
-        (each, widening)
-        for recording, widening in zip(recordings, widenings, strict=True)
-        for each in recording.observations
-        if each.movement_age_s > 0.0
-    ]
+    moving = []
+    for recording, setting in zip(recordings, chosen, strict=True):
+        for each in recording.observations:
+            if each.movement_age_s > 0.0:
+                widened = widen_covariances(each, [tuple(setting.values())], config)[0]
+                moving.append(replace(each, candidates=replace(each.candidates, covariance=widened)))
     if not moving:
         return {'inside_90': None, 'inside_all_90': None}
-    observations = [each for each, _ in moving]
-    shares = [power_rule_shares(each, config.likelihood) for each in observations]
-    covariances = [widen_covariances(each, [widening], config)[0] for each, widening in moving]
-    likeliest = [int(each.argmax()) for each in shares]
-    denser = np.array([compute_denser_shares(*each) for each in zip(observations, shares, covariances, strict=True)])
-    inside = np.where(np.isfinite(denser), denser < COVERAGE_LEVEL, np.nan)
-    return {
-        'inside_90': find_inside(observations, likeliest, covariances, COVERAGE_LEVEL)[COVERAGE_S],
-        'inside_all_90': average(inside)[COVERAGE_S],
-    }
+    shares = [power_rule_shares(each, config.likelihood) for each in moving]
+    weights = {'inside_90': [choose_row(int(each.argmax()), len(each)) for each in shares], 'inside_all_90': shares}
+    return {name: measure_inside(moving, each)[f'{COVERAGE_LEVEL:g}'][COVERAGE_S] for name, each in weights.items()}

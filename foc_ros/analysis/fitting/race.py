@@ -17,22 +17,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from foc_ros.analysis.evaluation.baselines import Forecast, power_rule_shares
-from foc_ros.analysis.evaluation.observations import observe
-from foc_ros.analysis.evaluation.questions import GAP, ask_all, ask_main
-from foc_ros.analysis.intervals import SEED, resample
+from foc_ros.analysis.evaluation.observations import GAP, ask_all, ask_main, observe
+from foc_ros.analysis.evaluation.scores import SEED, resample
+from foc_ros.analysis.evaluation.truth import RecordedHand
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import ARRIVALS, Config, flatten, replace_values
 from foc_ros.core.types import Array
 
 from . import Estimate, Findings, clip_to_bounds
-from .direct import CONSTANTS, RecordedHand, fit_other_models
+from .direct import CONSTANTS, fit_duration
 from .one_replay import FEW_WIDENINGS, NO_WIDENING, RULES, compute_mean_densities
 
 NOISES, DURATIONS = (0.06, 0.25, 2.0), (0.7, 1.4, 2.0)
@@ -57,8 +58,8 @@ def make_noise_settings(config: Config) -> list[Config]:
 
 def make_eta_settings(config: Config, may_be_lower: bool) -> list[Config]:
     """Return the configuration, and it with other probabilities of avoiding; may_be_lower: than the given one."""
-    etas = [eta for eta in ETAS if may_be_lower or eta > config.foc.eta]
-    return list(dict.fromkeys([config, *(replace_values(config, {'foc.eta': eta}) for eta in etas)]))
+    etas = [config.foc.eta, *(eta for eta in ETAS if may_be_lower or eta > config.foc.eta)]
+    return [replace_values(config, {'foc.eta': eta}) for eta in dict.fromkeys(etas)]
 
 
 def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
@@ -67,13 +68,18 @@ def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> lis
     Where a goal that is passed is modelled as one where the hand stops, no duration is right, nor where an acceleration that
     lasts is modelled as one that fades.
     """
-    models = [config, *fit_other_models(hands, config)]
-    scaled = [_scale(each, CONSTANTS[each.duration.model], factor) for each, factor in product(models, (1.0, *DURATIONS))]
+    models = [config]
+    if config.duration.model != 'fitts':
+        fitts = replace_values(config, {'duration.model': 'fitts'})
+        models.append(replace_values(fitts, fit_duration(hands, fitts).values))
     arrivals = dict.fromkeys([config.duration.arrival, *ARRIVALS])
     fading_times = dict.fromkeys([config.estimator.acceleration_time_s, 0.0])
     return [
-        replace_values(each, {'duration.arrival': arrival, 'estimator.acceleration_time_s': fading_s})
-        for each, arrival, fading_s in product(scaled, arrivals, fading_times)
+        replace_values(
+            _scale(model, CONSTANTS[model.duration.model], factor),
+            {'duration.arrival': arrival, 'estimator.acceleration_time_s': fading_s},
+        )
+        for model, factor, arrival, fading_s in product(models, (1.0, *DURATIONS), arrivals, fading_times)
     ]
 
 
@@ -83,12 +89,11 @@ def _scale(config: Config, names: Iterable[str], factor: float) -> Config:
     return replace_values(config, {name: clip_to_bounds(name, factor * float(before[name])) for name in names})
 
 
-@dataclass(frozen=True)
-class ReplayScores:
+class ReplayScores(NamedTuple):
     """Log-likelihoods of predictions, of classes above uniform, each under all parameters that need no replay, (q,) [nat]."""
 
-    classes: dict[Key, Array] = field(default_factory=dict)
-    positions: dict[Key, Array] = field(default_factory=dict)
+    classes: dict[Key, Array]
+    positions: dict[Key, Array]
 
 
 @dataclass
@@ -100,29 +105,44 @@ class Replays:
     _known: dict[tuple[Config, str], ReplayScores] = field(default_factory=dict)
 
     def score(self, settings: Sequence[Config], names: Sequence[str], description: str) -> Array:
-        """Return the scores of settings in named recordings, as of `compare_settings`; description: for the progress bar."""
+        """Return the scores of settings in recordings, of classes and of positions, (2, s, n) [nat]; description: for a bar.
+
+        A prediction that a setting could not make counts as the worst of those that others made in its place; of classes at most
+        as a uniform guess.
+        """
         missing = [key for key in product(settings, names) if key not in self._known]
         items = [
             (f'{name} {number}', (number, self.recordings[name], setting, self.thinned))
             for number, (setting, name) in enumerate(missing)
         ]
         found = dict(collect(_score_replay, items, description)[0])
-        self._known |= {key: found.get(number, ReplayScores()) for number, key in enumerate(missing)}
-        return compare_settings([[self._known[setting, name] for name in names] for setting in settings], names)
+        self._known |= {key: found.get(number, ReplayScores({}, {})) for number, key in enumerate(missing)}
+        # by kind and setting, the log-likelihoods of all predictions
+        classes, positions = zip(*(self._gather(setting, names) for setting in settings), strict=True)
+        return np.array([_average_by_recording(classes, 0.0, names), _average_by_recording(positions, np.inf, names)])
+
+    def _gather(self, setting: Config, names: Sequence[str]) -> list[dict[Key, float]]:
+        """Return the log-likelihoods of classes and of positions under the parameters best for all predictions of a setting."""
+        best = []
+        for kind in zip(*(self._known[setting, name] for name in names), strict=True):
+            rows = {key: row for each in kind for key, row in each.items()}
+            column = int(np.sum(list(rows.values()), axis=0).argmax()) if rows else 0
+            best.append({key: float(row[column]) for key, row in rows.items()})
+        return best
 
 
 def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> tuple[int, ReplayScores]:
     """Score the predictions of one setting in a recording; return its number and the scores."""
     number, given, config, thinned = item
     config = replace_values(config, thinned)
-    recording, found = observe(given, replace_values(config, NO_WIDENING)), ReplayScores()
+    recording, found = observe(given, replace_values(config, NO_WIDENING)), ReplayScores({}, {})
     gaps = {observation.stamp_ns: question for observation, question in ask_all(recording, GAP)}
     for observation, question in ask_main(recording):
-        questions = [question, *([gaps[observation.stamp_ns]] if observation.stamp_ns in gaps else [])]
-        shares = [power_rule_shares(observation, rule) for rule in RULES]
-        probabilities = [[Forecast.from_shares(each, about).true_probability(about) for each in shares] for about in questions]
-        uniform = [[1.0 / about.possible] for about in questions]
-        found.classes[recording.name, observation.stamp_ns] = np.log(np.divide(probabilities, uniform)).sum(axis=0)
+        shares, logs = [power_rule_shares(observation, rule) for rule in RULES], np.zeros(len(RULES))
+        for asked in filter(None, (question, gaps.get(observation.stamp_ns))):
+            probabilities = [Forecast.from_shares(each, asked).true_probability(asked) for each in shares]
+            logs += np.log(np.multiply(probabilities, asked.possible))
+        found.classes[recording.name, observation.stamp_ns] = logs
     for observation in recording.observations:
         densities = compute_mean_densities(observation, observation.candidates.mixture, config, FEW_WIDENINGS)
         if densities is not None:
@@ -130,41 +150,23 @@ def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> 
     return number, found
 
 
-def compare_settings(settings: Sequence[Sequence[ReplayScores]], names: Sequence[str]) -> Array:
-    """Return the scores of each setting in each recording, of classes and of positions, (2, s, n) [nat].
-
-    settings: by setting and recording. A prediction that a setting could not make counts as the worst of those that others made
-    in its place; of classes at most as a uniform guess.
-    """
-    classes = [_take_best([each.classes for each in parts]) for parts in settings]
-    positions = [_take_best([each.positions for each in parts]) for parts in settings]
-    return np.array([_average_by_recording(classes, 0.0, names), _average_by_recording(positions, np.inf, names)])
-
-
-def _take_best(parts: Sequence[Mapping[Key, Array]]) -> dict[Key, float]:
-    """Return the log-likelihoods under the parameters that are best for all predictions together."""
-    rows = {key: row for part in parts for key, row in part.items()}
-    best = int(np.sum(list(rows.values()), axis=0).argmax()) if rows else 0
-    return {key: float(row[best]) for key, row in rows.items()}
-
-
 def _average_by_recording(found: Sequence[Mapping[Key, float]], most: float, names: Sequence[str]) -> Array:
     """Return the means (s, n) over the predictions of each recording; most: what a missing prediction counts at most."""
     keys = sorted({key for each in found for key in each})
     table = np.array([[each.get(key, np.nan) for key in keys] for each in found])
-    worst = np.minimum(np.nanmin(table, axis=0), most)
+    table = np.where(np.isnan(table), np.minimum(np.nanmin(table, axis=0), most), table)
     recording = np.array([names.index(name) for name, _ in keys], dtype=np.intp)
     counts = np.maximum(np.bincount(recording, minlength=len(names)), 1)
-    return np.array([np.bincount(recording, np.where(np.isnan(row), worst, row), len(names)) / counts for row in table])
+    return np.array([np.bincount(recording, row, len(names)) / counts for row in table])
 
 
-def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[Config, Findings]:
-    """Return the best of some settings, of which the first is the given one, and what is new in it."""
+def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> Findings:
+    """Return what is new in the best of some settings, of which the first is the given one."""
     finalists, scores, first_scores = race(kind, settings, replays)
-    best, given = rank(scores)[0], settings[0]
     winners = resample(lambda rows: rank(scores[:, :, rows])[0], scores.shape[2]).astype(int)
-    if given in finalists and not is_better(scores[:, best], scores[:, finalists.index(given)]):
-        best = finalists.index(given)
+    best = rank(scores)[0]
+    if settings[0] in finalists and not is_better(scores[:, best], scores[:, given := finalists.index(settings[0])]):
+        best = given
     found = _describe_choice(finalists[best], settings, [finalists[each] for each in winners])
     positions = first_scores[1].mean(axis=1)
     if (loss := float(positions[0] - positions[settings.index(finalists[best])])) > 0.05:
@@ -172,7 +174,7 @@ def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> 
             f'{kind}: the setting that explains the classes best predicts positions worse: the mean log-density of the true ones '
             f'falls by {loss:.2g} nat'
         )
-    return finalists[best], found
+    return found
 
 
 def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequence[Config]) -> Findings:
@@ -199,18 +201,18 @@ def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequen
 
 
 def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array, Array]:
-    """Return the finalists, in the given order, with their scores as of `compare_settings`, and all scores of the first round."""
-    names = sample_names(list(replays.recordings))
-    left, count = list(settings), FIRST
-    first_scores = scores = replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}')
-    while count < len(names) and len(left) > 1:
-        is_behind = find_behind(scores, PLAINLY_WORSE)
-        kept = {index for index in rank(scores)[: max(-(-len(left) // 2), 4)] if not is_behind[index]}
+    """Return the finalists, in the given order, with their scores, and all scores of the first round."""
+    names, left, count = sample_names(list(replays.recordings)), list(settings), FIRST
+    rounds: list[Array] = []
+    while True:
+        rounds.append(replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}'))
+        if count >= len(names) or len(left) == 1:
+            return left, rounds[-1], rounds[0]
+        is_behind = find_behind(rounds[-1], PLAINLY_WORSE)
+        kept = {index for index in rank(rounds[-1])[: max(-(-len(left) // 2), 4)] if not is_behind[index]}
         if left[0] == settings[0] and not is_behind[0]:
             kept.add(0)
         left, count = [left[index] for index in sorted(kept)], 2 * count
-        scores = replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}')
-    return left, scores, first_scores
 
 
 def sample_names(names: Sequence[str]) -> list[str]:

@@ -13,16 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from foc_ros.analysis.evaluation.truth import read_hand
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.simulation import ACCURATE, CHANGES_WAY, HUMAN_PATHS, LAGGY, NOISY, UNANNOUNCED_GOAL
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError, RecordingError
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.types import NANOSECONDS, Array, Record
-from foc_ros.io.topics import HAND
-from foc_ros.ros.intake import Intake
+from foc_ros.core.types import Array, Record
 
 DT = 0.005
 """Time step of the simulation [s]."""
@@ -31,43 +29,27 @@ CLEARANCE_M = (0.003, 0.01)
 MOST_DRAWS = 200
 
 
-@dataclass(frozen=True, eq=False)
-class IntendedPath(Record):
-    """Positions [m], velocities [m/s] and accelerations [m/s^2] of a movement, (n, 2) each, at steps of `DT`."""
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-
-    @classmethod
-    def sample(cls, spline: BSpline, times: Array) -> IntendedPath:
-        """Return the path of a spline of positions at times (n,) [s]."""
-        return cls(spline(times), spline(times, 1), spline(times, 2))
-
-    def join(self, steps: int, rest: IntendedPath) -> IntendedPath:
-        """Return the path with another one behind its first steps."""
-        parts = ((self.position, rest.position), (self.velocity, rest.velocity), (self.acceleration, rest.acceleration))
-        return IntendedPath(*(np.concatenate([before[:steps], behind]) for before, behind in parts))
+def sample_path(spline: BSpline, times: Array) -> Array:
+    """Return the path (n, 3, 2) of a spline of positions at times (n,) [s]: position, velocity and acceleration in SI units."""
+    return np.stack([spline(times, order) for order in range(3)], axis=1)
 
 
-def interpolate_minimum_jerk(points: Array, times: Array, start: tuple[Array, Array]) -> IntendedPath:
-    """Return the path of least integrated squared jerk through points (k, 2) [m] at times (k,) [s], at rest at its end.
+def interpolate_minimum_jerk(points: Array, times: Array, moving: Array) -> Array:
+    """Return the path (n, 3, 2) of least integrated squared jerk through points (k, 2) [m] at times (k,) [s], at rest at its end.
 
     With fixed times this is the quintic spline with knots at the via points (Flash and Hogan 1985, doi
-    10.1523/JNEUROSCI.05-07-01688.1985). start: velocity (2,) [m/s] and acceleration (2,) [m/s^2] at the first point.
+    10.1523/JNEUROSCI.05-07-01688.1985). moving (2, 2): velocity [m/s] and acceleration [m/s^2] at the first point.
     """
-    conditions = ([(1, start[0]), (2, start[1])], [(1, np.zeros(2)), (2, np.zeros(2))])
+    conditions = ([(1, moving[0]), (2, moving[1])], [(1, np.zeros(2)), (2, np.zeros(2))])
     spline = make_interp_spline(times, points, k=5, bc_type=conditions)
-    return IntendedPath.sample(spline, np.append(np.arange(0.0, times[-1], DT), times[-1]))
+    return sample_path(spline, np.append(np.arange(0.0, times[-1], DT), times[-1]))
 
 
-def plan_path(
-    rng: np.random.Generator, start: Array, goal: Array, seen: Obstacles, moving: tuple[Array, Array] | None = None
-) -> IntendedPath | None:
-    """Return an intended path to a goal among obstacles as the operator sees them; None if no few via points lead there.
+def plan_path(rng: np.random.Generator, start: Array, goal: Array, seen: Obstacles, moving: Array | None = None) -> Array | None:
+    """Return an intended path (n, 3, 2) to a goal among obstacles as the operator sees them; None if few via points do not do.
 
-    Via points, at most four, are set beside the obstacle that the path comes nearest to, until the path is free by 1 mm. moving:
-    velocity [m/s] and acceleration [m/s^2] at the start, (2,) each; at rest if not given.
+    Via points, at most four, are set beside the obstacle that the path comes nearest to, until the path is free by 1 mm. moving
+    (2, 2): velocity [m/s] and acceleration [m/s^2] at the start; at rest if not given.
     """
     points, s = [start, goal], np.linspace(0.0, 1.0, 201)
     for _ in range(5):
@@ -77,28 +59,20 @@ def plan_path(
         if moving is None:  # else it has begun: the first half of the profile is past
             shares = np.interp(shares, 10 * s**3 - 15 * s**4 + 6 * s**5, s)
         times = shares * max(lengths[-1] / 0.25, 0.4)
-        path = interpolate_minimum_jerk(np.array(points), times, moving or (np.zeros(2), np.zeros(2)))
-        offsets, distances = measure_offsets(path.position, seen)
+        path = interpolate_minimum_jerk(np.array(points), times, np.zeros((2, 2)) if moving is None else moving)
+        offsets, distances = measure_offsets(path[:, 0], seen)
         heights = distances - seen.radius
         if not len(seen) or heights.min() >= 0.001:
             return path
         step, row = np.unravel_index(heights.argmin(), heights.shape)
-        points = _add_via_point(rng, points, path.position[step], offsets[step, row], float(seen.extent[row]), seen.centre[row])
+        # one more point beside the obstacle, on the shorter side with a probability of 3/4
+        along, extent = goal - start, float(seen.extent[row])
+        left = np.array([-along[1], along[0]]) / np.hypot(*along)
+        side = (1.0 if offsets[step, row] @ left > 0.0 else -1.0) * (-1.0 if rng.random() > 0.75 else 1.0)
+        via = seen.centre[row] + side * (extent + rng.uniform(*CLEARANCE_M)) * left
+        others = [each for each in points[1:-1] if np.hypot(*(each - path[step, 0])) > extent + CLEARANCE_M[1]]
+        points = [start, *sorted([*others, via], key=lambda each: float(each @ along)), goal]
     return None
-
-
-def _add_via_point(
-    rng: np.random.Generator, points: list[Array], near: Array, offset: Array, extent: float, centre: Array
-) -> list[Array]:
-    """Return the points with one more beside an obstacle, on the shorter side with a probability of 3/4."""
-    along = points[-1] - points[0]
-    left = np.array([-along[1], along[0]]) / np.hypot(*along)
-    side = 1.0 if offset @ left > 0.0 else -1.0
-    if rng.random() > 0.75:
-        side = -side
-    via = centre + side * (extent + rng.uniform(*CLEARANCE_M)) * left
-    others = [each for each in points[1:-1] if np.hypot(*(each - near)) > extent + CLEARANCE_M[1]]
-    return [points[0], *sorted([*others, via], key=lambda each: float(each @ along)), points[-1]]
 
 
 @dataclass(frozen=True)
@@ -133,7 +107,8 @@ class Task(Record):
     """One movement: the scene, what the assistance is told of it, and what the operator intends.
 
     obstacles: as they are; goals (g, 2): announced ones [m]; goal (2,): the one of the operator [m]; goal_row: its row, -1 if it
-    is not announced. hand_radius: of the hand [m].
+    is not announced; path (n, 3, 2): intended positions, velocities and accelerations at steps of `DT`, in SI units; hand_radius
+    [m].
     """
 
     arm: Arm
@@ -141,7 +116,7 @@ class Task(Record):
     goals: Array
     goal: Array
     goal_row: int
-    path: IntendedPath
+    path: Array
     hand_radius: float = 0.0
 
 
@@ -163,9 +138,9 @@ def draw_task(operator: str, rng: np.random.Generator) -> Task:
         path = plan_path(rng, np.zeros(2), goals[row], seen)
         if path is not None and operator == CHANGES_WAY:
             row = int((row + rng.integers(1, len(goals))) % len(goals))
-            step = round(rng.uniform(0.3, 0.5) * len(path.position))
-            rest = plan_path(rng, path.position[step], goals[row], seen, (path.velocity[step], path.acceleration[step]))
-            path = None if rest is None else path.join(step, rest)
+            step = round(rng.uniform(0.3, 0.5) * len(path))
+            rest = plan_path(rng, path[step, 0], goals[row], seen, path[step, 1:])
+            path = None if rest is None else np.concatenate([path[:step], rest])
         if path is None:
             continue
         if operator == UNANNOUNCED_GOAL:
@@ -184,30 +159,26 @@ class SimulatedArm:
     of the hand.
     """
 
-    def __init__(self, arm: Arm, path: IntendedPath, noise: Array) -> None:
-        self._arm, self._path, self._noise = arm, path, noise
-        self.position, self.velocity, self.force = path.position[0].copy(), path.velocity[0].copy(), np.zeros(2)
-        self._errors: list[tuple[Array, Array]] = []
+    def __init__(self, arm: Arm, path: Array) -> None:
+        self._arm, self._path = arm, path
+        (self.position, self.velocity), self.force = path[0, :2], np.zeros(2)
+        self._errors: list[Array] = []
         self._coloured = np.zeros(2)
-        self._step = 0
 
-    def move(self, assistance: Array) -> None:
-        """Move for one time step with a force (2,) [N] of the assistance."""
-        arm, path = self._arm, self._path
-        row, last = self._step, len(path.position) - 1
-        wanted = min(row, last)
-        velocity, acceleration = (path.velocity[wanted], path.acceleration[wanted]) if row <= last else (np.zeros(2), np.zeros(2))
-        self._errors.append((path.position[wanted] - self.position, velocity - self.velocity))
-        late = row - round(arm.delay_s / DT)
-        error, slip = self._errors[late] if late >= 0 else (np.zeros(2), np.zeros(2))
-        self.force = arm.mass * acceleration + arm.viscosity * velocity + arm.stiffness * error + arm.damping * slip
+    def move(self, assistance: Array, noise: Array) -> None:
+        """Move for one time step with a force (2,) [N] of the assistance; noise (2,): standard normal numbers."""
+        arm, path, step = self._arm, self._path, len(self._errors)
+        wanted = path[step] if step < len(path) else np.array([path[-1, 0], np.zeros(2), np.zeros(2)])
+        self._errors.append(wanted[:2] - [self.position, self.velocity])
+        late = step - round(arm.delay_s / DT)
+        error, slip = self._errors[late] if late >= 0 else np.zeros((2, 2))
+        self.force = arm.mass * wanted[2] + arm.viscosity * wanted[1] + arm.stiffness * error + arm.damping * slip
         decay = np.exp(-DT / arm.noise_s)
+        self._coloured = decay * self._coloured + np.sqrt(1.0 - decay**2) * noise
         stddev = arm.noise * float(np.hypot(*self.force))
-        self._coloured = decay * self._coloured + np.sqrt(1.0 - decay**2) * self._noise[row]
         total = self.force + stddev * self._coloured + assistance - arm.viscosity * self.velocity
         self.velocity = self.velocity + DT / arm.mass * total
         self.position = self.position + DT * self.velocity
-        self._step += 1
 
 
 def read_tasks(recordings: Iterable[Recording], config: Config) -> list[Task]:
@@ -223,24 +194,13 @@ def read_task(recording: Recording, config: Config) -> Task | None:
 
     None for a recording that cannot be read, that has few samples or no goals, or whose hand touches an obstacle by itself.
     """
-    intake, samples = Intake(Pipeline(config)), []
     try:
-        for item in recording.items():
-            status = intake.take(item.role, item.message)
-            if item.role == HAND and status is not None and status.is_taken and intake.sample is not None:
-                samples.append(intake.sample)
+        hand = read_hand(recording, config)
     except RecordingError:
         return None
-    scene = intake.pipeline.scene
-    stamps, rows = np.unique([each.stamp_ns for each in samples], return_index=True)
-    if len(rows) < 8 or scene.goals is None or not len(scene.goals):
+    spline = make_interp_spline(hand.times, hand.path.positions, k=5)
+    path, radius = sample_path(spline, np.arange(0.0, hand.times[-1], DT)), config.scene.hand_radius
+    if (measure_offsets(path[:, 0], hand.obstacles)[1] - hand.obstacles.radius).min(initial=np.inf) <= radius:
         return None
-    times = (stamps - stamps[0]) / NANOSECONDS
-    spline = make_interp_spline(times, np.array([samples[row].position for row in rows]), k=5)
-    path = IntendedPath.sample(spline, np.arange(0.0, times[-1], DT))
-    obstacles, radius = scene.obstacles(int(stamps[-1])), config.scene.hand_radius
-    if len(obstacles) and (measure_offsets(path.position, obstacles)[1] - obstacles.radius).min() <= radius:
-        return None
-    goal = path.position[-1]
-    row = int(np.hypot(*(scene.goals - goal).T).argmin())
-    return Task(ARMS[HUMAN_PATHS], obstacles, scene.goals, goal, row, path, radius)
+    goal, goals = path[-1, 0], hand.path.goals
+    return Task(ARMS[HUMAN_PATHS], hand.obstacles, goals, goal, int(np.hypot(*(goals - goal).T).argmin()), path, radius)

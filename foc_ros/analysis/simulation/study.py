@@ -9,14 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from foc_ros.analysis.intervals import compute_mean_interval
-from foc_ros.analysis.parallel import collect_all
+from foc_ros.analysis.evaluation.scores import compute_mean_interval, find_mean
 from foc_ros.analysis.simulation import FOC, HUMAN_PATHS, NONE, OPERATORS
 from foc_ros.analysis.simulation.operators import DT, SimulatedArm, Task, draw_task
 from foc_ros.core.classes.sides import find_path_sides
@@ -93,8 +90,8 @@ class FocAssistance(Assistance):
 
     def _is_wrong_way(self, prediction: Prediction, step: int) -> bool:
         """Return whether the likeliest candidate leads to another goal, or passes an obstacle on another side, than intended."""
-        path, goal = self.task.path.position, self.task.goal_row
-        rest = np.ascontiguousarray(path[min(step, len(path) - 2) :])
+        path, goal = self.task.path, self.task.goal_row
+        rest = np.ascontiguousarray(path[min(step, len(path) - 2) :, 0])
         for each in prediction.candidates_with_likelihood:
             if each.label == prediction.most_likely:
                 intended = find_path_sides(rest, self.task.obstacles)
@@ -120,36 +117,18 @@ class Trial(Record):
     effort: Array
     is_wrong: Array
 
-    @property
-    def duration_s(self) -> float:
-        """Time until the goal was reached, or until the end of the trial [s]."""
-        return DT * len(self.position)
-
     def measure_clearances(self, task: Task) -> Array:
         """Return the distance of the hand from the nearest obstacle, (n,) [m]; infinite without obstacles."""
-        obstacles = task.obstacles.grow(task.hand_radius)
-        if not len(obstacles):
-            return np.full(len(self.position), np.inf)
-        clearances: Array = (measure_offsets(self.position, obstacles)[1] - obstacles.radius).min(axis=1)
-        return clearances
-
-    def find_collisions(self, task: Task) -> NDArray[np.bool_]:
-        """Return whether the hand is within an obstacle, (n,)."""
-        return self.measure_clearances(task) < 0.0
-
-
-def count_steps(task: Task) -> int:
-    """Return the largest number of time steps of a trial, which ends 1.5 s after the intended movement."""
-    return len(task.path.position) + round(1.5 / DT)
+        offsets = measure_offsets(self.position, task.obstacles)[1] - task.obstacles.radius - task.hand_radius
+        return np.asarray(offsets.min(axis=1, initial=np.inf))
 
 
 def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: Array) -> Trial:
     """Run a trial. noise (n, 2, 2): standard normal numbers for arm and measurement, the same ones for each rule of a pair."""
-    arm, rule = SimulatedArm(task.arm, task.path, noise[:, 0]), assistance(task, config)
-    rows = []
-    for step in range(count_steps(task)):
-        force = rule.update(step, arm.position + 3e-4 * noise[step, 1])  # the standard deviation of a tracker [m]
-        arm.move(force)
+    arm, rule, rows = SimulatedArm(task.arm, task.path), assistance(task, config), []
+    for step, (shaken, measured) in enumerate(noise):
+        force = rule.update(step, arm.position + 3e-4 * measured)  # the standard deviation of a tracker [m]
+        arm.move(force, shaken)
         rows.append((*arm.position, *force, *arm.force, float(rule.is_wrong)))
         if np.hypot(*(arm.position - task.goal)) < 0.01 and np.hypot(*arm.velocity) < 0.05:  # [m], [m/s]
             break
@@ -163,39 +142,31 @@ def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
     The opposing impulse is the integral of the force of the assistance against the direction in which the operator intends to
     move, and the opposing share its mean as a share of the largest force.
     """
-    clearance = float(trial.measure_clearances(task).min())
-    velocity = np.zeros_like(trial.position)
-    steps = min(len(velocity), len(task.path.velocity))
-    velocity[:steps] = task.path.velocity[:steps]
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    along = (trial.assistance * velocity).sum(axis=1) / np.where(speed > 0.0, speed, 1.0)
+    clearance, duration_s = float(trial.measure_clearances(task).min()), DT * len(trial.position)
+    velocity = task.path[: len(trial.position), 1]
+    speed = np.hypot(*velocity.T)
+    along = (trial.assistance[: len(velocity)] * velocity).sum(axis=1) / np.where(speed > 0.0, speed, 1.0)
     opposing = DT * float(np.maximum(-along, 0.0).sum())
     return {
         'collision_rate': float(clearance < 0.0),
-        'completion_s': trial.duration_s,
+        'completion_s': duration_s,
         'min_clearance_m': clearance,
         'path_m': float(np.hypot(*np.diff(trial.position, axis=0).T).sum()),
         'effort': DT * float((trial.effort**2).sum()),
         'opposing_impulse': opposing,
-        'opposing_share': opposing / trial.duration_s / f_max,
+        'opposing_share': opposing / duration_s / f_max,
     }
 
 
 @dataclass(frozen=True)
 class Pair:
-    """One seed of one operator: all rules meet the same scene, intention and noise. tasks: for `human_paths`."""
+    """One seed of one operator: all rules meet the same scene, intention and noise. task: for `human_paths`."""
 
     operator: str
     seed: int
     number: int
     assistance: tuple[str, ...]
-    tasks: Sequence[Task] = ()
-
-    def draw(self) -> tuple[Task, Array]:
-        """Return the task, and the standard normal numbers of arm and measurement."""
-        rng = np.random.default_rng([self.seed, OPERATORS.index(self.operator), self.number])
-        task = self.tasks[0] if self.operator == HUMAN_PATHS else draw_task(self.operator, rng)
-        return task, rng.normal(size=(count_steps(task), 2, 2))
+    task: Task | None = None
 
 
 @dataclass(frozen=True)
@@ -208,19 +179,13 @@ class PairResult:
     trials: Mapping[str, Trial]
 
 
-def simulate(pairs: Sequence[Pair], config: Config, rules: Rules = RULES) -> list[PairResult]:
-    """Run all pairs with a progress bar; raise RecordingError where one fails. The results do not depend on the workers."""
-    items = [(f'{pair.operator} {pair.number}', pair) for pair in pairs]
-    return collect_all(partial(run_pair, config=config, rules=rules), items, 'simulate')
-
-
 def make_pairs(
     operators: Sequence[str], assistance: Sequence[str], trials: int, seed: int, tasks: Sequence[Task] = ()
-) -> list[Pair]:
-    """Return the pairs of a study, all with the rule `none`; tasks: of `human_paths`, used one after the other."""
+) -> list[tuple[str, Pair]]:
+    """Return the pairs of a study with their names, all with the rule `none`; tasks: of `human_paths`, one after the other."""
     rules = tuple(dict.fromkeys([NONE, *assistance]))
     return [
-        Pair(name, seed, number, rules, [tasks[number % len(tasks)]] if name == HUMAN_PATHS else ())
+        (f'{name} {number}', Pair(name, seed, number, rules, tasks[number % len(tasks)] if name == HUMAN_PATHS else None))
         for name in operators
         for number in range(trials)
     ]
@@ -228,7 +193,9 @@ def make_pairs(
 
 def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
     """Run all rules of a pair."""
-    task, noise = pair.draw()
+    rng = np.random.default_rng([pair.seed, OPERATORS.index(pair.operator), pair.number])
+    task = pair.task or draw_task(pair.operator, rng)
+    noise = rng.normal(size=(len(task.path) + round(1.5 / DT), 2, 2))  # a trial ends 1.5 s after the intended movement
     trials = {rule: run_trial(task, rules[rule], config, noise) for rule in pair.assistance}
     measures = {rule: measure_trial(trial, task, config.guidance.f_max) for rule, trial in trials.items()}
     for rule, row in measures.items():
@@ -252,33 +219,29 @@ def summarise(results: Sequence[PairResult], seed: int) -> list[dict[str, Any]]:
             cell: dict[str, Any] = {'operator': operator, 'assistance': rule, 'trials': len(rows)}
             for name in COLUMNS:
                 values, alone = (np.array([row[key][name] for row in rows]) for key in (rule, NONE))
-                cell[name], cell[f'{name}_interval'] = estimate_mean(values, seed)
-                if name not in HARMS:
-                    cell[f'{name}_difference'], cell[f'{name}_difference_interval'] = estimate_mean(values - alone, seed)
+                measures = {name: values} if name in HARMS else {name: values, f'{name}_difference': values - alone}
+                for measure, each in measures.items():
+                    finite = each[np.isfinite(each)]
+                    interval = compute_mean_interval(finite, np.arange(len(finite)), seed, 2000) if len(finite) else None
+                    cell |= {measure: find_mean(finite), f'{measure}_interval': interval}
             cells.append(cell)
     return cells
 
 
-def estimate_mean(values: Array, seed: int) -> tuple[float | None, list[float] | None]:
-    """Return the mean of the finite values, and its bootstrap interval of 95 %; None where there is none."""
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return None, None
-    return float(finite.mean()), compute_mean_interval(finite, np.arange(len(finite)), seed, resamples=2000)
-
-
 def make_tables(cells: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
     """Yield title, columns and rows for each operator, from the cells of `simulate --json`."""
+
+    def show(cell: Mapping[str, Any], name: str, factor: float, digits: int) -> str:
+        if cell[name] is None:
+            return '-'
+        value, low, high = (f'{factor * each:.{digits}f}' for each in (cell[name], *cell[f'{name}_interval']))
+        return f'{value} ({low} to {high})'
+
     for operator in dict.fromkeys(cell['operator'] for cell in cells):
         rows = [cell for cell in cells if cell['operator'] == operator]
         title = f'{operator}: mean of {rows[0]["trials"]} paired trials, and bootstrap interval of 95 %'
-        lines = [(cell['assistance'], *(_format(cell, name) for name in COLUMNS)) for cell in rows]
+        styles = COLUMNS.items()
+        lines = [
+            (cell['assistance'], *(show(cell, name, factor, digits) for name, (_, factor, digits) in styles)) for cell in rows
+        ]
         yield title, ('', *(heading for heading, _, _ in COLUMNS.values())), lines
-
-
-def _format(cell: Mapping[str, Any], name: str) -> str:
-    _, factor, digits = COLUMNS[name]
-    if cell[name] is None:
-        return '-'
-    low, high = cell[f'{name}_interval']
-    return f'{factor * cell[name]:.{digits}f} ({factor * low:.{digits}f} to {factor * high:.{digits}f})'
