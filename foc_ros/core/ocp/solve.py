@@ -176,7 +176,7 @@ def _complete_message(problem: Problem, status: Status, message: str, violation:
         message += f', by up to {violation:.3g} m'
     left = [name for name, is_inside in zip(problem.obstacles.ids, problem.inside_margin.tolist(), strict=True) if is_inside]
     if left:
-        message += f'; the hand is inside the margin of {", ".join(left)} now: eta holds from {problem.recovery_s:g} s on'
+        message += f'; the hand is inside the margin of {", ".join(left)} now: eta holds there from {problem.recovery_s:g} s on'
     return message
 
 
