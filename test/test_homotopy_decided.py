@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Candidates for hands and goals in margins, closed gaps, empty scenes and crowds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from homotopy_scenes import CLEARANCE, find
@@ -102,6 +104,14 @@ def test_a_moving_obstacle_counts_where_it_is_at_each_step():
     # half way, when the hand passes, it has come no nearer than 0.1 m to the left
     assert find_path_sides(path, ABEAM, crossing) == {'post': RIGHT}
     assert find_path_sides(path, ABEAM, crossing - [0.0, 0.2]) == {'post': LEFT}
+
+
+def test_a_class_has_the_sides_on_which_the_hand_passes_moving_obstacles_when_it_is_there():
+    """The post is on the left now, and will have crossed the straight line when the hand comes: both guesses are of one class."""
+    crossing = replace(make_obstacles([[0.5, 0.12]], 0.1, ids=('post',)), velocity=np.array([[0.0, -0.6]]))
+    for obstacles, sides in ((crossing, [LEFT]), (ABEAM, [LEFT, RIGHT])):
+        found = search(np.zeros(6), np.array([[1.0, 0.0]]), obstacles, HomotopyConfig(), [1.0], 50).candidates
+        assert sorted(dict(each.sides)['post'] for each in found) == sorted(sides)
 
 
 @settings(max_examples=80, deadline=None, derandomize=True)

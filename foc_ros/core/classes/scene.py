@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Way
 from foc_ros.core.types import Array, as_readonly
 
@@ -23,6 +25,7 @@ from .guess import compute_path_lengths, timed
 from .names import find_names, name_course, take_near
 from .outlines import outline_obstacles
 from .paths import PathQuery, find_shortest_paths
+from .sides import find_sides
 
 STATES, STATES_PER_CANDIDATE = 1000, 300
 """Number of states that the search for one goal may look at; a few dozen are enough for four candidates."""
@@ -118,13 +121,28 @@ class SearchScene:
         return tuple([tuple(sorted([self._near.ids[row] for row in each])) for each in rows])
 
     def make_candidates(self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int) -> tuple[Candidate, ...]:
-        """Return the candidates of classes, with their shortest paths as guesses for the time to go to each goal [s]."""
-        made = []
+        """Return the candidates of classes, with their shortest paths as guesses for the time to go to each goal [s].
+
+        Where obstacles move, a class is that in which the hand passes them when it is there: its guess decides, and of several
+        classes that become the same one the first is returned.
+        """
+        made: dict[str, Candidate] = {}
         for each in classes:
             guess = as_readonly(timed(each.points, self._velocity, duration_s[each.goal], steps))
             length = float(compute_path_lengths(each.points)[-1])
-            made.append(each.known or Candidate(each.label, each.goal, each.sides, guess, length))
-        return tuple(made)
+            candidate = each.known or Candidate(each.label, each.goal, each.sides, guess, length)
+            if each.known is None and self._near.velocity.any():
+                candidate = self._name_when_passed(candidate, duration_s[each.goal] / steps)
+            made.setdefault(candidate.label, candidate)
+        return tuple(made.values())
+
+    def _name_when_passed(self, candidate: Candidate, dt: float) -> Candidate:
+        """Return a candidate with the sides on which its guess, at steps of dt [s], passes the moving obstacles."""
+        near, guess = self._near, candidate.guess
+        centres = centre_trajectories(near.centre, near.velocity * dt, len(guess) - 1)
+        passed = find_sides(guess[None], near, centres)[0]
+        sides = tuple([(name, passed.get(name, side)) for name, side in candidate.sides])
+        return replace(candidate, label=f'goal{candidate.goal}:{name_course(sides)}', sides=sides)
 
     def _connect_hand(self, rows: Rows) -> tuple[Graph, Lines]:
         """Return the graph of the obstacles that block the paths to a goal, and the lines from the hand to its nodes."""
