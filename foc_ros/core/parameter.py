@@ -10,8 +10,6 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Any, TypeVar
 
-import numpy as np
-
 from .errors import ParameterError, join_errors
 from .registry import Registry
 
@@ -88,8 +86,8 @@ def _list_fields(group: type) -> tuple[tuple[str, Any, Bound], ...]:
 def check_value(parameter: Parameter, value: object) -> float | int | str | bool:
     """Return a value in the type of its parameter; raise ParameterError for a wrong type or a value out of bounds."""
     name, bound = parameter.name, parameter.bound
-    if isinstance(value, np.generic):
-        value = value.item()
+    if hasattr(value, 'item') and getattr(value, 'shape', None) == ():
+        value = value.item()  # a number of NumPy, which `--help` does without
     if isinstance(parameter.default, bool):
         if not isinstance(value, bool):
             raise ParameterError(name, 'true or false', repr(value))
