@@ -60,7 +60,8 @@ def test_end_to_end(tmp_path, capsys):
     found = counted(tmp_path / 'out' / 'bag')
     assert (found['/hand_pose'], found['/obstacles'], found['/goals']) == (201, 11, 3)
     assert found['/foc/prediction'] > 0
-    assert {found[topic] for topic in OUTPUTS} == {found['/foc/prediction']}
+    assert {found[topic] for topic in OUTPUTS if topic != '/foc/markers'} == {found['/foc/prediction']}
+    assert 0 < found['/foc/markers'] <= found['/foc/prediction']
     sent, made = (read_stamps(tmp_path / 'out' / 'bag', topic) for topic in ('/hand_pose', '/foc/prediction'))
     assert set(made) <= set(sent) and made == sorted(set(made)), 'the live predictions are those of the recording'
     numbers = json.loads((tmp_path / 'out' / 'report' / 'predictions.json').read_text(encoding='utf-8'))

@@ -30,7 +30,7 @@ FIVE_STRATEGIES = ['lv', 'hc', 'optimal', 'fixed', 'algorithm1']
 WALL = make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03], ids=('left', 'right'))
 
 
-@pytest.mark.parametrize('strategy', FIVE_STRATEGIES)
+@pytest.mark.parametrize('strategy', ['optimal', 'lv', 'hc'])  # the others look at the steps alone
 def test_an_infeasible_geometry_says_how_much_it_lacks_and_where(strategy):
     solution = solved(reach(WALL), bowed((0, 0), (0.3, 0), 50, 0.0), strategy)
     assert solution.status is Status.INFEASIBLE
