@@ -26,7 +26,6 @@ from foc_ros.core.safety_preference import SafetyPreference
 from foc_ros.core.solution import Status
 
 BOWED = bowed((0, 0), (0.3, 0), 50, 0.08)
-FIVE_STRATEGIES = ['lv', 'hc', 'optimal', 'fixed', 'algorithm1']
 WALL = make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03], ids=('left', 'right'))
 
 
