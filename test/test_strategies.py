@@ -106,7 +106,7 @@ def test_a_hand_inside_a_margin_gets_out_of_it_in_the_recovery_time(strategy, st
     assert np.hypot(*solution.path[15:].T).min() > 0.02
 
 
-@EVERY
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])
 @pytest.mark.parametrize('duration_s', [0.1, 0.15, 0.3])
 def test_the_recovery_time_is_for_obstacles_only_that_the_hand_is_too_near_to(strategy, duration_s):
     circle = foc_ros.Circle((0.1, 0.0), 0.02, 0.002)
