@@ -26,7 +26,7 @@ QUINTIC = np.array(
         [-6.0, -3.0, -0.5, 6.0, -3.0, 0.5],
     ]
 )
-"""The same in those of `hermite_quintic`."""
+"""Coefficients of each power of the share (rows) in the weights of `hermite_quintic`."""
 
 
 def hermite(share: Array) -> Array:

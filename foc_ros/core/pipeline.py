@@ -159,11 +159,10 @@ class Pipeline:
             return SampleStatus.WRONG_FRAME
         present = self.scene.sources.get(source)
         newest_ns = None if present is None else present.stamp_ns
-        if stamp_ns is not None and newest_ns is not None:
-            behind_ns = newest_ns - stamp_ns
-            if 0 < behind_ns <= self.config.estimator.gap_s * NANOSECONDS:
-                self._rejections.reject_stamp('obstacles_late', source, stamp_ns, newest_ns)
-                return SampleStatus.LATE
+        longest_ns = self.config.estimator.gap_s * NANOSECONDS
+        if stamp_ns is not None and newest_ns is not None and 0 < newest_ns - stamp_ns <= longest_ns:
+            self._rejections.reject_stamp('obstacles_late', source, stamp_ns, newest_ns)
+            return SampleStatus.LATE
         self.scene = self.scene.with_source(source, ObstacleSource(obstacles, stamp_ns, frame_id))
         return SampleStatus.ACCEPTED
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -76,6 +76,11 @@ class Goal(Record):
 def name_goal(row: int) -> str:
     """Return the name of the goal of a row that was given none, as labels begin with it."""
     return f'goal{row}'
+
+
+def label_class(goal: int, sides: Sequence[tuple[str, int]]) -> str:
+    """Return the label of a class to the goal of a row, such as `goal0:+l1-l2`; sides: LEFT or RIGHT by id."""
+    return f'{name_goal(goal)}:' + ''.join([('+' if side == LEFT else '-') + identity for identity, side in sides])
 
 
 def describe_class(sides: Iterable[tuple[str, int]], goal: str = '') -> str:

@@ -32,7 +32,7 @@ import numpy as np
 from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
-from .solution import Candidate, Solution, agrees, name_goal
+from .solution import Candidate, Solution, agrees, label_class
 from .types import NANOSECONDS, Array, Record, Rest, as_readonly
 
 HOLD_S = 0.2
@@ -69,7 +69,7 @@ class Track(Record):
         """Return the track of the same class, whose goal has a row now."""
         if row == self.candidate.goal:
             return self
-        label = f'{name_goal(row)}:{self.candidate.label.partition(":")[2]}'
+        label = label_class(row, self.candidate.sides)
         return replace(self, candidate=replace(self.candidate, goal=row, label=label))
 
     def is_solved_within(self, stamp_ns: int, seconds: float) -> bool:

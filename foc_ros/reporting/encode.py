@@ -209,7 +209,5 @@ def _quantise(values: Array, unit: float) -> list[int]:
 
 def _quantise_differences(values: Array, unit: float) -> list[int]:
     """Return the first value and then the differences, in whole units."""
-    whole = np.rint(values / unit).astype(np.int64)
-    whole[1:] -= whole[:-1].copy()
-    differences: list[int] = whole.tolist()
+    differences: list[int] = np.diff(np.rint(values / unit).astype(np.int64), prepend=0).tolist()
     return differences

@@ -49,7 +49,7 @@ from .worker import Computation, Worker
 REST_S, LONGEST_REST_S = 0.004, 0.02
 """Shortest and longest time for which the poses of a fast hand gather before they are taken together [s]."""
 DRAWN_S = 0.035
-"""Least time between the stamps of two arrays of markers [s]: for the eye, 25 images a second are enough."""
+"""Least time between the stamps of two arrays of markers [s]: of 50 predictions a second, every second one is drawn."""
 COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
 """Inputs of which each message replaces the one before: of several in the queue, the newest that is accepted is used."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE

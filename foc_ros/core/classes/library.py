@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
-from foc_ros.core.solution import LEFT, RIGHT, Candidate
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, label_class
 from foc_ros.core.types import Array, HandState, Record
 
 from .guess import compute_path_lengths, timed
-from .names import name_course
 from .search import Search
 from .sides import find_path_sides
 
@@ -159,7 +158,7 @@ def recall_demonstrations(
 def _name(goal: int, names: Sequence[str], sides: Mapping[str, int]) -> tuple[str, tuple[tuple[str, int], ...]]:
     """Return the label of a class, and the sides on which it passes the obstacles that are named in it."""
     named = tuple([(name, sides[name]) for name in names])
-    return f'goal{goal}:{name_course(named)}', named
+    return label_class(goal, named), named
 
 
 def _deform(path: Array, hand: Array, goal: Array) -> Array | None:

@@ -15,7 +15,7 @@ import numpy as np
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import cull_obstacles
 from foc_ros.core.obstacles.geometry import find_holders, measure_offsets
-from foc_ros.core.solution import LEFT, Candidate
+from foc_ros.core.solution import Candidate
 from foc_ros.core.types import Array
 
 from .graph import Rows
@@ -42,11 +42,6 @@ class Names:
     holds_goal: Flags
     blocks: Flags
     is_named: Flags
-
-
-def name_course(sides: Sequence[tuple[str, int]]) -> str:
-    """Return the part of a label that says on which side each obstacle is passed."""
-    return ''.join([('+' if side == LEFT else '-') + identity for identity, side in sides])
 
 
 def take_near(obstacles: Obstacles, hand: Array, goals: Array) -> Obstacles:

@@ -17,12 +17,12 @@ from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.risk import centre_trajectories
-from foc_ros.core.solution import LEFT, RIGHT, Candidate, Way
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Way, label_class
 from foc_ros.core.types import Array, as_readonly
 
 from .graph import Graph, Lines, Rows, build_graph
 from .guess import compute_path_lengths, timed
-from .names import find_names, name_course, take_near
+from .names import find_names, take_near
 from .outlines import outline_obstacles
 from .paths import PathQuery, find_shortest_paths
 from .sides import find_sides
@@ -112,7 +112,7 @@ class SearchScene:
             classes = []
             for key, points, swept in tied:
                 sides = tuple([(ids[row], LEFT if swept[row] < 0.0 else RIGHT) for row in order])
-                classes.append(PathClass(round(key, 9), f'goal{goal}:{name_course(sides)}', goal, sides, points))
+                classes.append(PathClass(round(key, 9), label_class(goal, sides), goal, sides, points))
             yield from [each for each in sorted(classes) if not self._is_left_out(each.points)]
 
     def list_named(self) -> tuple[tuple[str, ...], ...]:
@@ -142,7 +142,7 @@ class SearchScene:
         centres = centre_trajectories(near.centre, near.velocity * dt, len(guess) - 1)
         passed = find_sides(guess[None], near, centres)[0]
         sides = tuple([(name, passed.get(name, side)) for name, side in candidate.sides])
-        return replace(candidate, label=f'goal{candidate.goal}:{name_course(sides)}', sides=sides)
+        return replace(candidate, label=label_class(candidate.goal, sides), sides=sides)
 
     def _connect_hand(self, rows: Rows) -> tuple[Graph, Lines]:
         """Return the graph of the obstacles that block the paths to a goal, and the lines from the hand to its nodes."""

@@ -66,9 +66,11 @@ class Point:
     def is_kept_at_steps(self) -> NDArray[np.bool_]:
         """Return whether the mean is held off at the steps alone, and keeps its distances there, (b,)."""
         margins, rows = self.solver.margins, np.arange(len(self.k))
+        if margins.between:
+            return np.zeros(len(rows), dtype=np.bool_)
         grid = margins.measure_grid(rows, margins.move(rows, self.now.control), np.zeros(len(rows)))
         is_kept: NDArray[np.bool_] = grid.value.min(axis=(1, 2), initial=np.inf) >= -TOUCHING * margins.extent
-        return is_kept & (not margins.between)
+        return is_kept
 
 
 def solve_at(

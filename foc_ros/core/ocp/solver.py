@@ -41,8 +41,9 @@ LAST_GAIN = 1e-4
 """Gain, as a logarithm of cost, that may remain when a problem counts as solved. A step that fails although its QP promised less
 fails by rounding."""
 CLOSE, CLOSE_FOR_NOW = 3e-5, 1e-3
-"""Relative excess over the wanted safety factor that is aimed at, so that a step that misses it by rounding still meets it; and
-where a later prediction goes on, so that one that misses it by what a QP cannot know does: each repetition would cost as much."""
+"""Relative excess over the wanted safety factor that is aimed at. With the first number, a step that misses its aim by rounding
+meets the wanted factor. The second one holds where a later prediction goes on: a step may then miss by the error of its QP, and
+is not repeated for that."""
 UNLIKELY, SMALL_PART = 6.0, 0.04
 """A class can wait for the next prediction if it is less likely than the best one to its goal by more than the first number, as a
 logarithm, and if its QP promises less than the second one as a part of that."""
