@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Candidates for hands and goals in margins, closed gaps, empty scenes and crowds."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from homotopy_scenes import CLEARANCE, find
@@ -14,6 +12,7 @@ from foc_ros.core.classes import Turn, find_path_sides, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.solution import LEFT, RIGHT
 
 NOTHING = make_obstacles()
@@ -106,12 +105,15 @@ def test_a_moving_obstacle_counts_where_it_is_at_each_step():
     assert find_path_sides(path, ABEAM, crossing - [0.0, 0.2]) == {'post': LEFT}
 
 
-def test_a_class_has_the_sides_on_which_the_hand_passes_moving_obstacles_when_it_is_there():
-    """The post is on the left now, and will have crossed the straight line when the hand comes: both guesses are of one class."""
-    crossing = replace(make_obstacles([[0.5, 0.12]], 0.1, ids=('post',)), velocity=np.array([[0.0, -0.6]]))
-    for obstacles, sides in ((crossing, [LEFT]), (ABEAM, [LEFT, RIGHT])):
-        found = search(np.zeros(6), np.array([[1.0, 0.0]]), obstacles, HomotopyConfig(), [1.0], 50).candidates
-        assert sorted(dict(each.sides)['post'] for each in found) == sorted(sides)
+@pytest.mark.parametrize('end', [-0.15, -0.05, 0.05, 0.15])
+def test_a_moving_obstacle_has_two_classes_which_pass_it_on_both_sides_when_the_hand_is_there(end):
+    """The post crosses the straight line from the left, and is at `end` when the hand has gone half of the way."""
+    post = make_obstacles([[0.5, 0.4]], 0.1, ids=('post',), velocity=[[0.0, (end - 0.4) / 0.5]])
+    found = search(np.zeros(6), np.array([[1.0, 0.0]]), post, HomotopyConfig(), [1.0], 50).candidates
+    assert sorted(dict(each.sides)['post'] for each in found) == [RIGHT, LEFT]
+    for each in found:
+        centres = centre_trajectories(post.centre, post.velocity / 50, 50)
+        assert find_path_sides(each.guess, post, centres) == dict(each.sides)
 
 
 @settings(max_examples=80, deadline=None, derandomize=True)

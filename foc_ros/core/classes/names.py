@@ -14,7 +14,7 @@ import numpy as np
 
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import cull_obstacles
-from foc_ros.core.obstacles.geometry import find_holders, measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import Candidate
 from foc_ros.core.types import Array
 
@@ -53,9 +53,9 @@ def find_names(
     hand: Array,
     goals: Array,
     obstacles: Obstacles,
+    blocks: Flags,
     clearance: float,
     previous: Sequence[Candidate],
-    objects: Sequence[str | None] = (),
 ) -> Names:
     """Find out which obstacles the names contain.
 
@@ -63,13 +63,12 @@ def find_names(
     line or a path round its far side is short enough. As no other obstacle has an influence, a name stays the same if other
     obstacles appear, vanish or move.
 
-    hand (2,), goals (g, 2) [m]; clearance: distance that the hand needs from an obstacle [m]; previous: the candidates of the
-    previous prediction; objects: the id of the obstacle that each goal is.
+    hand (2,), goals (g, 2) [m]; blocks (g, n): see `Names`; clearance: distance that the hand needs from an obstacle [m];
+    previous: the candidates of the previous prediction.
     """
     sides = _tabulate_sides(obstacles, previous)
     radius = _keep_gaps_open(obstacles, np.maximum(obstacles.radius + clearance, MIN_SIZE), clearance, sides)
     _, distance = measure_offsets(np.vstack([hand, goals]), obstacles)
-    blocks = ~find_holders(goals, obstacles, objects)
     slack = np.zeros((len(goals), len(obstacles)))
     goal_of = np.array([candidate.goal for candidate in previous], dtype=np.intp)
     for goal in {candidate.goal for candidate in previous if candidate.goal < len(goals)}:

@@ -15,7 +15,7 @@ import numpy as np
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.geometry import find_holders, measure_offsets
 from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Way, label_class
 from foc_ros.core.types import Array, as_readonly
@@ -61,6 +61,8 @@ class PathClass(NamedTuple):
 class SearchScene:
     """A hand with its velocity, goals and obstacles; arguments as in `search.search`.
 
+    A moving obstacle stands where it is when the hand is there: where a hand that moves straight to a goal comes nearest to it.
+
     Attributes
     ----------
     names : Names
@@ -77,17 +79,22 @@ class SearchScene:
         goals: Array,
         obstacles: Obstacles,
         config: HomotopyConfig,
+        duration_s: Sequence[float],
+        steps: int,
         previous: Sequence[Candidate],
         objects: Sequence[str | None] = (),
     ) -> None:
         self._hand, self._velocity = hand_mean[:4].astype(float).reshape(2, 2)
         is_on_hand = np.hypot(*(goals - self._hand).T) < OFF_HAND
         self._goals = np.where(is_on_hand[:, None], self._hand + np.array([OFF_HAND, 0.0]), goals)
-        self._near = take_near(obstacles, self._hand, self._goals)
+        self._duration_s, self._steps = duration_s, steps
+        self._now = take_near(obstacles, self._hand, self._goals)
+        self._near = self._place_when_passed(self._now)
         kept = {*self._near.ids}
         self._others = obstacles.take([row for row, name in enumerate(obstacles.ids) if name not in kept])
         self._clearance, self._max_states = config.clearance, STATES + STATES_PER_CANDIDATE * config.max_candidates
-        self.names = find_names(self._hand, self._goals, self._near, config.clearance, previous, objects)
+        blocks = ~find_holders(goals, self._now, objects)
+        self.names = find_names(self._hand, self._goals, self._near, blocks, config.clearance, previous)
         ids, fitting = {*obstacles.ids}, [each for each in previous if each.goal < len(goals)]
         known = [PathClass(each.length, each.label, each.goal, each.sides, each.guess, each) for each in fitting]
         self.known = sorted([each for each in known if each.named <= ids], key=lambda each: each[:2])
@@ -120,27 +127,44 @@ class SearchScene:
         rows = (np.flatnonzero(is_named).tolist() for is_named in self.names.is_named)
         return tuple([tuple(sorted([self._near.ids[row] for row in each])) for each in rows])
 
-    def make_candidates(self, classes: Sequence[PathClass], duration_s: Sequence[float], steps: int) -> tuple[Candidate, ...]:
-        """Return the candidates of classes, with their shortest paths as guesses for the time to go to each goal [s].
+    def make_candidates(self, classes: Sequence[PathClass]) -> tuple[Candidate, ...]:
+        """Return the candidates of classes, with their shortest paths as guesses for the time to go to each goal.
 
         Where obstacles move, a class is that in which the hand passes them when it is there: its guess decides, and of several
         classes that become the same one the first is returned.
         """
         made: dict[str, Candidate] = {}
         for each in classes:
-            guess = as_readonly(timed(each.points, self._velocity, duration_s[each.goal], steps))
+            guess = as_readonly(timed(each.points, self._velocity, self._duration_s[each.goal], self._steps))
             length = float(compute_path_lengths(each.points)[-1])
             candidate = each.known or Candidate(each.label, each.goal, each.sides, guess, length)
-            if each.known is None and self._near.velocity.any():
-                candidate = self._name_when_passed(candidate, duration_s[each.goal] / steps)
+            if each.known is None and self._now.velocity.any():
+                candidate = self._name_when_passed(candidate, self._duration_s[each.goal] / self._steps)
             made.setdefault(candidate.label, candidate)
         return tuple(made.values())
 
+    def _place_when_passed(self, obstacles: Obstacles) -> Obstacles:
+        """Return obstacles with their centres where a hand that moves straight to a goal comes nearest to them."""
+        if not obstacles.velocity.any():
+            return obstacles
+        offsets, nearest_s = [], []
+        for goal, duration_s in zip(self._goals, self._duration_s, strict=True):
+            dt, path = duration_s / self._steps, timed(np.stack((self._hand, goal)), self._velocity, duration_s, self._steps)
+            offset = path[:, None] - centre_trajectories(obstacles.centre, obstacles.velocity * dt, self._steps)
+            change = np.diff(offset, axis=0)
+            share = -(offset[:-1] * change).sum(axis=2) / np.maximum((change**2).sum(axis=2), np.finfo(float).tiny)
+            share = np.clip(share, 0.0, 1.0)
+            offsets.append(np.hypot(*(offset[:-1] + share[..., None] * change).transpose(2, 0, 1)))
+            nearest_s.append(dt * (np.arange(self._steps)[:, None] + share))
+        distance, at_s = np.concatenate(offsets), np.concatenate(nearest_s)
+        passed_s = np.take_along_axis(at_s, distance.argmin(axis=0)[None], axis=0)[0]
+        return replace(obstacles, centre=obstacles.centre + passed_s[:, None] * obstacles.velocity)
+
     def _name_when_passed(self, candidate: Candidate, dt: float) -> Candidate:
         """Return a candidate with the sides on which its guess, at steps of dt [s], passes the moving obstacles."""
-        near, guess = self._near, candidate.guess
-        centres = centre_trajectories(near.centre, near.velocity * dt, len(guess) - 1)
-        passed = find_sides(guess[None], near, centres)[0]
+        now, guess = self._now, candidate.guess
+        centres = centre_trajectories(now.centre, now.velocity * dt, len(guess) - 1)
+        passed = find_sides(guess[None], now, centres)[0]
         sides = tuple([(name, passed.get(name, side)) for name, side in candidate.sides])
         return replace(candidate, label=label_class(candidate.goal, sides), sides=sides)
 

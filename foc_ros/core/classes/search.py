@@ -96,7 +96,7 @@ def search(
     goals : Array
         Positions (g, 2) [m].
     obstacles : Obstacles
-        The obstacles, where they are now.
+        The obstacles, where they are now. The search takes moving ones where they are when the hand passes them.
     config : HomotopyConfig
         Number of candidates, largest detour and clearance.
     duration_s : Sequence[float]
@@ -126,15 +126,15 @@ def search(
         raise SceneError('duration_s', f'one for each of the {len(goals)} goals', len(duration_s))
     if not len(goals):
         return Search(())
-    scene = SearchScene(hand_mean, goals, obstacles, config, previous, turn.objects)
+    scene = SearchScene(hand_mean, goals, obstacles, config, duration_s, steps, previous, turn.objects)
     ranking = _Ranking(scene, previous, config.max_detour, turn.deadline)
     next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < turn.first_goal, goal)))
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
     chosen = ranking.choose(count)
-    candidates = scene.make_candidates(chosen, duration_s, steps)
+    candidates = scene.make_candidates(chosen)
     ways, reached = {each.way for each in chosen}, {each.goal for each in chosen}
     seen = {each.label: each for each in ranking.seen if each.goal not in reached or not any(each.way <= way for way in ways)}
-    unfollowed = scene.make_candidates(tuple(seen.values()), duration_s, steps)
+    unfollowed = scene.make_candidates(tuple(seen.values()))
     notes = {name: number for name, number in scene.notes.items() if number}
     return Search(candidates, notes, next_goal, unfollowed, scene.list_named())
 
