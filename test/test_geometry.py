@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Convex polygons against brute force: the nearest point, its side and its normal; and what shapes refuse."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -120,6 +122,39 @@ def test_shapes_refuse_by_the_name_of_the_field(case):
     make, field = REFUSED[case]
     with pytest.raises(SceneError, match=rf'^obstacle\.{field}'):
         make()
+
+
+STAR = np.column_stack([turn(0.8 * np.pi * np.arange(5)) for turn in (np.cos, np.sin)])
+SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+TABLES_REFUSED = {
+    'a centre that is not a number': ({'centre': [[np.nan, 0]]}, r'centre: expected numbers in'),
+    'a radius without end': ({'radius': [np.inf]}, r'radius: expected numbers in'),
+    'two radii': ({'radius': [0.1, 0.2]}, r'radius: expected finite numbers of shape \(1,\)'),
+    'a negative radius': ({'radius': [-0.1]}, r'radius\[0\]: expected a number >= 0, got -0.1'),
+    'a negative deviation': ({'radius_stddev': [-1.0]}, r'radius_stddev\[0\]'),
+    'a negative variance': ({'centre_covariance': [-np.eye(2)]}, r'centre_covariance\[0\]: expected a symmetric'),
+    'a covariance that is not symmetric': ({'centre_covariance': [[[1, 1], [0, 1]]]}, r'centre_covariance\[0\]'),
+    'more corners than vertices': ({'corners': [5]}, r'corners\[0\]: expected a number in \[1, 4\], got 5'),
+    'a clockwise polygon': ({'vertices': [SQUARE[::-1]]}, r'vertices\[0\]: expected a convex polygon, anticlockwise'),
+    'a hollow polygon': ({'vertices': [[[0, 0], [1, 0], [0.1, 0.1], [0, 1]]]}, r'vertices\[0\]: expected a convex'),
+    'a polygon that goes round twice': ({'vertices': [STAR], 'corners': [5]}, r'vertices\[0\]: expected a convex'),
+    'heights in the wrong order': ({'heights': [[0.2, 0.1]]}, r'heights\[0\]: expected the lowest point below'),
+    'one height': ({'heights': [0.2]}, r'heights: expected numbers of shape \(1, 2\)'),
+}
+
+
+@pytest.mark.parametrize('case', TABLES_REFUSED)
+def test_tables_refuse_by_the_name_of_the_field(case):
+    changed, message = TABLES_REFUSED[case]
+    table = make_obstacles([[0, 0]], 0.1, polygons=[SQUARE])
+    assert collect_obstacles(table) is table
+    with pytest.raises(SceneError, match=rf'^obstacles\.{message}'):
+        collect_obstacles(replace(table, **{field: np.array(value) for field, value in changed.items()}))
+
+
+def test_tables_refuse_a_name_that_occurs_twice():
+    with pytest.raises(SceneError, match=r"^obstacles\.ids: expected a different name for each obstacle, got \('a', 'a'\)"):
+        collect_obstacles(make_obstacles([[0, 0], [1, 0]], 0.1, ids=('a', 'a')))
 
 
 @given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=12), st.floats(1e-3, 0.1))

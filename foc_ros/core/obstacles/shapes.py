@@ -18,6 +18,7 @@ from foc_ros.core.support import check_array, check_number, check_vector
 from foc_ros.core.types import Array
 
 from .polygons import make_box_polygon, make_hull_polygon
+from .table_checks import check_obstacles
 
 MOST_VERTICES = 16
 """Most vertices of a convex hull that a user gives."""
@@ -320,12 +321,12 @@ class Hull(_HullOfPoints):
 
 
 def collect_obstacles(shapes: Iterable[Shape] | Shape | Obstacles) -> Obstacles:
-    """Return the table of some shapes or of one, or a table as it is.
+    """Return the table of some shapes or of one, or a table whose rows can be used.
 
     Raises SceneError, which names the place in the list, for anything else or a name that occurs twice.
     """
     if isinstance(shapes, Obstacles):
-        return shapes
+        return check_obstacles(shapes)
     if not isinstance(shapes, (Shape, Iterable)):
         raise SceneError('obstacles', 'a list of Circle, Box, Capsule and Hull', repr(shapes))
     given = [shapes] if isinstance(shapes, Shape) else list(shapes)
