@@ -17,7 +17,7 @@ from .plant.models import make_plant_model
 from .predict import build_problem, take_in_the_way
 from .prediction import PredictedCandidate
 from .scene import ReachingScene
-from .solution import LEFT, Candidate
+from .solution import Candidate, label_class
 from .types import Array
 
 
@@ -58,5 +58,4 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
 
 def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
     sides = tuple(sorted(find_path_sides(guess, obstacles).items()))
-    label = 'goal0:' + ''.join(('+' if side == LEFT else '-') + identity for identity, side in sides)
-    return Candidate(label, 0, sides, guess, 0.0)
+    return Candidate(label_class(0, sides), 0, sides, guess, 0.0)
