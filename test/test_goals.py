@@ -78,7 +78,7 @@ def test_goals_are_compared_by_the_straight_effort_in_a_common_time_and_less_by_
 
 
 def test_paths_to_a_goal_behind_obstacles_are_solved_beside_a_free_goal():
-    """They cost some thirty times as much as the path to the other goal, and are solved to their end all the same."""
+    """They cost more than ten times as much as the path to the other goal, which makes them less likely, and no less exact."""
     obstacles = [foc_ros.Box((0.01, 0.15), (0.3, 0.02), name='wall'), foc_ros.Circle((-0.05, 0.22), 0.03, 0.003, name='cup')]
 
     def solve_paths_to_last(goals):
@@ -91,7 +91,7 @@ def test_paths_to_a_goal_behind_obstacles_are_solved_beside_a_free_goal():
 
     alone, _ = solve_paths_to_last([(0.0, 0.3)])
     beside, likelihood = solve_paths_to_last([(0.3, 0.0), (0.0, 0.3)])
-    assert len(alone) == 2 and beside == alone and likelihood > 0.05
+    assert len(alone) == 2 and beside == alone and likelihood > 0.15
 
 
 def test_the_predictor_takes_the_object_of_a_goal():
