@@ -23,10 +23,10 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obstacle
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
-from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
+from foc_ros.io.outputs import MARK
 from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
 
-from .views import COLOURS, LIKELY, NOTED, SLOTS, HandTrajectory, describe_ghost, list_unsolved
+from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghost, list_unsolved
 
 try:
     import matplotlib as mpl
@@ -67,11 +67,8 @@ def open_figure(width_in: float, height_in: float) -> Iterator[Figure]:
         yield Figure(figsize=(width_in, height_in), layout='constrained')
 
 
-def save_figure(figure: Figure, file: Path | str) -> None:
-    """Write a figure as PNG, PDF or SVG, by the file's suffix; raises InputError if that is not possible."""
-    suffix = Path(file).suffix.lower()
-    if suffix not in PICTURE_SUFFIXES:
-        raise InputError('picture file', f'a name that ends in {", ".join(PICTURE_SUFFIXES)}', str(file))
+def save_figure(figure: Figure, file: Path) -> None:
+    """Write a figure as PNG, PDF or SVG, by the file's suffix; raises InputError if it cannot be written."""
     # without its date it is the same file each time
     metadata = {
         '.png': {'Software': MARK},
@@ -79,7 +76,7 @@ def save_figure(figure: Figure, file: Path | str) -> None:
         '.svg': {'Creator': MARK, 'Date': None},
     }
     try:
-        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=metadata[suffix])
+        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=metadata[file.suffix.lower()])
     except OSError as error:
         raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
 
@@ -110,11 +107,6 @@ def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = 
     found = 'estimated' if candidate.is_estimated else 'compromised'
     words = '' if candidate.is_solved else f'; {found}: eta {candidate.eta:.3f}'
     return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
-
-
-def number_labels(snapshot: Prediction) -> dict[str, int]:
-    """Return slots of the candidates of a single prediction, by label; candidates beyond the number of slots have none."""
-    return {each.label: number for number, each in enumerate(snapshot.candidates_with_likelihood[:SLOTS])}
 
 
 def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
