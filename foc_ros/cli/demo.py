@@ -29,6 +29,7 @@ from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter, Item
+from foc_ros.io.outputs import make_folder
 from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
 from foc_ros.reporting.report import describe_late, write_report
@@ -146,14 +147,11 @@ def prepare(output: Path) -> None:
     """Make the output directory and remove bag and report of an earlier demo; refuse a directory with other contents."""
     if output.exists() and not (output / MARK).exists() and (not output.is_dir() or any(output.iterdir())):
         raise InputError('--output', 'a new or empty directory, or one of an earlier demo', f'{output}, which has other contents')
-    try:
-        output.mkdir(parents=True, exist_ok=True)
+    with make_folder('--output', output):
         (output / MARK).write_text('The next demo replaces bag and report beside this file.\n', encoding='utf-8')
         for name in ('bag', 'report'):
             if (output / name).exists():
                 shutil.rmtree(output / name)
-    except OSError as error:
-        raise InputError('--output', 'a directory that can be written', f'{output}: {error.strerror}') from error
 
 
 def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: threading.Event) -> None:

@@ -20,11 +20,12 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.config import Config
-from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.core.errors import RecordingError
 from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, HandSample, as_readonly
 from foc_ros.io.bags import TYPESTORE, BagWriter
+from foc_ros.io.outputs import make_folder
 from foc_ros.io.topics import TYPES
 from foc_ros.reporting.page import Table
 from foc_ros.reporting.report import write_report
@@ -51,13 +52,10 @@ class Recording:
 
     def __init__(self, data: Path, config: Config, scene: Mapping[str, Any], types: MessageTypes) -> None:
         name, number = datetime.now().astimezone().strftime('%Y-%m-%d_%H-%M-%S'), 1
-        try:
-            data.mkdir(parents=True, exist_ok=True)
+        with make_folder('--data', data):
             while (folder := data / (name if number == 1 else f'{name}_{number}')).exists():
                 number += 1
             folder.mkdir()
-        except OSError as error:
-            raise InputError('--data', 'a folder that can be written', f'{data}: {error.strerror}') from error
         self.folder = folder
         self.scores: Table | None = None
         self._types, self._scene = types, dict[str, bytes]()

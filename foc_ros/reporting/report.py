@@ -6,9 +6,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import NANOSECONDS, HandSample
-from foc_ros.io.outputs import MARK, REPORT_FILES, check_page
+from foc_ros.io.outputs import MARK, REPORT_FILES, check_page, make_folder
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
 from .draw import save_figure
@@ -30,8 +29,7 @@ COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candi
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
 
 
-@dataclass(frozen=True)
-class PageWarning:
+class PageWarning(NamedTuple):
     """What went wrong, and the first moment of it: seconds after the first hand sample, None if there is none."""
 
     text: str
@@ -90,17 +88,14 @@ def write_report(
         'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
     }
     page_file, numbers_file, overview_file = (directory / name for name in REPORT_FILES)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        solved = [each for each in snapshots if each.candidates_with_likelihood]
+    solved = [each for each in snapshots if each.candidates_with_likelihood]
+    with make_folder('--report', directory):
         if solved:
             goals = np.unique(np.concatenate([each.goal_positions for each in solved]), axis=0)
             bounds = compute_recording_bounds(hand, solved)
             save_figure(make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds), overview_file)
         page_file.write_text(html, encoding='utf-8', errors='replace')
         numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
-    except OSError as error:
-        raise InputError('report directory', 'a directory that can be written', f'{directory}: {error.strerror}') from error
     return [page_file, numbers_file, *([overview_file] if solved else [])]
 
 

@@ -25,7 +25,7 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE
 
-from .draw import draw_scene, get_class_style
+from .draw import compute_bounds, draw_scene, get_class_style
 from .figures import make_moment_figure
 from .page import Section, explain_tables, make_chart, make_picture, write_page
 from .report import ReportCollector
@@ -261,9 +261,8 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
 
 
 def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> None:
-    everything = np.concatenate([task.path[:, 0], task.goals, *(each.position for each in trials.values())])
-    (left, low), (right, high) = (everything.min(axis=0) - 0.04).tolist(), (everything.max(axis=0) + 0.04).tolist()
-    draw_scene(axes, task.obstacles, task.goals, (left, right, low, high))
+    paths = [task.path[:, 0], *(each.position for each in trials.values())]
+    draw_scene(axes, task.obstacles, task.goals, compute_bounds(task.obstacles, task.goals, (), *paths))
     axes.plot(*task.path[:, 0].T, color='black', linestyle='--', linewidth=1.0, label='intended')
     for number, (rule, trial) in enumerate(trials.items()):
         look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}

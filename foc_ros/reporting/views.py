@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ def _read_candidate(label: str, ids: Collection[str], values: Array, rows: Any, 
     status, dt = STATUSES[int(rows['status'][0])], float(rows['t'][-1]) / max(len(rows) - 1, 1)
     only_motor = None if np.array_equal(total, motor) else motor
     solution = Solution(status, '', dt, mean, total, np.zeros((0, 2)), effort, {}, 0.0, 0.0, eta, motor_covariance=only_motor)
-    sides = parse_label(label, ids)[1]
+    sides = parse_sides(label, ids)
     candidate = Candidate(label, int(rows['goal'][0]), tuple(sides.items()), mean[:, :2], 0.0)
     return PredictedCandidate(candidate, solution, sides, cost_ratio, likelihood, way=int(rows['way'][0]))
 
@@ -165,28 +166,20 @@ def describe_ghost(snapshot: Prediction, candidate: PredictedCandidate) -> tuple
 
 @dataclass(frozen=True, eq=False)
 class HandTrajectory(Record):
-    """The measured movement of the hand: stamps_ns (n,) increasing, positions (n, 2) [m], velocity (n, 2) [m/s]."""
+    """The measured movement of the hand: stamps_ns (n,) increasing, positions (n, 2) [m]."""
 
     stamps_ns: np.ndarray[tuple[int], np.dtype[np.int64]]
     positions: Array
-    velocity: Array = field(init=False)
 
-    HALF_WIDTH_S = 0.05
-    """Half of the interval of the central difference: wide enough to suppress sensor noise, short compared with a reach."""
-
-    def __post_init__(self) -> None:
-        times = self.seconds_after(int(self.stamps_ns[0]) if len(self.stamps_ns) else 0)
-        begins, ends = (np.clip(times + shift, times[:1], times[-1:]) for shift in (-self.HALF_WIDTH_S, self.HALF_WIDTH_S))
-        axes = self.positions.T if len(times) else ()
-        displacement = [np.interp(ends, times, axis) - np.interp(begins, times, axis) for axis in axes]
-        elapsed = np.where(ends > begins, ends - begins, np.inf)
-        object.__setattr__(self, 'velocity', (np.array(displacement) / elapsed).T.reshape(-1, 2))
-        super().__post_init__()
-
-    @property
+    @cached_property
     def speed(self) -> Array:
-        """Speed (n,) [m/s]."""
-        speed: Array = np.linalg.norm(self.velocity, axis=1)
+        """Speed (n,) [m/s]: central differences over an interval that suppresses sensor noise and is short beside a reach."""
+        if not len(self.stamps_ns):
+            return np.zeros(0)
+        times = self.seconds_after(int(self.stamps_ns[0]))
+        begins, ends = (np.clip(times + shift, times[:1], times[-1:]) for shift in (-0.05, 0.05))
+        moved = [np.interp(ends, times, axis) - np.interp(begins, times, axis) for axis in self.positions.T]
+        speed: Array = np.hypot(*moved) / np.where(ends > begins, ends - begins, np.inf)
         return speed
 
     def seconds_after(self, origin_ns: int) -> Array:
@@ -222,15 +215,14 @@ def build_hand_trajectory(samples: Sequence[HandSample]) -> HandTrajectory:
     return HandTrajectory(stamps[is_newest], positions[is_newest])
 
 
-def parse_label(label: str, ids: Collection[str]) -> tuple[str, dict[str, int]]:
-    """Split a label into its goal and the sides it names; ids: of the obstacles of the scene, which may contain signs.
+def parse_sides(label: str, ids: Collection[str]) -> dict[str, int]:
+    """Return the sides that a label names; ids: of the obstacles of the scene, which may contain signs.
 
     An obstacle that is not among them may have any name without a sign.
     """
-    goal, _, rest = label.partition(':')
     names = '|'.join([*(re.escape(name) for name in sorted(ids, key=len, reverse=True)), '[^+-]+'])
-    found = re.findall(rf'([+-])({names})(?=[+-]|$)', rest)
-    return goal, {name: LEFT if sign == '+' else RIGHT for sign, name in found}
+    found = re.findall(rf'([+-])({names})(?=[+-]|$)', label.partition(':')[2])
+    return {name: LEFT if sign == '+' else RIGHT for sign, name in found}
 
 
 @dataclass(frozen=True)
