@@ -152,14 +152,14 @@ class Session:
         if self._tasks is not None:
             self._follow_tasks(self._tasks, stamp_ns * 1e-9, message.position)
 
+    # tasks
+
     def _begin_tasks(self, settings: messages.TasksMessage) -> None:
         self._end_recording()
         self._begin_recording()
         self._tasks, self._guided_before = tasks.Tasks(settings, self._scene), self._is_guided
         self._kept.pop('score', None)
         self._prepare_trial(self._tasks)
-
-    # tasks
 
     def _prepare_trial(self, running: tasks.Tasks) -> None:
         if self._scene is not running.trial.scene:
@@ -303,8 +303,6 @@ class Session:
         message = {'type': kind, **values}
         if kind in ('score', 'job', 'result'):  # repeated to a page that is loaded again
             self._kept[kind] = message
-            if 'rows' in message and kind == 'job':
-                self._kept['result'] = {'type': 'result', 'columns': values['columns'], 'rows': values['rows']}
         if self._page is not None:
             self._page(message)
         if kind == 'job' and values['state'] == 'done':

@@ -177,14 +177,13 @@ const handlers = {
   score({ columns, rows }) {
     byId('score').replaceChildren(rows.length ? makeTable(columns, rows) : 'No trial was finished.');
   },
-  job({ name, state, text, columns, rows, seconds }) {
+  job({ name, state, text, seconds }) {
     job = state === 'running' ? { name, text, begunMs: performance.now() - 1000 * seconds } : null;
     failure = state === 'failed' ? `${name} failed` : '';
     showJob();
     if (!job) byId('job').textContent = `${name}: ${text}${seconds ? ` (${seconds} s)` : ''}`;
     for (const each of ['cancel', 'progress']) byId(each).hidden = !job || job.name === 'report';
     if (name === 'report' && state === 'done') byId('download').hidden = false;
-    if (columns) handlers.result({ columns, rows });
   },
   result({ columns, rows }) {
     byId('result').replaceChildren(makeTable(columns, rows));
