@@ -117,7 +117,8 @@ def test_a_fit_and_its_comparison(tmp_path, monkeypatch):
         assert 'duration.fitts_b_s' in [row[0] for row in page.last('result')['rows']]
         compared = await work(page, 'compare')
         assert 'on the trials of the fit' in compared['text']
-        assert [row[0] for row in page.last('result')['rows']][:2] == ['path class: correct [%]', 'path class: log-likelihood [nat]']
+        scores = [row[0] for row in page.last('result')['rows']]
+        assert scores[:2] == ['path class: correct [%]', 'path class: log-likelihood [nat]']
 
     use_few_predictions(monkeypatch)
     monkeypatch.setattr(jobs, 'run_command', run_here)

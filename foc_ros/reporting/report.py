@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,22 +37,30 @@ class PageWarning(NamedTuple):
 
 
 class ReportCollector:
-    """Collects the steps of a replay for their report."""
+    """Collects what a report shows.
+
+    Attributes: samples, of the hand; snapshots, as `build_snapshot` and `read_snapshot` make them.
+    """
 
     def __init__(self) -> None:
         self.samples: list[HandSample] = []
         self.snapshots: list[Prediction] = []
 
+    @property
+    def hand(self) -> HandTrajectory:
+        """The measured movement."""
+        return build_hand_trajectory(self.samples)
+
     def add(self, step: Step) -> None:
-        """Keep the hand sample and the prediction of a step."""
+        """Keep the hand sample and the prediction of a step of a replay."""
         if step.sample is not None:
             self.samples.append(step.sample)
         if step.prediction is not None:
             self.snapshots.append(build_snapshot(step.prediction))
 
-    def write(self, directory: Path, title: str, summary: Mapping[str, str]) -> None:
-        """Write the report; see :func:`write_report`."""
-        write_report(directory, title, build_hand_trajectory(self.samples), self.snapshots, summary)
+    def write(self, directory: Path, title: str, summary: Mapping[str, str], tables: Sequence[Table] = ()) -> Path:
+        """Write the report and return its page; see :func:`write_report`."""
+        return write_report(directory, title, self.hand, self.snapshots, summary, tables)[0]
 
 
 def write_report(
@@ -126,27 +134,22 @@ def _collect_facts(snapshots: Sequence[Prediction]) -> dict[str, str]:
 
 
 def _collect_warnings(snapshots: Sequence[Prediction], origin_ns: int) -> list[PageWarning]:
-    def find(is_found: Callable[[Prediction], bool]) -> list[float]:
-        return [_measure_seconds(each, origin_ns) for each in snapshots if is_found(each)]
-
     if not snapshots:
         return [PageWarning('There is no prediction.')]
-    warnings, count = [], len(snapshots)
-    if at := find(lambda each: not each.candidates_with_likelihood):
-        warnings.append(PageWarning(f'In {len(at)} of {count} predictions no candidate could be solved.', at[0]))
-    if words := describe_late(snapshots):
-        warnings.append(PageWarning(words, find(is_late)[0]))
-    if at := find(lambda each: any(one.status is Status.COMPROMISED for one in each.candidates[:1])):
-        words = f'In {len(at)} of {count} predictions the most likely path avoids the obstacles less surely than wanted'
-        warnings.append(PageWarning(f'{words}. Remedy: {Status.COMPROMISED.remedy}.', at[0]))
-    lost: dict[str, list[float]] = {}
-    for each in snapshots:
-        for view in list_unsolved(each):
-            lost.setdefault(view.status.value, []).append(_measure_seconds(each, origin_ns))
-    for status, at in sorted(lost.items()):
-        words = f'{len(at)} candidate{"s" if len(at) > 1 else ""} ended with status {status}. Remedy: {Status(status).remedy}.'
-        warnings.append(PageWarning(words, at[0]))
-    return warnings
+    count, late = len(snapshots), describe_late(snapshots)
+    unsolved = [each for each in snapshots if not each.candidates_with_likelihood]
+    unsure = [each for each in snapshots if any(one.status is Status.COMPROMISED for one in each.candidates[:1])]
+    words = f'In {len(unsure)} of {count} predictions the most likely path avoids the obstacles less surely than wanted'
+    found = [
+        (f'In {len(unsolved)} of {count} predictions no candidate could be solved.', unsolved),
+        (late, [each for each in snapshots if late and is_late(each)]),
+        (f'{words}. Remedy: {Status.COMPROMISED.remedy}.', unsure),
+    ]
+    for status in sorted(Status, key=lambda each: each.value):
+        lost = [each for each in snapshots for one in list_unsolved(each) if one.status is status]
+        words = f'{len(lost)} candidate{"s" if len(lost) > 1 else ""} ended with status {status.value}. Remedy: {status.remedy}.'
+        found.append((words, lost))
+    return [PageWarning(words, _measure_seconds(each[0], origin_ns)) for words, each in found if each]
 
 
 def _measure_seconds(snapshot: Prediction, origin_ns: int) -> float:

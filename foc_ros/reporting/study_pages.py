@@ -29,7 +29,7 @@ from .draw import compute_bounds, draw_scene, get_class_style
 from .figures import make_moment_figure
 from .page import Section, explain_tables, make_chart, make_picture, write_page
 from .report import ReportCollector
-from .views import build_hand_trajectory, choose_moment
+from .views import choose_moment
 
 FEW = 20
 """Number of recordings or trials below which a page warns."""
@@ -290,7 +290,7 @@ def draw_example(recordings: Mapping[str, Recording] | None, config: Config | No
                 collected.add(step)
         except FocError:
             continue  # the page lists what cannot be read
-        hand = build_hand_trajectory(collected.samples)
+        hand = collected.hand
         for span in hand.find_movements():
             row = choose_moment(collected.snapshots, *span)
             if row is not None:
