@@ -53,7 +53,7 @@ class Session:
         self._hands: deque[tuple[int, messages.HandMessage]] = deque(maxlen=256)
         self._tasks: tasks.Tasks | None = None
         self._guided_before = self._is_guided
-        self._force_s, self._touched = 0.0, 0
+        self._force_s = 0.0
 
     @property
     def report(self) -> Path | None:
@@ -169,11 +169,10 @@ class Session:
         self._say_task()
 
     def _follow_tasks(self, running: tasks.Tasks, t: float, position: scene.Point) -> None:
-        trial, scored = running.trial, len(running.scores)
+        trial, scored, touched = running.trial, len(running.scores), running.touched
         phase = running.follow(t, position)
-        if self._touched < running.touched:
+        if running.touched > touched:
             self._say('touched')
-        self._touched = running.touched
         if phase is None:
             return
         if phase is tasks.Phase.REACH:
