@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -38,6 +37,8 @@ from foc_ros.ros.intake import Intake
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, isolated_graph
 from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, STAMP
+
+from .options import warn_all
 
 RECORDING = Path(__file__).resolve().parents[1] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
@@ -115,7 +116,7 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
         if not recorder.snapshots and not stopped.is_set():
             raise NodeDiedError('the node sent no prediction')
     except NodeDiedError as error:
-        print(f'foc_ros demo: {error}', file=sys.stderr)
+        warn_all('demo', [str(error)])
         return 1
     if stopped.is_set():
         print(f'interrupted; the messages recorded so far are in {output / "bag"}')

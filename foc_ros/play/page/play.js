@@ -4,7 +4,6 @@
 import { Arranging } from './arranging.js';
 import { Hand } from './hand.js';
 
-const byId = (name) => document.getElementById(name);
 const RETRY_MS = 1000;
 // Time over which frames are counted [ms], and the number of delays of which the median is shown.
 const COUNTED_MS = 2000;
