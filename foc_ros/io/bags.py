@@ -72,13 +72,10 @@ class BagReader:
         self._chosen, self._is_whole = chosen, is_whole
 
     def __enter__(self) -> BagReader:
-        self._stack = ExitStack()
-        try:
-            with _named_errors(self.path):
-                self._open()
-        except BaseException:
-            self._stack.close()
-            raise
+        check_bag(self.path)
+        with ExitStack() as stack, _named_errors(self.path):
+            self._open(stack)
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -97,10 +94,9 @@ class BagReader:
         """Return the channel of a topic that is read."""
         return next(each for each in self._channels if each.topic == topic and each.is_read)
 
-    def _open(self) -> None:
-        _refuse_unreadable(self.path)
+    def _open(self, stack: ExitStack) -> None:
         paths, stated, missing = _list_files(self.path) if self.path.is_dir() else ([self.path], None, '')
-        self._files = [self._open_file(each) for each in paths]
+        self._files = [_open_file(each, stack) for each in paths]
         self._channels = [each for file in self._files for each in file.channels]
         self.message_count = sum(file.message_count for file in self._files)
         if not self.message_count:
@@ -124,14 +120,6 @@ class BagReader:
             else:
                 self._report_loss(f'metadata.yaml {words}')
         self._assign_topics()
-
-    def _open_file(self, path: Path) -> McapFile | SqliteFile:
-        if path.suffix in COMPRESSED:
-            folder = Path(self._stack.enter_context(TemporaryDirectory()))
-            with zstandard.open(path, 'rb') as packed, (folder / path.stem).open('wb') as unpacked:
-                shutil.copyfileobj(packed, unpacked)
-            path = folder / path.stem
-        return FILE_TYPES[path.suffix](path, self._stack)
 
     def _assign_topics(self) -> None:
         """Find the topics of the inputs; a topic that is read hides one of the same name that is not."""
@@ -211,7 +199,16 @@ class BagWriter:
 def check_bag(path: Path) -> None:
     """Raise RecordingError for a path that is clearly no bag, without opening it."""
     with _named_errors(path):
-        _refuse_unreadable(path)
+        if not path.exists():
+            raise RecordingError('no such file or directory')
+        if path.is_dir() and not any(map(is_bag_file, path.iterdir())):
+            raise RecordingError('no .mcap or .db3 file in the directory: not a bag')
+        if path.is_file() and path.suffix == '.bag':
+            raise RecordingError('a bag of ROS 1: convert it to ROS 2, for example with rosbags-convert')
+        if not path.is_dir() and not is_bag_file(path):
+            raise RecordingError('expected a bag directory, a .mcap or a .db3 file')
+        if path.is_file() and not path.stat().st_size:
+            raise RecordingError('the file is empty')
 
 
 def check_new_bag(path: Path) -> None:
@@ -227,6 +224,15 @@ def is_bag_file(path: Path) -> bool:
 
 def _strip_compression(name: str) -> str:
     return PurePath(name).stem if name.endswith(COMPRESSED) else name
+
+
+def _open_file(path: Path, stack: ExitStack) -> McapFile | SqliteFile:
+    if path.suffix in COMPRESSED:
+        folder = Path(stack.enter_context(TemporaryDirectory()))
+        with zstandard.open(path, 'rb') as packed, (folder / path.stem).open('wb') as unpacked:
+            shutil.copyfileobj(packed, unpacked)
+        path = folder / path.stem
+    return FILE_TYPES[path.suffix](path, stack)
 
 
 def _decompress(data: bytes) -> bytes:
@@ -285,20 +291,6 @@ def _find_gap(names: Collection[str]) -> str:
     if missing is None or len(numbers) < max(2, len(names)) or len(stems) > 1:
         return ''
     return f'{parts[0][1]}{missing}{parts[0][3]} is missing, by the numbers of the other files'
-
-
-def _refuse_unreadable(path: Path) -> None:
-    """Raise RecordingError for the usual mistakes; the reader finds the others."""
-    if not path.exists():
-        raise RecordingError('no such file or directory')
-    if path.is_dir() and not any(map(is_bag_file, path.iterdir())):
-        raise RecordingError('no .mcap or .db3 file in the directory: not a bag')
-    if path.is_file() and path.suffix == '.bag':
-        raise RecordingError('a bag of ROS 1: convert it to ROS 2, for example with rosbags-convert')
-    if not path.is_dir() and not is_bag_file(path):
-        raise RecordingError('expected a bag directory, a .mcap or a .db3 file')
-    if path.is_file() and not path.stat().st_size:
-        raise RecordingError('the file is empty')
 
 
 @contextmanager

@@ -72,7 +72,7 @@ class Recording:
 
     def add_input(self, role: str, message: Any) -> None:
         """Record a message to the predictor."""
-        now_ns, raw = time_ns(), _serialize(message)
+        now_ns, raw = time_ns(), bytes(TYPESTORE.serialize_cdr(message, TYPES[role]))
         self._bag.write_raw(f'/{role}', TYPES[role], raw, now_ns)
         if role in ('obstacles', 'goals'):
             self._scene[role] = raw
@@ -123,8 +123,4 @@ class Recording:
 
     def _add_outputs(self, messages: Mapping[str, Any]) -> None:
         for name, message in messages.items():
-            self._bag.write_raw(f'/foc/{name}', message.__msgtype__, _serialize(message), time_ns())
-
-
-def _serialize(message: Any) -> bytes:
-    return bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
+            self._bag.write(f'/foc/{name}', message, time_ns())
