@@ -179,9 +179,11 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
     Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
-    has its total uncertainty, too. Ghosts have their reasons beside them. The legend has one line for all below NOTED.
+    has its total uncertainty, too. Ghosts have their reasons beside them. The legend has one line for all below NOTED, and the
+    others in the order of their group identities.
     """
     goals, entered = len(snapshot.goal_positions), set[str]()
+    order = {each.label: f'candidate {row:04d}' for row, each in enumerate(snapshot.candidates)}
     views = [(each, *describe_ghost(snapshot, each)) for each in snapshot.candidates]
     paths = [each for each, reason, _ in views if not reason]
     count = sum(each.likelihood < NOTED for each in paths)
@@ -195,14 +197,14 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
         if is_first or each.likelihood >= LIKELY:
             _draw_ellipses(axes, each, style['color'], is_total=is_first)
         label = describe_in_legend(each, goals, get_letter(slot)) if is_noted else more
-        axes.plot(*find_drawn_curve(each).T, zorder=3, label=label, **style)
+        axes.plot(*find_drawn_curve(each).T, zorder=3, label=label, gid=order[each.label] if is_noted else None, **style)
         path = each.solution.path
         draw_tag(axes, path[int((0.45 + 0.12 * (rank % 3)) * (len(path) - 1))], get_letter(slot), style['color'])
     for number, (each, reason, place) in enumerate(view for view in reversed(views) if view[1]):
         is_noted, curve = not each.has_likelihood or each.likelihood >= NOTED, find_drawn_curve(each)
         label = describe_in_legend(each, goals, get_letter(slots.get(each.label) if is_noted else None), reason)
         look = {'color': GHOST_COLOUR, 'linewidth': 4.0 if is_noted else 1.5, 'alpha': 0.3, 'solid_capstyle': 'round'}
-        axes.plot(*curve.T, zorder=2, label=label, **look)
+        axes.plot(*curve.T, zorder=2, label=label, gid=order[each.label], **look)
         share = 0.5 + 0.15 * (number % 3) if place is None else place
         if reason not in entered:  # those of one obstacle would cover each other
             look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}

@@ -138,8 +138,7 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     width_in = figure.get_figwidth() * place.width
     columns, sign_columns = (40, 1) if width_in < 3.5 else (COLUMNS, 2)
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    shares = {label: float(label.partition('%')[0][1:].strip().replace('-', '-1')) for label in named if '%  ' in label}
-    candidates = sorted(shares, key=lambda label: (-shares[label], label))
+    candidates = sorted((label for label in named if named[label].get_gid()), key=lambda label: (named[label].get_gid(), label))
     if any(line.get_linestyle() == ':' for line in axes.lines):
         named['dotted: not known to avoid as surely as wanted'] = Line2D([], [], color='0.35', linestyle=':', linewidth=2.0)
     signs = [label for label in named if label not in candidates]
