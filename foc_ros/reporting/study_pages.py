@@ -229,17 +229,12 @@ def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     measures = {'collision_rate': 'collisions in {:.0f} % of the trials', 'completion_s': '{:.2f} s for a movement'}
     sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
     for operator in dict.fromkeys(cell['operator'] for cell in cells):
-        by_rule = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}
-        told = [
-            ' and '.join(
-                words.format(study.COLUMNS[name][1] * by_rule[rule][name])
-                for name, words in measures.items()
-                if by_rule[rule][name] is not None
-            )
-            + f' {"with" if rule == FOC else "without"} guidance'
-            for rule in (FOC, NONE)
-            if rule in by_rule
-        ]
+        by_rule, told = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}, []
+        for rule, words in ((FOC, 'with guidance'), (NONE, 'without guidance')):
+            values = {name: by_rule[rule][name] for name in measures} if rule in by_rule else {}
+            known = [measures[name].format(study.COLUMNS[name][1] * each) for name, each in values.items() if each is not None]
+            if values:
+                told.append(f'{" and ".join(known)} {words}')
         sentences.append(f'{operator.replace("_", " ").capitalize()}: {"; ".join(told)}.')
     return sentences
 

@@ -117,9 +117,8 @@ def is_late(snapshot: Prediction) -> bool:
 def count_likely_paths(snapshot: Prediction) -> float:
     """Return the number of likely paths, without estimates and ghosts: exp of the entropy of likelihoods of at least LIKELY."""
     likely = [each for each in snapshot if each.likelihood >= LIKELY and not each.is_estimated]
-    likely = [each for each in likely if not describe_ghost(snapshot, each)[0]]
-    shares = np.array([each.likelihood for each in likely])
-    shares = shares / max(shares.sum(), LIKELY)
+    shares = np.array([each.likelihood for each in likely if not describe_ghost(snapshot, each)[0]])
+    shares /= max(shares.sum(), LIKELY)
     return float(np.exp(-(shares * np.log(shares)).sum())) if len(shares) else 0.0
 
 
@@ -190,20 +189,17 @@ class HandTrajectory(Record):
         """Return the rows with start_ns <= stamp <= end_ns."""
         return slice(int(np.searchsorted(self.stamps_ns, start_ns)), int(np.searchsorted(self.stamps_ns, end_ns, side='right')))
 
-    def find_movements(self, onset_speed: float = ONSET_SPEED) -> list[tuple[int, int]]:
+    def find_movements(self) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement.
 
-        During it the hand is faster than onset_speed [m/s], pauses shorter than PAUSE_S apart; it extends over more than LEAST_M.
+        During it the hand is faster than ONSET_SPEED, pauses shorter than PAUSE_S apart; it extends over more than LEAST_M.
         """
-        rows = np.flatnonzero(self.speed > onset_speed)
-        if not len(rows):
-            return []
+        rows = np.flatnonzero(self.speed > ONSET_SPEED)
         breaks = np.flatnonzero(np.diff(self.stamps_ns[rows]) > PAUSE_S * NANOSECONDS)
-        spans = zip(np.concatenate([rows[:1], rows[breaks + 1]]), np.concatenate([rows[breaks], rows[-1:]]), strict=True)
         return [
-            (int(self.stamps_ns[first]), int(self.stamps_ns[last]))
-            for first, last in spans
-            if np.ptp(self.positions[first : last + 1], axis=0).max() > LEAST_M
+            (int(self.stamps_ns[each[0]]), int(self.stamps_ns[each[-1]]))
+            for each in np.split(rows, breaks + 1)
+            if len(each) and np.ptp(self.positions[each[0] : each[-1] + 1], axis=0).max() > LEAST_M
         ]
 
 
