@@ -300,6 +300,6 @@ def test_reaches_are_expected_to_end_where_the_earlier_ones_did():
     np.testing.assert_allclose(habits.find_ends(np.zeros((1, 2))), [[0.0, -0.02 * 6 / 9]], atol=1e-3)
     ends = np.hypot(*habits.find_ends(np.array(goals)).T)
     # the straight effort counts with the power 0.75, and the costs of the movements depend on the goals themselves
-    first = odds(Session(goals).share(1))
-    given = np.hypot(*np.array(goals).T)
-    assert odds(session.share(1)) / first == pytest.approx(((ends[0] * given[1]) / (ends[1] * given[0])) ** (1.5 * BETA), rel=0.01)
+    before, given = odds(Session(goals).share(1)), np.hypot(*np.array(goals).T)
+    nearer = (ends[0] / ends[1]) / (given[0] / given[1])
+    assert odds(session.share(1)) / before == pytest.approx(nearer ** (1.5 * BETA), rel=0.01)

@@ -3,8 +3,8 @@
 """Which goals an operator prefers, and where reaches end: hands stop at the near side of objects, and tools have a length.
 
 A hand that begins to move at the distance d_i from goal i is expected to go there with the probability q_i, which is proportional
-to d_i^(-2 beta). With the number n_i of reaches that ended at the goal, and the sum e_i of its q_i over all reaches, the likelihoods
-of its candidates get the weight
+to d_i^(-2 beta). With the number n_i of reaches that ended at the goal, and the sum e_i of its q_i over all reaches, the
+likelihoods of its candidates get the weight
 
     w_i = (1 + c n_i) / (1 + c e_i),   c = `likelihood.past_goals`.
 
