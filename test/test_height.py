@@ -213,9 +213,9 @@ def test_markers_say_their_heights(plane):
     flat = marker(TYPES, place, (0.1, 0.1, 0.0), type=CYLINDER, id=3)
     message.markers.append(flat)
     half = 0.1 * np.sqrt(2.0) if plane == 'xy' else 0.1
-    obstacles = MarkerTable().with_message(message, SECOND, plane, 0.0).obstacles(SECOND)
+    obstacles = MarkerTable().with_message(message, SECOND, plane).obstacles(SECOND, 0.0)
     assert_allclose(obstacles.heights, [[0.5 - half, 0.5 + half], [0.35, 0.65], UNKNOWN, UNKNOWN], rtol=1e-12)
-    assert MarkerTable().obstacles(SECOND).heights.shape == (0, 2)
+    assert MarkerTable().obstacles(SECOND, 0.0).heights.shape == (0, 2)
 
 
 def test_objects_and_detections_say_their_heights():

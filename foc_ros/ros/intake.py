@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -51,9 +50,7 @@ class Intake:
         self.sample: HandSample | None = None
         self._still: HandSample | None = None  # the first of those that were used with the same position as the last one
         self.last_refusal: str | None = None
-        self._markers = MarkerTable()
-        self._markers_ns = 0
-        self._markers_unchanged = (-math.inf, math.inf)
+        self._markers, self._expired = MarkerTable(), 0
         self._collisions = CollisionTable()
         self._counts: Counter[str] = Counter()
         self._handlers: dict[str, Callable[[Any, Place], SampleStatus]] = {
@@ -121,7 +118,7 @@ class Intake:
         if source == topics.COLLISION:
             self._collisions = CollisionTable()
         if source == 'markers':
-            self._markers, self._markers_ns, self._markers_unchanged = MarkerTable(), 0, (-math.inf, math.inf)
+            self._markers, self._expired = MarkerTable(), 0
 
     def _take_hand(self, message: Any, place: Place) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
@@ -133,8 +130,7 @@ class Intake:
         is_same = still is not None and (*still.position, still.height) == (*sample.position, sample.height)
         if status.is_taken and (not is_same or status.is_restart):
             self._still = sample
-        start_ns, end_ns = self._markers_unchanged
-        if status.is_taken and not start_ns <= self.sample.stamp_ns < end_ns:
+        if status.is_taken and self._markers.count_expired(sample.stamp_ns) != self._expired:
             self._set_markers(self._markers)
         return status
 
@@ -161,32 +157,34 @@ class Intake:
         return status
 
     def _ignore_small_steps_back(self, newest_ns: int, stamp_ns: int) -> int:
-        """Return a stamp, or the newest one if that is at most `estimator.gap_s` after it."""
+        """Return a stamp, or the newest one if that is at most `estimator.gap_s` after it.
+
+        Several publishers with different delays may add to a table: a stamp a little behind does not make it late.
+        """
         is_slightly_behind = stamp_ns and 0 < newest_ns - stamp_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS
         return newest_ns if is_slightly_behind else stamp_ns
 
     def _take_markers(self, message: Any, place: Place) -> SampleStatus:
-        config = self.pipeline.config
         # markers received before the working frame was known are discarded if they are in another frame
         before = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerTable()
-        markers = before.with_message(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev, place)
+        markers = before.with_message(message, self._now_ns(), self.pipeline.config.plane, place)
+        markers = replace(markers, stamp_ns=self._ignore_small_steps_back(before.stamp_ns, markers.stamp_ns))
         return self._count_dropped(topics.MARKERS, markers.dropped, self._set_markers(markers))
 
     def _set_markers(self, markers: MarkerTable) -> SampleStatus:
         """Pass the existing markers to the pipeline.
 
-        Several publishers with different delays may add to the table, so a stamp a little behind the newest one does not make the
-        table late. A table without markers is valid in every frame. One that has never held any is no source: many programs send
-        a DELETEALL once at their start, and no markers after it.
+        A table without markers is valid in every frame. One that has never held any is no source: many programs send a DELETEALL
+        once at their start, and no markers after it.
         """
-        stamp_ns = self._ignore_small_steps_back(self._markers_ns, markers.stamp_ns)
         frame_id = markers.frame_id if markers.markers else self.pipeline.frame_id or markers.frame_id
         now_ns = self._now_ns()
         status = SampleStatus.ACCEPTED
         if markers.markers or 'markers' in self.pipeline.scene.sources:
-            status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns or None, frame_id)
+            obstacles = markers.obstacles(now_ns, self.pipeline.config.scene.marker_radius_stddev)
+            status = self.pipeline.set_obstacles('markers', obstacles, markers.stamp_ns or None, frame_id)
         if status.is_taken:
-            self._markers, self._markers_ns, self._markers_unchanged = markers, stamp_ns, markers.find_unchanged_interval(now_ns)
+            self._markers, self._expired = markers, markers.count_expired(now_ns)
         return status
 
     def _now_ns(self) -> int:
