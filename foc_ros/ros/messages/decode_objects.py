@@ -135,12 +135,13 @@ class MarkerTable:
                 if lifetime_ns < 0:
                     raise MessageError(f'{name}.lifetime', 'at least 0 s (0: no end)', f'{lifetime_ns / NANOSECONDS:g} s')
                 held[key] = found, start_ns + lifetime_ns if lifetime_ns and start_ns else math.inf
-        _check_count('markers', len(held))
+        if len(held) > MAX_ROWS:
+            raise MessageError('markers', f'at most {MAX_ROWS} obstacles held at a time', len(held))
         return MarkerTable(held, frame_id, newest_ns, dropped)
 
     def obstacles(self, now_ns: int, radius_stddev: float) -> Obstacles:
         """Return the obstacles that exist at a time [ns]; the id of an obstacle is ns/id."""
-        outlines = {encode_name(ns, str(number)): found for (ns, number), (found, _) in self._find_existing(now_ns).items()}
+        outlines = {encode_name(*key): found for key, (found, _) in self._find_existing(now_ns).items()}
         return _collect(outlines, radius_stddev)
 
     def count_expired(self, now_ns: int) -> int:
@@ -204,13 +205,14 @@ class CollisionTable:
         else:
             before = held[name][1] if operation == APPEND and name in held else ()
             held[name] = pose, (*before, *_read_primitives(message, dropped))
-        _check_count('primitives', sum(len(parts) for _, parts in held.values()))
+        if (count := sum(len(parts) for _, parts in held.values())) > MAX_ROWS:
+            raise MessageError('primitives', f'at most {MAX_ROWS} obstacles held at a time', count)
         return CollisionTable(held, frame_id, stamp_ns, +dropped)
 
     def obstacles(self, plane: str, radius_stddev: float) -> Obstacles:
         """Return the primitives as obstacles; the name of one is the id of its object and its number in it."""
         outlines = {
-            encode_name(name, str(number)): outline((kind, size, pose.compose(own)), plane, 'primitives')
+            encode_name(name, number): outline((kind, size, pose.compose(own)), plane, 'primitives')
             for name, (pose, parts) in self.objects.items()
             for number, (kind, size, own) in enumerate(parts)
         }
@@ -260,15 +262,15 @@ def decode_detections(message: Any, plane: str, radius_stddev: float, place: Pla
             continue
         size = _read_sizes(f'{label}.bbox.size', _read(each.bbox.size))
         box = BOX, size, _read_pose(f'{label}.bbox.center', each.bbox.center, transform)
-        name = encode_name(str(each.id) or str(row))
+        name = encode_name(each.id or row)
         dropped['duplicate_id'] += outlines.pop(name, None) is not None
         outlines[name] = outline(box, plane, f'{label}.bbox.size')
     return DecodedCloud(_collect(outlines, radius_stddev), stamp_ns, frame_id, dict(+dropped))
 
 
-def encode_name(*parts: str) -> str:
+def encode_name(*parts: object) -> str:
     """Return the parts of a name joined by '/', without ';', which separates the labels of candidates."""
-    return '/'.join(part.replace('%', '%25').replace(';', '%3B') for part in parts)
+    return '/'.join(str(part).replace('%', '%25').replace(';', '%3B') for part in parts)
 
 
 def _read(vector: Any, axes: str = 'xyz') -> list[float]:
@@ -294,11 +296,6 @@ def _read_sizes(name: str, lengths: Iterable[float], parts: Iterable[str] = ('.x
         if not 0.0 <= length <= MAX_COORDINATE:
             raise MessageError(f'{name}{part}', f'a size in [0, {MAX_COORDINATE:g}] m', f'{length:g}')
     return sizes
-
-
-def _check_count(field: str, count: int) -> None:
-    if count > MAX_ROWS:
-        raise MessageError(field, f'at most {MAX_ROWS} obstacles held at a time', count)
 
 
 def _collect(outlines: Mapping[str, Outline], radius_stddev: float) -> Obstacles:

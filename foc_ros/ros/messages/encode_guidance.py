@@ -33,14 +33,13 @@ class Place:
 def encode_wrench(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/WrenchStamped without torque."""
     header = make_header(types, place.stamp_ns, place.frame_id)
-    return types.make('geometry_msgs/msg/WrenchStamped', header=header, wrench=encode_force(output, place, types))
+    return types.fill('geometry_msgs/msg/WrenchStamped', (header, encode_force(output, place, types)))
 
 
 def encode_force(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/Wrench without torque and without a stamp, as drivers of haptic devices take it."""
-    return types.make(
-        'geometry_msgs/msg/Wrench', force=types.fill('geometry_msgs/msg/Vector3', lift(output.force, 0.0, place.plane).tolist())
-    )
+    force = types.fill('geometry_msgs/msg/Vector3', lift(output.force, 0.0, place.plane).tolist())
+    return types.make('geometry_msgs/msg/Wrench', force=force)
 
 
 def encode_reference(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
@@ -69,12 +68,12 @@ def encode_guidance_markers(output: GuidanceOutput, place: Place, types: Message
     start = lift(output.position, place.height, place.plane)
     end = start + 0.02 * lift(output.force, 0.0, place.plane)
     reference = encode_reference(output, place, types)
-    shared = {'header': reference.header, 'lifetime': types.make('builtin_interfaces/msg/Duration', sec=1)}
+    shared = {'ns': 'guidance', 'header': reference.header, 'lifetime': types.make('builtin_interfaces/msg/Duration', sec=1)}
     points = [types.fill('geometry_msgs/msg/Point', each.tolist()) for each in (start, end)]
     arrow = {'pose': encode_pose(types, (0.0, 0.0, 0.0)), 'points': points}
     return [
-        make_marker(types, 'guidance', 0, ARROW, COLOUR, (0.004, 0.008, 0.0), **arrow, **shared),
-        make_marker(types, 'guidance', 1, SPHERE, COLOUR, (0.008, 0.008, 0.008), pose=reference.pose, **shared),
+        make_marker(types, COLOUR, (0.004, 0.008, 0.0), id=0, type=ARROW, **arrow, **shared),
+        make_marker(types, COLOUR, (0.008, 0.008, 0.008), id=1, type=SPHERE, pose=reference.pose, **shared),
     ]
 
 

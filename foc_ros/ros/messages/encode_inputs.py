@@ -14,12 +14,10 @@ from foc_ros.core.types import Array
 
 from .types import MessageTypes, make_header, make_marker
 
-_NAMES = ('x', 'y', 'z', 'radius', 'radius_stddev', 'id')
-_BOX_NAMES = ('size_x', 'size_y', 'yaw')
 _DATATYPES = {'<i4': 5, '<u4': 6, '<f4': 7}
-CLOUD_ROW = np.dtype([(name, '<i4' if name == 'id' else '<f4') for name in _NAMES])
+CLOUD_ROW = np.dtype([*((name, '<f4') for name in ('x', 'y', 'z', 'radius', 'radius_stddev')), ('id', '<i4')])
 """One circle of the `obstacles` table [m], and its id."""
-BOX_ROW = np.dtype([*CLOUD_ROW.descr, *((name, '<f4') for name in _BOX_NAMES)])
+BOX_ROW = np.dtype([*CLOUD_ROW.descr, *((name, '<f4') for name in ('size_x', 'size_y', 'yaw'))])
 """One obstacle of a table with boxes: circles have the sizes 0."""
 
 
@@ -47,18 +45,16 @@ def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Se
     Rows without the last three are circles. The message has their fields only if a row has a size. No row can tell the corners of
     a hull that is no box.
     """
-    is_box = any(any(row[len(_NAMES) : -1]) for row in rows)
-    table = (
-        [(*row, 0.0, 0.0, 0.0)[: len(_NAMES + _BOX_NAMES)] for row in rows] if is_box else [row[: len(_NAMES)] for row in rows]
-    )
-    return encode_table(types, make_header(types, stamp_ns, frame_id), np.array(table, dtype=BOX_ROW if is_box else CLOUD_ROW))
+    columns, count = (BOX_ROW, 9) if any(any(row[6:8]) for row in rows) else (CLOUD_ROW, 6)
+    table = np.array([(*row, 0.0, 0.0, 0.0)[:count] for row in rows], dtype=columns)
+    return encode_table(types, make_header(types, stamp_ns, frame_id), table)
 
 
 def encode_boxes(types: MessageTypes, stamp_ns: int, frame_id: str, boxes: Mapping[str, Sequence[float]]) -> Any:
     """Encode boxes by name, x, y, z of the centre and full lengths along these axes [m], as a MarkerArray of cubes."""
     header, cube, grey = make_header(types, stamp_ns, frame_id), 1, (0.45, 0.45, 0.5, 0.9)
     markers = [
-        make_marker(types, name, 0, cube, grey, box[3:], header=header, pose=encode_pose(types, box[:3]))
+        make_marker(types, grey, box[3:], ns=name, type=cube, header=header, pose=encode_pose(types, box[:3]))
         for name, box in boxes.items()
     ]
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)

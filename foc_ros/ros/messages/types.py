@@ -14,20 +14,13 @@ from collections.abc import Callable, Iterable
 from copy import copy
 from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
-
-
-class _Layout(NamedTuple):
-    """A message whose fields have their defaults, and the converter of each field."""
-
-    blank: Any
-    converters: dict[str, Callable[[Any], Any]]
 
 
 class MessageTypes(ABC):
@@ -42,27 +35,28 @@ class MessageTypes(ABC):
         Messages may share the values of their fields, so they must not be changed. rosbags knows no defaults but zero: give a
         Quaternion its w. Raises TypeError for a field that the type does not have.
         """
-        layout = self._find_layout(name)
-        if unknown := values.keys() - layout.converters.keys():
+        blank, converters = self._find_layout(name)
+        if unknown := values.keys() - converters.keys():
             raise TypeError(f'{name} has no field {", ".join(sorted(unknown))}')
-        message = copy(layout.blank)  # the constructors of rclpy make a default of every field, also of those that are given
+        message = copy(blank)  # the constructors of rclpy make a default of every field, also of those that are given
         for field, value in values.items():
-            setattr(message, field, layout.converters[field](value))
+            setattr(message, field, converters[field](value))
         return message
 
     def fill(self, name: str, values: Iterable[Any]) -> Any:
         """Create a message from the values of all its fields in their order, such as a Point from x, y and z."""
-        return self.make(name, **dict(zip(self._find_layout(name).converters, values, strict=True)))
+        return self.make(name, **dict(zip(self._find_layout(name)[1], values, strict=True)))
 
     def fill_each(self, name: str, rows: NDArray[np.float64]) -> list[Any]:
         """Create a message from each row of numbers (m, n), the values of all its n fields of floats; faster than `fill`."""
-        layout = self._find_layout(name)
-        message_class, fields = type(layout.blank), tuple(layout.converters)
+        blank, converters = self._find_layout(name)
+        message_class, fields = type(blank), tuple(converters)
         return [message_class(**dict(zip(fields, row, strict=True))) for row in rows.tolist()]
 
-    def _describe(self, name: str) -> _Layout:
+    def _describe(self, name: str) -> tuple[Any, dict[str, Callable[[Any], Any]]]:
+        """Return a message whose fields have their defaults, and the converter of each field."""
         blank, fields = self._make_blank(name)
-        return _Layout(blank, {field: _find_converter(getattr(blank, field)) for field in fields})
+        return blank, {field: _find_converter(getattr(blank, field)) for field in fields}
 
     @abstractmethod
     def _make_blank(self, name: str) -> tuple[Any, Iterable[str]]:
@@ -94,12 +88,11 @@ class RosbagsTypes(MessageTypes):
         if node.name == 'NAME':
             return self.make(detail)
         if node.name == 'BASE':
-            name = detail[0]
-            return '' if name == 'string' else False if name == 'bool' else 0 if name == 'byte' else np.zeros(1, name)[0].item()
+            return {'string': '', 'bool': False}.get(detail[0], 0.0 if detail[0].startswith('float') else 0)
         element, length = detail
-        default, count = self._find_default(element), length if node.name == 'ARRAY' else 0
-        is_numeric = isinstance(default, (int, float)) and element[1][0] not in ('bool', 'byte')
-        return np.zeros(count, element[1][0]) if is_numeric else [default] * count
+        count = length if node.name == 'ARRAY' else 0
+        is_number = element[0].name == 'BASE' and element[1][0] not in ('string', 'bool', 'byte')
+        return np.zeros(count, element[1][0]) if is_number else [self._find_default(element)] * count
 
 
 def find_message_class(name: str) -> Any:
@@ -128,16 +121,7 @@ def make_header(types: MessageTypes, stamp_ns: int, frame_id: str) -> Any:
     return types.fill('std_msgs/msg/Header', (stamp, frame_id))
 
 
-def make_marker(
-    types: MessageTypes, ns: str, identity: int, kind: int, colour: Iterable[float], scale: Iterable[float], **rest: Any
-) -> Any:
-    """Return a visualization_msgs/Marker; rest: its other fields."""
-    return types.make(
-        'visualization_msgs/msg/Marker',
-        ns=ns,
-        id=identity,
-        type=kind,
-        color=types.fill('std_msgs/msg/ColorRGBA', colour),
-        scale=types.fill('geometry_msgs/msg/Vector3', scale),
-        **rest,
-    )
+def make_marker(types: MessageTypes, colour: Iterable[float], scale: Iterable[float], **fields: Any) -> Any:
+    """Return a visualization_msgs/Marker; fields: its other ones."""
+    color, size = types.fill('std_msgs/msg/ColorRGBA', colour), types.fill('geometry_msgs/msg/Vector3', scale)
+    return types.make('visualization_msgs/msg/Marker', color=color, scale=size, **fields)
