@@ -46,7 +46,7 @@ ZEROS = 2
 
 @dataclass(frozen=True)
 class Newest:
-    """What guidance knows: the hand and when it was received, the prediction and when its hand was received [s, steady clock].
+    """What guidance knows: the hand and the prediction, and when the hand of each was received [s, steady clock].
 
     is_released: whether the clutch is open or the node is not active.
     """
@@ -84,7 +84,8 @@ class GuidanceLoop:
         self.output: GuidanceOutput | None = None
         self.place: Place | None = None
         self._publish, self._report, self._warn = publish, report, warn
-        self._priority, self._wanted_priority, self._has_warned = 0, 0, False
+        self._priority = self._wanted_priority = 0
+        self._has_warned = False
         self._state, self._zeros = GuidanceState(), ZEROS
         self._end, self._enabled = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
@@ -104,12 +105,15 @@ class GuidanceLoop:
     def reconfigure(self, config: Config) -> None:
         """Use other parameters."""
         self.newest = replace(self.newest, config=config)
-        self._wake()
+        if config.guidance.enabled:
+            self._enabled.set()
+        else:
+            self._enabled.clear()
 
     def start(self) -> None:
         """Begin to update."""
         self._end.clear()
-        self._wake()
+        self.reconfigure(self.newest.config)
         self._thread = threading.Thread(target=self._run, name='guidance', daemon=True)
         self._thread.start()
 
@@ -156,13 +160,6 @@ class GuidanceLoop:
             self.place = newest.place or self.place
             if self.place is not None:
                 self._publish(self.output, self.place)
-
-    def _wake(self) -> None:
-        """Let the thread update if guidance is enabled."""
-        if self.newest.config.guidance.enabled:
-            self._enabled.set()
-        else:
-            self._enabled.clear()
 
     def _run(self) -> None:
         """Update once in a period; a late update shifts the following ones."""

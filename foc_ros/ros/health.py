@@ -45,7 +45,7 @@ THROTTLE_S = 5.0
 
 @dataclass
 class Input:
-    """Messages of one input: how many were received, refused, and received before the last report.
+    """Messages of one input: numbers received, refused, and received before the last report.
 
     And when the last one was received, used and refused, and why it was refused.
     """
@@ -107,9 +107,9 @@ class Freshness:
         """
         hand, limit_s, age_s = self.inputs[HAND], config.estimator.hand_timeout_s, abs(self._age_s)
         limit, silence_s = f'(estimator.hand_timeout_s is {limit_s:g})', now_s - self.used_s(HAND, now_s)
-        if 0.0 < limit_s < silence_s and now_s - hand.refused_s <= limit_s:
-            return 'hand_refused', f'no hand_pose could be used for {silence_s:.1f} s, the last: {hand.refusal}'
         if 0.0 < limit_s < silence_s:
+            if now_s - hand.refused_s <= limit_s:
+                return 'hand_refused', f'no hand_pose could be used for {silence_s:.1f} s, the last: {hand.refusal}'
             return 'hand_silent', f'hand_pose silent for {silence_s:.1f} s {limit}'
         if self._has_ros_time and 0.0 < limit_s < age_s:
             relation = 'older' if self._age_s > 0.0 else 'newer'
@@ -139,7 +139,7 @@ class Freshness:
 
 
 class Health(NamedTuple):
-    """Level, summary and all values of the diagnostics."""
+    """The diagnostics."""
 
     level: int
     message: str
@@ -170,22 +170,21 @@ class Monitor:
         self._reported: Counter[str] = Counter()
         self._reported_s = now_s
 
-    def note_computed(self, prediction: Prediction, budget_s: float) -> None:
-        """Store how long a prediction was computed; budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit."""
+    def note_prediction(self, prediction: Prediction, start_s: float, now_s: float, budget_s: float, late: str | None) -> None:
+        """Count a prediction that was computed and published between two times.
+
+        budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit; late: why it was not published, None if it was.
+        """
         self._solve_ms.append(1e3 * prediction.solve_s)
         self.counts['predict_over_budget'] += 0.0 < budget_s < prediction.solve_s - 0.002
-
-    def note_prediction(self, prediction: Prediction, start_s: float, now_s: float) -> None:
-        """Count a prediction that was computed and published between two times."""
+        if late is not None:
+            self.counts['predict_too_late'] += 1
+            self._late = late
+            return
         self._prediction, self._predicted_s = prediction, now_s
         self.counts['predictions'] += 1
         self.counts.update(f'scene_{name}' for name in ('hand_inside', 'no_way') if prediction.notes.get(name))
         self._cycle_ms.append(1e3 * (now_s - start_s))
-
-    def note_late(self, reason: str) -> None:
-        """Count a prediction that was too old when it had been computed."""
-        self.counts['predict_too_late'] += 1
-        self._late = reason
 
     def note_error(self, error: BaseException) -> None:
         """Count an internal error."""
@@ -213,22 +212,18 @@ class Monitor:
         is_fresh = self._predicted_s is not None and now_s - self._predicted_s < BUSY_S
         if is_fresh and not recent['predict_over_budget'] and not recent['predict_too_late']:
             del recent[DROPPED]  # hand samples between predictions that are fresh are not missed
-        level, message = self._judge(recent, state, reasons)
+        if recent['internal_errors']:
+            level, message = ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
+        elif state != 'active' or not self._intake.pipeline.is_engaged:
+            level, message = OK, 'disengaged' if state == 'active' else f'{state}: nothing is predicted'
+        else:
+            faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
+            found = [*reasons, *(f'{name} {count}' for name, count in sorted(faults.items()))]
+            level, message = (WARN, '; '.join(found)) if found else (OK, 'predicting')
         self._reported, self._reported_s = totals, now_s
         for entry in self._freshness.inputs.values():
             entry.reported = entry.received
         return Health(level, '; '.join(filter(None, [message, self._intake.describe_still_hand()])), values)
-
-    def _judge(self, recent: Counter[str], state: str, reasons: list[str]) -> tuple[int, str]:
-        if recent['internal_errors']:
-            return ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
-        if state != 'active':
-            return OK, f'{state}: nothing is predicted'
-        if not self._intake.pipeline.is_engaged:
-            return OK, 'disengaged'
-        faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
-        parts = reasons + [f'{name} {count}' for name, count in sorted(faults.items())]
-        return (WARN, '; '.join(parts)) if parts else (OK, 'predicting')
 
     def _list_values(self, now_s: float, state: str, totals: Counter[str], recent: Counter[str]) -> dict[str, str]:
         pipeline, seconds = self._intake.pipeline, max(now_s - self._reported_s, 1e-3)

@@ -47,7 +47,7 @@ class TransformSource(Protocol):
 class Transforms:
     """Queues of messages, one for each input.
 
-    source: None if there is none; intake: that takes the messages. A hand pose that it will skip needs no transform.
+    source: of transforms, or None; intake: that takes the messages. A hand pose that it will skip needs no transform.
     """
 
     def __init__(self, source: TransformSource | None, intake: Intake) -> None:
@@ -88,7 +88,7 @@ class Transforms:
 
     def _find_place(self, role: str, message: Any, is_overdue: bool) -> tuple[Place, bool]:
         """Return the transforms for the headers of a message, and whether the newest one was taken for one of them."""
-        frame_id = self._intake.pipeline.frame_id
+        frame_id, tolerance_s = self._intake.pipeline.frame_id, self._intake.pipeline.config.frames.tolerance_s
         is_unneeded = role == HAND and self._intake.is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
             return stay, False
@@ -106,24 +106,17 @@ class Transforms:
             except TransformUnavailableError as reason:
                 if not is_overdue:
                     raise
-                found[given], is_inexact = self._find_newest(frame_id, *given, reason), True
+                found[given], is_inexact = self._source.look_up(frame_id, given[0], 0), True
+                late_s = (given[1] - found[given].stamp_ns) / NANOSECONDS
+                if abs(late_s) > tolerance_s:
+                    far = f'the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
+                    raise TransformUnavailableError(f'{reason}; {far} (frames.tolerance_s is {tolerance_s:g})') from None
 
         def place(header: Any) -> tuple[str, Transform]:
             transform = found.get(_identify(header))
             return stay(header) if transform is None else (frame_id, transform)
 
         return place, is_inexact
-
-    def _find_newest(self, target: str, source: str, stamp_ns: int, reason: Exception) -> Transform:
-        """Return the newest transform instead of that for a stamp [ns], if its stamp differs by the tolerance at most."""
-        assert self._source is not None
-        tolerance_s = self._intake.pipeline.config.frames.tolerance_s
-        newest = self._source.look_up(target, source, 0)
-        late_s = (stamp_ns - newest.stamp_ns) / NANOSECONDS
-        if abs(late_s) > tolerance_s:
-            text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
-            raise TransformUnavailableError(f'{text} (frames.tolerance_s is {tolerance_s:g})') from None
-        return newest
 
 
 def _identify(header: Any) -> tuple[str, int]:
