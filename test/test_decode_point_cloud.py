@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.ros.messages import decode_objects
-from foc_ros.ros.messages.decode_objects import MarkerTable
+from foc_ros.ros.messages.decode_objects import ObjectTable
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
 from foc_ros.ros.messages.plane import project
 
@@ -180,7 +180,7 @@ def test_the_number_of_obstacles_is_bounded(monkeypatch):
     monkeypatch.setattr(decode_objects, 'MAX_ROWS', 3)
     markers = after(marker_array(BAGS, *[marker(BAGS, id=i) for i in range(3)]))
     with pytest.raises(MessageError, match='markers: expected at most 3 obstacles held at a time, got 4'):
-        markers.with_message(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy')
+        markers.with_markers(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy')
 
 
 NAMES = ['x', 'y', 'z', 'radius', 'radius_stddev', 'id', 'vx', 'size_x', 'yaw', 'rgb']
@@ -210,9 +210,9 @@ def test_any_bytes_are_decoded_or_refused(layout, data, given_sizes):
 
 
 def after(*messages, now_ns=SECOND):
-    scene = MarkerTable()
+    scene = ObjectTable()
     for message in messages:
-        scene = scene.with_message(message, now_ns, 'xy')
+        scene = scene.with_markers(message, now_ns, 'xy')
     return scene
 
 
@@ -240,7 +240,7 @@ def test_a_tilted_cube_covers_its_projected_points_and_no_more(plane):
     for i in range(20):
         quaternion, size, centre = rng.normal(size=4) * (i > 0), rng.uniform(0.05, 0.4, 3), rng.normal(size=3)
         cube = marker(BAGS, centre, size, type=1, turned=dict(zip('xyzw', quaternion, strict=True)))
-        table = MarkerTable().with_message(marker_array(BAGS, cube), SECOND, plane).obstacles(SECOND, 0.0)
+        table = ObjectTable().with_markers(marker_array(BAGS, cube), SECOND, plane).obstacles(SECOND, 0.0)
         assert 4 <= table.corners[0] <= 6 and table.radius[0] == 0.0
         # an orientation that was never set is none
         rotation = Rotation.from_quat(quaternion).as_matrix() if i else np.eye(3)
@@ -263,7 +263,7 @@ def test_add_replaces_and_delete_removes():
     assert ids(after(first, marker_array(BAGS, marker(BAGS, id=9, action=2)))) == ('a/1', 'a/2')
     ordered = marker_array(BAGS, marker(BAGS, (1, 0, 0), id=1), marker(BAGS, id=1, action=2), marker(BAGS, (5, 0, 0), id=1))
     np.testing.assert_array_equal(after(ordered).obstacles(0, 0.0).centre, [[5, 0]])
-    scene.with_message(marker_array(BAGS, marker(BAGS, action=3, ns='')), SECOND, 'xy')
+    scene.with_markers(marker_array(BAGS, marker(BAGS, action=3, ns='')), SECOND, 'xy')
     assert ids(scene) == ('a/1', 'a/2'), 'an update does not change the old table'
 
 
@@ -277,7 +277,7 @@ def test_a_lifetime_starts_at_the_stamp_or_now_if_the_marker_has_none_and_the_ti
     scene = after(marker_array(BAGS, marker(BAGS, id=1, lifetime=0.5, stamp_ns=4 * SECOND), marker(BAGS, id=2)))
     for now_ns, expected in ((int(4.5 * SECOND) - 1, ('a/1', 'a/2')), (int(4.5 * SECOND), ('a/2',))):
         assert ids(scene, now_ns) == expected and scene.count_expired(now_ns) == 2 - len(expected)
-    assert list(scene.with_message(marker_array(BAGS), 5 * SECOND, 'xy').markers) == [('a', 2)]
+    assert list(scene.with_markers(marker_array(BAGS), 5 * SECOND, 'xy').held) == [('a', 2)]
     message = marker_array(BAGS, marker(BAGS, lifetime=0.5, stamp_ns=0))
     for known_ns, expected in ((7 * SECOND, [0, 1]), (0, [0, 0])):
         scene = after(message, now_ns=known_ns)
@@ -321,7 +321,7 @@ def test_another_type_replaces_an_obstacle_and_is_counted():
 def test_a_message_with_a_wrong_marker_is_refused(types, changes, words):
     scene = after(marker_array(types, marker(types, id=7)))
     with pytest.raises(MessageError, match=re.escape(words)):
-        scene.with_message(marker_array(types, marker(types, id=1), marker(types, id=2, **changes)), SECOND, 'xy')
+        scene.with_markers(marker_array(types, marker(types, id=1), marker(types, id=2, **changes)), SECOND, 'xy')
     assert ids(scene) == ('a/7',)
 
 

@@ -20,12 +20,12 @@ from foc_ros.core.config import Config
 from foc_ros.core.pipeline import SampleStatus
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.io.topics import CLOUD, COLLISION, DETECTIONS, HAND, MARKERS
+from foc_ros.io.topics import HAND
 
-from .intake import Intake
+from .intake import SOURCES, Intake
 from .messages.types import MessageTypes, make_header
 
-SOURCE_TOPICS = {'cloud': CLOUD, 'markers': MARKERS, COLLISION: COLLISION, DETECTIONS: DETECTIONS}
+SOURCE_TOPICS = {source: role for role, source in SOURCES.items()}
 """Topic of every source of obstacles in the scene."""
 WINDOW = 1000
 """Number of predictions over which the percentiles are computed."""

@@ -78,35 +78,43 @@ def outline(solid: Solid, plane: str, field: str) -> Outline:
     return Outline(middle, polygon, 0.0, make_heights((heights.min() + heights.max()) / 2.0, np.ptp(heights)))
 
 
-@dataclass(frozen=True)
-class MarkerTable:
-    """The present markers, updated as RViz updates its own.
+class Present(NamedTuple):
+    """A marker or a collision object.
 
-    A marker is identified by (ns, id). ADD inserts or replaces it, DELETE removes it, DELETEALL removes the markers of its ns, or
-    all of them if ns is empty. A marker with a lifetime expires when that has passed since its stamp.
-
-    markers: outline and end of the lifetime [ns], infinite if it does not expire, of each; frame_id: of all markers; stamp_ns:
-    newest stamp of the last message, 0 if it had none; dropped: markers of the last message that are no obstacles, by reason
-    (`not_finite`, `not_a_shape`).
+    outlines: of its obstacles, by their names; end_ns: of its lifetime; solids: of a collision object, relative to its pose.
     """
 
-    markers: Mapping[tuple[str, int], tuple[Outline, float]] = field(default_factory=dict)
+    outlines: dict[str, Outline]
+    end_ns: float = math.inf
+    solids: tuple[Solid, ...] = ()
+
+
+@dataclass(frozen=True)
+class ObjectTable:
+    """The present markers, updated as RViz updates its own, or the present collision objects.
+
+    held: markers by (ns, id), or objects by id; frame_id: of all of them; stamp_ns: newest stamp of the last message, 0 if it had
+    none; dropped: parts of the last message that are no obstacles, by reason (`not_finite`, `not_a_shape`).
+    """
+
+    held: Mapping[Any, Present] = field(default_factory=dict)
     frame_id: str = ''
     stamp_ns: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
 
-    def with_message(self, message: Any, now_ns: int, plane: str, place: Place = stay) -> MarkerTable:
+    def with_markers(self, message: Any, now_ns: int, plane: str, place: Place = stay) -> ObjectTable:
         """Return the table after a MarkerArray.
 
         now_ns: start of the lifetime of an unstamped marker; 0 if unknown, and the marker does not expire.
 
-        The radius of a sphere is half its largest scale, that of a cylinder half the larger of scale.x and scale.y; their
-        orientation is not used. A cylinder stands on the plane, with the height scale.z; the height of a sphere, and of any
-        marker without an extent along the normal, is not known. A cube is the convex hull of its corners, with the radius 0. A
-        marker with a number that is not finite is dropped, and the marker that it would replace stays. A marker of another type
-        replaces an obstacle, but is none; both are counted. Raises MessageError, and then nothing is changed, for an unknown
-        action, a negative scale or lifetime, a cube without an extent in the plane, a coordinate beyond MAX_COORDINATE, two
-        frames, or more markers than MAX_ROWS.
+        ADD inserts or replaces a marker, DELETE removes it, DELETEALL removes those of its ns, or all of them if ns is empty. A
+        marker with a lifetime expires when that has passed since its stamp. The radius of a sphere is half its largest scale,
+        that of a cylinder half the larger of scale.x and scale.y; their orientation is not used. A cylinder stands on the plane,
+        with the height scale.z; the height of a sphere, and of any marker without an extent along the normal, is not known. A
+        cube is the convex hull of its corners, with the radius 0. A marker with a number that is not finite is dropped, and the
+        marker that it would replace stays. A marker of another type replaces an obstacle, but is none; both are counted. Raises
+        MessageError, and then nothing is changed, for an unknown action, a negative scale or lifetime, a cube without an extent
+        in the plane, a coordinate beyond MAX_COORDINATE, two frames, or more markers than MAX_ROWS.
         """
         held = self._find_existing(now_ns)
         frame_id, newest_ns, dropped = self.frame_id, 0, Counter[str]()
@@ -134,15 +142,46 @@ class MarkerTable:
                 start_ns, lifetime_ns = stamp_ns or now_ns, int(marker.lifetime.sec) * NANOSECONDS + int(marker.lifetime.nanosec)
                 if lifetime_ns < 0:
                     raise MessageError(f'{name}.lifetime', 'at least 0 s (0: no end)', f'{lifetime_ns / NANOSECONDS:g} s')
-                held[key] = found, start_ns + lifetime_ns if lifetime_ns and start_ns else math.inf
+                end_ns = start_ns + lifetime_ns if lifetime_ns and start_ns else math.inf
+                held[key] = Present({encode_name(*key): found}, end_ns)
         if len(held) > MAX_ROWS:
             raise MessageError('markers', f'at most {MAX_ROWS} obstacles held at a time', len(held))
-        return MarkerTable(held, frame_id, newest_ns, dropped)
+        return ObjectTable(held, frame_id, newest_ns, dropped)
+
+    def with_collision_object(self, message: Any, plane: str, place: Place = stay) -> ObjectTable:
+        """Return the table after a CollisionObject; the name of an obstacle is the id of its object and its number in it.
+
+        ADD replaces an object, APPEND adds primitives to it, MOVE changes its pose, REMOVE removes it, or all if the id is empty.
+        Boxes, spheres and cylinders are obstacles; other primitives, meshes and planes are counted. Raises MessageError, and then
+        nothing is changed, for a wrong operation, number of dimensions or poses, size or coordinate, or another frame.
+        """
+        stamp_ns, name = decode_stamp(message.header), str(message.id)
+        frame_id, transform = place(message.header)
+        operation = message.operation[0] if isinstance(message.operation, bytes) else int(message.operation)
+        held, dropped = dict(self.held), Counter[str]()
+        if operation == REMOVE:
+            held = {other: kept for other, kept in held.items() if name not in ('', other)}
+            return ObjectTable(held, self.frame_id if held else frame_id, stamp_ns)
+        if operation not in (ADD, APPEND, MOVE):
+            raise MessageError('operation', 'ADD (0), REMOVE (1), APPEND (2) or MOVE (3)', operation)
+        if held and frame_id != self.frame_id:
+            raise MessageError('header.frame_id', f"'{self.frame_id}', as the other objects", f"'{frame_id}'")
+        if operation == MOVE and name not in held:
+            raise MessageError('id', 'an object that was added before it is moved', repr(name))
+        pose = _read_pose('pose', message.pose, transform)
+        solids = held[name].solids if operation != ADD and name in held else ()
+        if operation != MOVE:
+            solids = (*solids, *_read_primitives(message, dropped))
+        parts = {encode_name(name, i): (kind, size, pose.compose(own)) for i, (kind, size, own) in enumerate(solids)}
+        held[name] = Present({part: outline(solid, plane, 'primitives') for part, solid in parts.items()}, solids=solids)
+        if (count := sum(len(each.solids) for each in held.values())) > MAX_ROWS:
+            raise MessageError('primitives', f'at most {MAX_ROWS} obstacles held at a time', count)
+        return ObjectTable(held, frame_id, stamp_ns, +dropped)
 
     def obstacles(self, now_ns: int, radius_stddev: float) -> Obstacles:
-        """Return the obstacles that exist at a time [ns]; the id of an obstacle is ns/id."""
-        outlines = {encode_name(*key): found for key, (found, _) in self._find_existing(now_ns).items()}
-        return _collect(outlines, radius_stddev)
+        """Return the obstacles that exist at a time [ns]."""
+        parts = [part for each in self._find_existing(now_ns).values() for part in each.outlines.items()]
+        return _collect(dict(parts), radius_stddev)
 
     def count_expired(self, now_ns: int) -> int:
         """Return how many of the markers do not exist any more at a time [ns]."""
@@ -150,10 +189,10 @@ class MarkerTable:
 
     @cached_property
     def _ends(self) -> list[float]:
-        return sorted(expiry_ns for _, expiry_ns in self.markers.values())
+        return sorted(each.end_ns for each in self.held.values())
 
-    def _find_existing(self, now_ns: int) -> dict[tuple[str, int], tuple[Outline, float]]:
-        return {key: marker for key, marker in self.markers.items() if now_ns < marker[1]}
+    def _find_existing(self, now_ns: int) -> dict[Any, Present]:
+        return {key: each for key, each in self.held.items() if now_ns < each.end_ns}
 
 
 def _read_marker(marker: Any, name: str, plane: str, transform: Transform) -> Solid:
@@ -164,59 +203,6 @@ def _read_marker(marker: Any, name: str, plane: str, transform: Transform) -> So
     check_coordinates(f'{name}.pose.position', position.tolist())
     size = (max(size) / 2.0,) if marker.type == SPHERE else (z, max(x, y) / 2.0)
     return marker.type, size, Transform(UPRIGHT[plane], position)
-
-
-@dataclass(frozen=True)
-class CollisionTable:
-    """The present collision objects.
-
-    objects: pose of each by its id, and its primitives with poses relative to it; frame_id: of all objects; stamp_ns: of the last
-    message; dropped: parts of it that are no obstacles (`not_a_shape`).
-    """
-
-    objects: Mapping[str, tuple[Transform, tuple[Solid, ...]]] = field(default_factory=dict)
-    frame_id: str = ''
-    stamp_ns: int = 0
-    dropped: Mapping[str, int] = field(default_factory=dict)
-
-    def with_message(self, message: Any, place: Place = stay) -> CollisionTable:
-        """Return the table after a CollisionObject.
-
-        ADD replaces an object, APPEND adds primitives to it, MOVE changes its pose, REMOVE removes it, or all if the id is empty.
-        Boxes, spheres and cylinders are obstacles; other primitives, meshes and planes are counted. Raises MessageError, and then
-        nothing is changed, for a wrong operation, number of dimensions or poses, size or coordinate, or another frame.
-        """
-        stamp_ns, name = decode_stamp(message.header), str(message.id)
-        frame_id, transform = place(message.header)
-        operation = message.operation[0] if isinstance(message.operation, bytes) else int(message.operation)
-        held = dict(self.objects)
-        if operation == REMOVE:
-            held = {other: kept for other, kept in held.items() if name not in ('', other)}
-            return CollisionTable(held, self.frame_id if held else frame_id, stamp_ns)
-        if operation not in (ADD, APPEND, MOVE):
-            raise MessageError('operation', 'ADD (0), REMOVE (1), APPEND (2) or MOVE (3)', operation)
-        if held and frame_id != self.frame_id:
-            raise MessageError('header.frame_id', f"'{self.frame_id}', as the other objects", f"'{frame_id}'")
-        pose, dropped = _read_pose('pose', message.pose, transform), Counter[str]()
-        if operation == MOVE:
-            if name not in held:
-                raise MessageError('id', 'an object that was added before it is moved', repr(name))
-            held[name] = pose, held[name][1]
-        else:
-            before = held[name][1] if operation == APPEND and name in held else ()
-            held[name] = pose, (*before, *_read_primitives(message, dropped))
-        if (count := sum(len(parts) for _, parts in held.values())) > MAX_ROWS:
-            raise MessageError('primitives', f'at most {MAX_ROWS} obstacles held at a time', count)
-        return CollisionTable(held, frame_id, stamp_ns, +dropped)
-
-    def obstacles(self, plane: str, radius_stddev: float) -> Obstacles:
-        """Return the primitives as obstacles; the name of one is the id of its object and its number in it."""
-        outlines = {
-            encode_name(name, number): outline((kind, size, pose.compose(own)), plane, 'primitives')
-            for name, (pose, parts) in self.objects.items()
-            for number, (kind, size, own) in enumerate(parts)
-        }
-        return _collect(outlines, radius_stddev)
 
 
 def _read_primitives(message: Any, dropped: Counter[str]) -> list[Solid]:
