@@ -129,7 +129,7 @@ _STAMP = itemgetter(0)
 
 @dataclass
 class _Frame:
-    """A frame with its parent and its poses in it: stamp [ns], rotation, position (3,) [m] of each; a static one has one pose."""
+    """A frame with its parent and its poses in it, as (stamp [ns], rotation, position (3,) [m]); a static one has one pose."""
 
     parent: str
     is_static: bool
