@@ -234,14 +234,17 @@ ENDLESS_CONFIG = replace_values(Config(), {'estimator.hand_timeout_s': 0.0, 'sce
     ],
 )
 def test_poses_stamped_by_ros_time_are_judged_by_it(poses):
-    freshness = Freshness()
+    pipeline = Pipeline(FRESH_CONFIG)
+    freshness = Freshness(pipeline)
     for stamp_s, clock_s, is_restart, words in poses:
-        freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, is_restart=is_restart)
-        found = freshness.find_not_ready_reason(0.0, FRESH_CONFIG, ())
+        freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), is_restart=is_restart)
+        found = freshness.find_not_ready_reason(0.0)
         assert (found is not None) == bool(words) and words in (found or ('', ''))[1]
-        assert freshness.find_not_ready_reason(0.0, ENDLESS_CONFIG, ()) is None
+        pipeline.config = ENDLESS_CONFIG
+        assert freshness.find_not_ready_reason(0.0) is None
+        pipeline.config = FRESH_CONFIG
     freshness.forget_clock()
-    assert freshness.find_not_ready_reason(0.0, FRESH_CONFIG, ()) is None
+    assert freshness.find_not_ready_reason(0.0) is None
 
 
 def predictor_of_one_goal():

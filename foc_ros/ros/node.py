@@ -173,7 +173,7 @@ class FocNode(LifecycleNode):
 
     def _create_pipeline(self) -> None:
         self.pipeline = Pipeline(self._live_parameters.config, self._library)
-        self.intake, self._freshness = Intake(self.pipeline), Freshness()
+        self.intake, self._freshness = Intake(self.pipeline), Freshness(self.pipeline)
         self._monitor = Monitor(self.intake, self._freshness, monotonic())
         self._transforms = Transforms(self._tf, self.intake)
 
@@ -247,22 +247,17 @@ class FocNode(LifecycleNode):
             self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
         if status is None or not status.is_taken:
             return False
-        if role == HAND and self.intake.sample is not None:
+        if role == HAND and (sample := self.intake.sample) is not None:
             self._guidance.loop.note_hand(self.pipeline.hand_state, arrival.received_s)
-            clock_ns, timeout_s = self.get_clock().now().nanoseconds, self.pipeline.config.estimator.hand_timeout_s
-            self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, is_restart=status.is_restart)
+            self._freshness.note_pose(sample.stamp_ns, self.get_clock().now().nanoseconds, is_restart=status.is_restart)
         return True
-
-    def _find_clock_reason(self) -> tuple[str, str] | None:
-        """Return why the clocks allow no prediction, as (kind, text); the pipeline judges by stamps."""
-        return self._freshness.find_not_ready_reason(monotonic(), self.pipeline.config, self.pipeline.scene.sources)
 
     def _predict(self) -> None:
         """Begin a prediction if one is due; while one is being computed, its end begins the next."""
         if self.is_busy or not self.pipeline.is_due:
             return
         start_s = monotonic()
-        if (clock_reason := self._find_clock_reason()) is not None:
+        if (clock_reason := self._freshness.find_not_ready_reason(start_s)) is not None:
             self._monitor.counts[f'predict_{clock_reason[0]}'] += 1
             return
         try:
@@ -300,8 +295,8 @@ class FocNode(LifecycleNode):
         prediction, config = self.pipeline.finish(ended.task, ended.result.result), ended.task.config
         if prediction is None:
             return
-        now_s, clock_ns = monotonic(), self.get_clock().now().nanoseconds
-        late = self._freshness.find_late_reason(prediction.stamp_ns, ended.received_s, now_s, clock_ns, config)
+        clock_ns = self.get_clock().now().nanoseconds
+        late = self._freshness.find_late_reason(prediction.stamp_ns, ended.received_s, monotonic(), clock_ns)
         if late is None:
             self._guidance.loop.note_prediction(prediction, ended.received_s)
             # one after the other: the markers of 8 candidates take longer than all else, and come last
@@ -326,12 +321,11 @@ class FocNode(LifecycleNode):
     def _publish_health(self) -> None:
         self._receive(HAND)  # a hand whose poses wait here is not silent
         self._goal_topics.remove_absent()
-        clock_reason, now_s = self._find_clock_reason(), monotonic()
-        not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
+        now_s = monotonic()
         busy_s = 0.0 if self._computation is None else now_s - self._computation.start_s
         publishers = (*self._outputs.values(), *self._guidance.publishers.values())
         unheard = endpoints.report_unconnected(self, self._inputs, publishers, self._loggers)
-        health = self._monitor.report(now_s, self._state, not_ready_reason, busy_s, unheard)
+        health = self._monitor.report(now_s, self._state, busy_s, unheard)
         health.values.update(self._guidance.loop.describe())
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
         endpoints.publish(self, self._diagnostics, health.encode(name, stamp_ns, self._types))
@@ -344,7 +338,7 @@ class FocNode(LifecycleNode):
         return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        silent = self._freshness.find_silent_sources(monotonic(), self.pipeline.config, self.pipeline.scene.sources)
+        silent = self._freshness.find_silent_sources(monotonic())
         for source in silent:
             self.intake.remove_source(source)
         self._forget_movement()
