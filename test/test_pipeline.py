@@ -122,6 +122,8 @@ def test_a_table_that_never_held_a_marker_is_no_source(intake):
     assert seen(intake) == ('a/0',)
     assert show(intake, nothing) is SampleStatus.ACCEPTED
     assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
+    assert intake.take('collision_objects', collision_object(operation=1)) is SampleStatus.ACCEPTED
+    assert list(intake.pipeline.scene.sources) == ['markers'], 'nor is one of collision objects'
 
 
 def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):

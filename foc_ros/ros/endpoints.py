@@ -22,6 +22,7 @@ from foc_ros.core.solution import name_goal
 from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
 from .health import THROTTLE_S
+from .messages.decode_poses import decode_stamp
 from .messages.encode_guidance import TWIST_TYPE
 from .messages.encode_prediction import GOAL_LIKELIHOOD_TYPE, encode_goal_likelihoods
 from .messages.plane import Transform, compute_rotation
@@ -230,9 +231,8 @@ class TfListener:
             found = self._buffer.lookup_transform(target, source, Time(nanoseconds=stamp_ns))
         except self._unavailable as error:
             raise TransformUnavailableError(' '.join(str(error).split())) from None
-        shift = found.transform.translation
-        translation = np.array([shift.x, shift.y, shift.z])
-        return Transform(compute_rotation(found.transform.rotation), translation, Time.from_msg(found.header.stamp).nanoseconds)
+        shift, turn = found.transform.translation, found.transform.rotation
+        return Transform(compute_rotation(turn), np.array([shift.x, shift.y, shift.z]), decode_stamp(found.header))
 
     def set_transform(self, transform: Any, authority: str) -> None:
         """Take a transform from the listener."""
