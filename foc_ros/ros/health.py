@@ -147,9 +147,7 @@ class Health(NamedTuple):
 
     def encode(self, node_name: str, stamp_ns: int, types: MessageTypes) -> Any:
         """Return a diagnostic_msgs/DiagnosticArray with one status; node_name: the node's full name, such as '/foc'."""
-        values = [types.fill('diagnostic_msgs/msg/KeyValue', item) for item in self.values.items()]
-        parts = self.level, f'{node_name[1:]}: prediction', self.message, node_name, values
-        status = types.fill('diagnostic_msgs/msg/DiagnosticStatus', parts)
+        status = self.level, f'{node_name[1:]}: prediction', self.message, node_name, list(self.values.items())
         return types.fill('diagnostic_msgs/msg/DiagnosticArray', (make_header(types, stamp_ns, ''), [status]))
 
 

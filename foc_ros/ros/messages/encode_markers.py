@@ -26,7 +26,7 @@ from foc_ros.core.types import Array
 
 from .plane import lift
 from .ranking import describe_candidate, find_drawn_curve, order_candidates
-from .types import MessageTypes, make_header, make_marker
+from .types import MessageTypes, make_header
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
 """Types of markers."""
@@ -85,10 +85,8 @@ class _MarkerEncoder:
 
     def __init__(self, prediction: Prediction, plane: str, types: MessageTypes) -> None:
         self._prediction, self._plane, self._types = prediction, plane, types
-        self._shared = {
-            'header': make_header(types, prediction.stamp_ns, prediction.frame_id),
-            'lifetime': types.make('builtin_interfaces/msg/Duration', sec=int(LIFETIME_S)),
-        }
+        lifetime = types.make('builtin_interfaces/msg/Duration', sec=int(LIFETIME_S))
+        self._shared = {'header': make_header(types, prediction.stamp_ns, prediction.frame_id), 'lifetime': lifetime}
         # down in the plane, and towards a viewer who sees its first axis to the right
         self._down = lift([0.0, -1.0], 0.0, plane)
         self._towards = lift([0.0, 0.0], -1.0 if plane == 'xz' else 1.0, plane)
@@ -107,7 +105,7 @@ class _MarkerEncoder:
             colour, share, notes = GREY, '- %', f', {outcome.reason}'
         points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
-        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=self._encode_points(points))
+        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=points)
         if _is_labelled(outcome):
             words = describe_candidate(outcome, len(self._prediction.goal_positions))
             words = outcome.label if len(words) > MOST_LETTERS else words
@@ -170,7 +168,7 @@ class _MarkerEncoder:
                     yield self.encode(name, row, CYLINDER, colour, (diameter, diameter, TALL), centres[row] + shift)
                     continue
                 outline = self._lift(trace_obstacle(near, row, growth, 32))
-                middle, *edge = self._encode_points(np.vstack([centres[row], outline]))
+                middle, *edge = self._types.fill_each('geometry_msgs/msg/Point', np.vstack([centres[row], outline]))
                 corners = [corner for before, after in pairwise(edge) for corner in (middle, before, after)]
                 yield self.encode(name, row, TRIANGLES, colour, centre=shift, points=corners)
 
@@ -194,9 +192,8 @@ class _MarkerEncoder:
         x, y, z, w = PLANE_ROTATION[self._plane if kind == CYLINDER else 'xy']  # a cylinder stands on the plane
         sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
         turn = x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine, w * cosine - z * sine
-        orientation = self._types.fill('geometry_msgs/msg/Quaternion', turn)
-        pose = self._types.fill('geometry_msgs/msg/Pose', (*self._encode_points(centre[None]), orientation))
-        return make_marker(self._types, colour, scale, ns=name, id=identity, type=kind, pose=pose, **self._shared, **rest)
+        own = {'ns': name, 'id': identity, 'type': kind, 'color': colour, 'scale': scale, 'pose': (centre.tolist(), turn)}
+        return self._types.make('visualization_msgs/msg/Marker', **own, **self._shared, **rest)
 
     def _lift(self, positions: Array) -> Array:
         """Return positions in the plane (..., 2) as points in space, at the height of the hand."""
@@ -209,6 +206,3 @@ class _MarkerEncoder:
         heights = outcome.height.mean[:, 0]
         between = np.interp(np.linspace(0.0, 1.0, len(curve)), np.linspace(0.0, 1.0, len(heights)), heights)
         return lift(curve, between, self._plane)
-
-    def _encode_points(self, points: Array) -> list[Any]:
-        return self._types.fill_each('geometry_msgs/msg/Point', points)

@@ -121,8 +121,7 @@ def encode_likelihoods_by_name(prediction: Prediction, types: MessageTypes) -> A
     statuses = []
     for name, rows in (('goals', goals), ('classes', classes)):
         items = (rows | _list_shares(prediction)).items()
-        values = [types.fill('diagnostic_msgs/msg/KeyValue', (key, f'{share:.6g}')) for key, share in items]
-        statuses.append(types.make('diagnostic_msgs/msg/DiagnosticStatus', name=name, values=values))
+        statuses.append({'name': name, 'values': [(key, f'{share:.6g}') for key, share in items]})
     header = make_header(types, prediction.stamp_ns, prediction.frame_id)
     return types.fill('diagnostic_msgs/msg/DiagnosticArray', (header, statuses))
 
