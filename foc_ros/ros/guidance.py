@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -196,32 +196,20 @@ class GuidanceLoop:
 
 
 class GuidanceTopics:
-    """Publishes guidance for a node between `create` and `destroy`; `report` is called with an exception of an update.
+    """Publishes guidance for a node while `loop` runs; `report` is called with an exception of an update.
 
-    Attributes: loop, which has to be told what is new; publishers, by the name of the topic below the node's name.
+    publishers: of the node, by the name of the topic below the node's name. Attributes: loop, which has to be told what is new.
     """
 
-    def __init__(self, node: Node, config: Config, report: Callable[[Exception], None]) -> None:
-        self._node = node
+    def __init__(self, node: Node, publishers: Mapping[str, Any], config: Config, report: Callable[[Exception], None]) -> None:
+        self._node, self._publishers = node, publishers
         self._thread_types = RclpyTypes()  # messages of the thread of guidance; no other thread uses them
-        self.publishers: dict[str, Any] = {}
         self.loop = GuidanceLoop(config, self._publish_output, report, node.get_logger().warning)
 
-    def create(self) -> None:
-        """Create the publishers and begin to update."""
-        from .endpoints import create_publisher  # needs rclpy, and the loop does not
-
+    def list_kinds(self) -> dict[str, str]:
+        """Return the types of the outputs, by the names of their topics."""
         outputs = LIVE_OUTPUTS if self._node.get_parameter('guidance.unstamped').value else GUIDANCE_OUTPUTS
-        kinds = {name: kind for name, (kind, _) in outputs.items()} | {TWIST: TWIST_TYPE}
-        self.publishers = {name: create_publisher(self._node, name, kind) for name, kind in kinds.items()}
-        self.loop.start()
-
-    def destroy(self) -> None:
-        """End the updates and destroy the publishers."""
-        self.loop.stop()
-        for publisher in self.publishers.values():
-            self._node.destroy_publisher(publisher)
-        self.publishers = {}
+        return {name: kind for name, (kind, _) in outputs.items()} | {TWIST: TWIST_TYPE}
 
     def encode_markers(self, types: MessageTypes) -> list[Any]:
         """Return the markers of the last output, none if guidance is disabled or has no hand."""
@@ -247,9 +235,9 @@ class GuidanceTopics:
     def _publish_output(self, output: GuidanceOutput, place: Place) -> None:
         """Publish an output; this happens in the thread of guidance."""
         for name, (_, encode) in LIVE_OUTPUTS.items():
-            if name in self.publishers and self.publishers[name].get_subscription_count():
+            if name in self._publishers and self._publishers[name].get_subscription_count():
                 self._publish(name, encode(output, place, self._thread_types))
 
     def _publish(self, name: str, message: Any) -> None:
         if self._node.context.ok():
-            self.publishers[name].publish(message)
+            self._publishers[name].publish(message)

@@ -81,7 +81,7 @@ class FocNode(LifecycleNode):
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._goal_topics = endpoints.GoalTopics(self)
-        self._guidance = GuidanceTopics(self, self._live_parameters.config, self.report)
+        self._guidance = GuidanceTopics(self, self._outputs, self._live_parameters.config, self.report)
         try:
             self._tf: endpoints.TfListener | None = endpoints.TfListener(self, self._take_held)
         except ImportError:  # tf2 is optional
@@ -103,9 +103,10 @@ class FocNode(LifecycleNode):
         """Create the topics, and prepare what the first prediction needs."""
         try:
             warm_up(self._live_parameters.config)
-            self._outputs = {name: endpoints.create_publisher(self, name, kind) for name, (kind, _) in OUTPUTS.items()}
-            self._inputs = endpoints.create_subscriptions(self, self._receive)
-            self._guidance.create()
+            kinds = {name: kind for name, (kind, _) in OUTPUTS.items()} | self._guidance.list_kinds()
+            self._outputs.update({name: endpoints.create_publisher(self, name, kind) for name, kind in kinds.items()})
+            self._inputs.update(endpoints.create_subscriptions(self, self._receive))
+            self._guidance.loop.start()
         except Exception as error:
             self._destroy_topics()
             self._start_error = ' '.join(str(error).split())
@@ -180,13 +181,14 @@ class FocNode(LifecycleNode):
     def _destroy_topics(self) -> None:
         """Destroy what `on_configure` creates; a prediction that is being computed is abandoned."""
         self.pipeline.reset()
-        self._guidance.destroy()
+        self._guidance.loop.stop()
         for subscription in self._inputs.values():
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
         self._goal_topics.destroy()
-        self._inputs, self._outputs = {}, {}
+        self._inputs.clear()
+        self._outputs.clear()
 
     def _enter(self, state: str) -> TransitionCallbackReturn:
         self._state = state
@@ -300,7 +302,7 @@ class FocNode(LifecycleNode):
         if late is None:
             self._guidance.loop.note_prediction(prediction, ended.received_s)
             # one after the other: the markers of 8 candidates take longer than all else, and come last
-            for name in [name for name, publisher in self._outputs.items() if publisher.get_subscription_count()]:
+            for name in [name for name in OUTPUTS if self._outputs[name].get_subscription_count()]:
                 if name == 'markers' and abs(prediction.stamp_ns - self._drawn_ns) < DRAWN_S * NANOSECONDS:
                     continue
                 (message,) = encode_outputs(prediction, config.plane, self._types, [name]).values()
@@ -323,8 +325,7 @@ class FocNode(LifecycleNode):
         self._goal_topics.remove_absent()
         now_s = monotonic()
         busy_s = 0.0 if self._computation is None else now_s - self._computation.start_s
-        publishers = (*self._outputs.values(), *self._guidance.publishers.values())
-        unheard = endpoints.report_unconnected(self, self._inputs, publishers, self._loggers)
+        unheard = endpoints.report_unconnected(self, self._inputs, self._outputs.values(), self._loggers)
         health = self._monitor.report(now_s, self._state, busy_s, unheard)
         health.values.update(self._guidance.loop.describe())
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
