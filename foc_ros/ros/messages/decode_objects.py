@@ -41,7 +41,8 @@ POINT = np.zeros((1, 2))
 """The polygon of a circle."""
 CORNERS = np.array([*product((-0.5, 0.5), repeat=3)])
 """Corners of a box of the size 1."""
-UPRIGHT = {plane: np.outer(lift(np.zeros(2), 1.0, plane), [0.0, 0.0, 1.0]) for plane in ('xy', 'xz', 'yz')}
+NORMALS = {plane: lift(np.zeros(2), 1.0, plane) for plane in ('xy', 'xz', 'yz')}
+UPRIGHT = {plane: np.outer(normal, [0.0, 0.0, 1.0]) for plane, normal in NORMALS.items()}
 """Matrices whose last column, the axis of a cylinder, is the normal of each plane."""
 Solid = tuple[int, tuple[float, ...], Transform]
 """Type, size (lengths of a box, radius of a sphere, height and radius of a cylinder [m]) and pose."""
@@ -66,9 +67,10 @@ def outline(solid: Solid, plane: str, field: str) -> Outline:
     if kind == SPHERE:
         return Outline(centre, POINT, size[0], UNKNOWN_HEIGHTS)
     if kind == CYLINDER:
-        (length, radius), (axis, upright) = size, project(pose.rotation[:, 2], plane)
-        slope = math.hypot(*axis)
-        polygon = np.outer([0.5, -0.5], length * axis) if length * slope >= FLAT else POINT
+        (length, radius), axis = size, pose.rotation[:, 2]
+        upright = float(axis @ NORMALS[plane])
+        slope = math.sqrt(max(1.0 - upright**2, 0.0))
+        polygon = np.outer([0.5, -0.5], length * project(axis, plane)[0]) if length * slope >= FLAT else POINT
         return Outline(centre, polygon, radius, make_heights(height, length * abs(upright) + 2.0 * radius * slope))
     places, heights = project(pose.translation + CORNERS * size @ pose.rotation.T, plane)
     middle, polygon = make_hull_polygon(places)
@@ -180,8 +182,10 @@ class ObjectTable:
 
     def obstacles(self, now_ns: int, radius_stddev: float) -> Obstacles:
         """Return the obstacles that exist at a time [ns]."""
-        parts = [part for each in self._find_existing(now_ns).values() for part in each.outlines.items()]
-        return _collect(dict(parts), radius_stddev)
+        outlines: dict[str, Outline] = {}
+        for each in self._find_existing(now_ns).values():
+            outlines |= each.outlines
+        return _collect(outlines, radius_stddev)
 
     def count_expired(self, now_ns: int) -> int:
         """Return how many of the markers do not exist any more at a time [ns]."""
@@ -259,18 +263,20 @@ def encode_name(*parts: object) -> str:
     return '/'.join(str(part).replace('%', '%25').replace(';', '%3B') for part in parts)
 
 
-def _read(vector: Any, axes: str = 'xyz') -> list[float]:
-    return [getattr(vector, axis) for axis in axes]
+def _read(vector: Any) -> list[float]:
+    return [vector.x, vector.y, vector.z]
 
 
 def _is_finite(pose: Any, size: Any, *, is_turned: bool) -> bool:
-    numbers = [*_read(pose.position), *_read(size), *(_read(pose.orientation, 'xyzw') if is_turned else ())]
+    numbers = _read(pose.position) + _read(size)
+    if is_turned:
+        numbers += [*_read(pose.orientation), pose.orientation.w]
     return all(map(math.isfinite, numbers))
 
 
 def _read_pose(name: str, pose: Any, transform: Transform = NO_TRANSFORM) -> Transform:
     """Return a pose after a transform, if its numbers are within their bounds."""
-    check_coordinates(f'{name}.orientation', _read(pose.orientation, 'xyzw'))
+    check_coordinates(f'{name}.orientation', [*_read(pose.orientation), pose.orientation.w])
     found = transform.compose(Transform(compute_rotation(pose.orientation), np.array(_read(pose.position), dtype=float)))
     check_coordinates(f'{name}.position', found.translation.tolist())
     return found
