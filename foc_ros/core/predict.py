@@ -132,8 +132,7 @@ def predict(
         other=rest.other,
     )
     following = Tracks(
-        known.follow(predicted, matched, solved, stamp_ns),
-        absent,
+        *known.follow(predicted, matched, solved, absent, stamp_ns),
         stamp_ns,
         goals,
         obstacles,
