@@ -140,6 +140,20 @@ def test_the_share_grows_if_the_hand_goes_between_the_goals_and_falls_if_it_goes
     assert max(each.other for each in met) < 1.5 * PRIOR
 
 
+def test_a_goal_that_cannot_be_reached_makes_no_other_one_likelier():
+    """The hand moves to a goal within walls, and the only other one is as likely as if this goal were not there."""
+    corners = np.array([[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]])
+    sides = [np.array([corners[row - 1], corners[row]]) for row in range(4)]
+    walls = make_obstacles([[0.3, 0.0]] * 4, 0.005, ids=tuple('abcd'), polygons=sides)
+    mean = np.array([0.15, 0.0, 0.3, 0.0, 0.0, 0.0])
+    hand = HandState(0, mean, 1e-6 * np.eye(6), onset_ns=-NANOSECONDS // 2, onset_position=np.zeros(2))
+    free, within = [0.25, 0.2], [0.3, 0.0]
+    alone, beside = (predict(Config(), hand, walls, np.array(goals), NO_TRACKS)[0] for goals in ([free], [free, within]))
+    assert beside.goals[1].likelihood is None
+    assert beside.goals[0].likelihood == pytest.approx(alone.goals[0].likelihood, abs=0.005)
+    assert beside.other == pytest.approx(alone.other, abs=0.005) and alone.other > 2.0 * PRIOR
+
+
 def test_guidance_yields_to_another_goal():
     pull, shares, still = np.array([[0.0, 2.0]]), ((1.0, 0.0), (0.7, 0.3), (0.3, 0.7)), np.zeros(2)
     weights = [weigh_candidates(np.array([known]), pull, still, other=other) for known, other in shares]

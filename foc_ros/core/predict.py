@@ -102,7 +102,9 @@ def predict(
     rest = Rest(unknown)
     if unknown < 1.0:
         spread_m, prior = config.foc.endpoint_stddev, config.likelihood.other_goal
-        other = find_other_share(scene.hand, ends, scene.durations_s, prior, spread_m)
+        led_to = sorted({each.candidate.goal for each in compared if each.has_likelihood})
+        times_s = [scene.durations_s[goal] for goal in led_to]
+        other = find_other_share(scene.hand, ends[led_to], times_s, prior, spread_m)
         rest = Rest((1.0 - other) * unknown, other)
     known_share = 1.0 - sum(rest)
     shared = [replace(each, likelihood=known_share * each.likelihood) for each in pooled]
