@@ -252,7 +252,7 @@ def _hold_track(track: Track, candidate: Candidate, hand: HandState, reason: str
     rest = take_rest(track.solution, age_s, hand.mean[:2], reason)
     if rest is None:
         return None
-    return PredictedCandidate(candidate, rest, dict(candidate.sides), rest.expected_effort * rest.dt, 0.0, age_s, track.number)
+    return PredictedCandidate(candidate, rest, track.sides, rest.expected_effort * rest.dt, 0.0, age_s, track.number)
 
 
 def warm_up(config: Config) -> None:

@@ -54,7 +54,8 @@ class Track(Record):
     """A homotopy class that is followed.
 
     number: stays for as long as the class is followed; candidate: as it was last, at the stamp seen_ns; likelihood: its last one;
-    solution: the last one, found at solved_ns, None if there is none; has_failed: whether the class could not be solved since.
+    solution: the last one, found at solved_ns, None if there is none, and the sides on which it passes obstacles, by id;
+    has_failed: whether the class could not be solved since.
     """
 
     number: int
@@ -63,6 +64,7 @@ class Track(Record):
     likelihood: float = 0.0
     solution: Solution | None = None
     solved_ns: int = 0
+    sides: dict[str, int] = field(default_factory=dict)
     has_failed: bool = False
 
     def in_row(self, row: int) -> Track:
@@ -192,17 +194,18 @@ class Tracks(Record):
     def _hand_down(self, taking_part: Sequence[PredictedCandidate]) -> tuple[dict[int, float], float]:
         """Return the likelihoods before by the numbers of the tracks, and what belongs to tracks that no candidate continues.
 
-        Where two classes have become one, because an obstacle that told them apart is passed, their likelihoods are added.
+        Where two classes have become one, because the obstacle that told them apart is no more between their paths, their
+        likelihoods are added.
         """
-        before = {each.number: each.likelihood for each in (*self.followed, *self.absent)}
-        lost = 0.0
-        for track in (*self.followed, *self.absent):
-            if track.number in {each.way for each in taking_part}:
+        known, lost = (*self.followed, *self.absent), 0.0
+        before, present = {each.number: each.likelihood for each in known}, {each.way for each in taking_part}
+        for track in known:
+            if track.number in present:
                 continue
-            heirs = [each for each in taking_part if count_shared(track.candidate, each.candidate) is not None]
+            heirs = [each for each in taking_part if _inherits(each, track.candidate)]
             if heirs:
-                heir = max(heirs, key=lambda each: count_shared(track.candidate, each.candidate) or 0)
-                before[heir.way] = before.get(heir.way, 0.0) + track.likelihood
+                heir = max(heirs, key=lambda each: each.likelihood).way
+                before[heir] = before.get(heir, 0.0) + track.likelihood
             else:
                 lost += track.likelihood
         return before, lost
@@ -234,8 +237,9 @@ class Tracks(Record):
         for track, found in zip(matched, solved, strict=True):
             seen = Track(track.number, found.candidate, stamp_ns, likelihoods.get(track.number, 0.0))
             is_new = found.has_likelihood and not found.age_s
-            newest = (found.solution, stamp_ns) if is_new else (track.solution, track.solved_ns)
-            present.append(replace(seen, solution=newest[0], solved_ns=newest[1], has_failed=not found.has_likelihood))
+            newest = (found.solution, stamp_ns, found.sides) if is_new else (track.solution, track.solved_ns, track.sides)
+            known = replace(seen, solution=newest[0], solved_ns=newest[1], sides=newest[2])
+            present.append(replace(known, has_failed=not found.has_likelihood))
         return tuple(present), tuple(replace(each, likelihood=likelihoods.get(each.number, 0.0)) for each in absent)
 
     def _find_recent(self, stamp_ns: int) -> list[Track]:
@@ -251,6 +255,11 @@ def count_shared(before: Candidate, now: Candidate) -> int | None:
     if before.goal != now.goal or not agrees(frozenset(before.sides), frozenset(now.sides)):
         return None
     return min(len(before.sides), len(now.sides))
+
+
+def _inherits(candidate: PredictedCandidate, before: Candidate) -> bool:
+    """Tell whether the path of a candidate is in a class that was followed before."""
+    return candidate.candidate.goal == before.goal and before.contains(candidate.sides)
 
 
 def take_rest(solution: Solution, age_s: float, position: Array, reason: str) -> Solution | None:
