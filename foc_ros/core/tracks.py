@@ -258,7 +258,9 @@ def count_shared(before: Candidate, now: Candidate) -> int | None:
 
 
 def _inherits(candidate: PredictedCandidate, before: Candidate) -> bool:
-    """Tell whether the path of a candidate is in a class that was followed before."""
+    """Tell whether a candidate is a class that was followed before, under any name, or its path is in that class."""
+    if count_shared(before, candidate.candidate) is not None:
+        return True
     return candidate.candidate.goal == before.goal and before.contains(candidate.sides)
 
 
