@@ -105,6 +105,18 @@ def test_likelihoods_do_not_depend_on_the_side_on_which_a_path_ends_in_its_goal(
 
 TYPES = RosbagsTypes(TYPESTORE)
 LEFT_GOAL, RIGHT_GOAL, MIDDLE = (0.3, 0.25), (0.3, -0.25), (0.32, 0.0)
+
+
+@pytest.mark.parametrize('goals', [[0, 1], [1, 0]])
+@pytest.mark.parametrize('beside', [0.03, 0.1])
+def test_objects_that_mirror_each_other_are_equally_likely_goals(beside, goals):
+    """A path that ends in one of them passes it on neither side."""
+    places = np.array([[0.3, beside], [0.3, -beside]])
+    prediction = predict_in(make_obstacles(places, 0.03, 0.001, ids=('left', 'right')), places[goals])
+    one, other = (each.likelihood for each in prediction.goals)
+    assert one == pytest.approx(other, rel=1e-6)
+
+
 PRIOR = Config().likelihood.other_goal
 
 
