@@ -115,6 +115,18 @@ def test_likelihoods_do_not_depend_on_the_side_on_which_a_path_ends_in_its_goal(
 
 TYPES = RosbagsTypes(TYPESTORE)
 LEFT_GOAL, RIGHT_GOAL, MIDDLE = (0.3, 0.25), (0.3, -0.25), (0.32, 0.0)
+
+
+@pytest.mark.parametrize('goals', [[0, 1], [1, 0]])
+@pytest.mark.parametrize('beside', [0.03, 0.1])
+def test_objects_that_mirror_each_other_are_equally_likely_goals(beside, goals):
+    """A path that ends in one of them passes it on neither side."""
+    places = np.array([[0.3, beside], [0.3, -beside]])
+    prediction = predict_in(make_obstacles(places, 0.03, 0.001, ids=('left', 'right')), places[goals])
+    one, other = (each.likelihood for each in prediction.goals)
+    assert one == pytest.approx(other, rel=1e-6)
+
+
 PRIOR = Config().likelihood.other_goal
 
 
@@ -148,6 +160,20 @@ def test_the_share_grows_if_the_hand_goes_between_the_goals_and_falls_if_it_goes
     missed, met = reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL]), reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL, MIDDLE])
     assert missed[-1].other > 2.0 * PRIOR and met[-1].other < PRIOR / 4.0
     assert max(each.other for each in met) < 1.5 * PRIOR
+
+
+def test_a_goal_that_cannot_be_reached_makes_no_other_one_likelier():
+    """The hand moves to a goal within walls, and the only other one is as likely as if this goal were not there."""
+    corners = np.array([[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]])
+    sides = [np.array([corners[row - 1], corners[row]]) for row in range(4)]
+    walls = make_obstacles([[0.3, 0.0]] * 4, 0.005, ids=tuple('abcd'), polygons=sides)
+    mean = np.array([0.15, 0.0, 0.3, 0.0, 0.0, 0.0])
+    hand = HandState(0, mean, 1e-6 * np.eye(6), onset_ns=-NANOSECONDS // 2, onset_position=np.zeros(2))
+    free, within = [0.25, 0.2], [0.3, 0.0]
+    alone, beside = (predict(Config(), hand, walls, np.array(goals), NO_TRACKS)[0] for goals in ([free], [free, within]))
+    assert beside.goals[1].likelihood is None
+    assert beside.goals[0].likelihood == pytest.approx(alone.goals[0].likelihood, abs=0.005)
+    assert beside.other == pytest.approx(alone.other, abs=0.005) and alone.other > 2.0 * PRIOR
 
 
 def test_guidance_yields_to_another_goal():

@@ -105,6 +105,22 @@ def test_every_dead_man_condition_releases_the_hand_within_the_ramp(case, settin
     assert output.authority == 0.0
 
 
+@pytest.mark.parametrize('case', DEAD_MAN)
+def test_a_blended_command_does_not_jump_when_the_hand_is_released(case):
+    settings, command = GuidanceConfig(), np.array([0.1, 0.0])
+    state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0)))
+    changes, _ = DEAD_MAN[case]
+    before = (1.0 - state.authority) * command + state.authority * np.hypot(*command) * state.heading
+    assert state.authority * np.hypot(*state.heading) > 0.1, 'guidance has no share'
+    for _ in range(round(settings.ramp_s / PERIOD) + 1):
+        given = replace(given, t=given.t + PERIOD, **changes)
+        output, state = guide(Config(guidance=settings), state, given)
+        blended = output.blend_command(command)
+        assert np.hypot(*(blended - before)) <= 2.0 * np.hypot(*command) * PERIOD / settings.ramp_s * (1 + 1e-9)
+        before = blended
+    assert before.tolist() == command.tolist()
+
+
 SAMPLES, PERIOD = 12, 0.005
 HANDS = ('still', 'walks', 'flees', 'shakes', 'attacks', 'circles')
 

@@ -132,3 +132,18 @@ def test_a_class_that_misses_eta_takes_part_with_less_weight():
     likelihood = foc_ros.Config().likelihood
     weights = [each.cost**-likelihood.beta * math.exp(-likelihood.shortfall * each.solution.safety_shortfall) for each in found]
     np.testing.assert_allclose([each.likelihood for each in found], np.array(weights) / sum(weights))
+
+
+def test_a_path_counts_once_where_the_obstacle_between_two_classes_moves_out_of_the_way():
+    """The trolley is behind the goal before the hand arrives: its two sides are no choice, and those of the post are one."""
+    post, trolley = foc_ros.Circle((0.12, 0.005), 0.03, name='post'), foc_ros.Circle((0.25, 0.0), 0.02, velocity=(0.1, 0.0))
+    alone, beside = (foc_ros.solve_classes((0.0, 0.0), (0.3, 0.0), each) for each in ([post], [post, trolley]))
+    assert [each.sides['post'] for each in beside] == [each.sides['post'] for each in alone]
+    assert [each.likelihood for each in beside] == pytest.approx([each.likelihood for each in alone], abs=0.06)
+    predictor = foc_ros.Predictor(foc_ros.Config(budget_s=0.0))
+    predictor.set_goals((0.3, 0.0))
+    predictor.set_obstacles([post, trolley])
+    for tick in range(10):
+        prediction = predictor.update(0.01 * tick, (0.0, 0.0))
+        assert [each.sides['post'] for each in prediction.candidates] == [RIGHT, LEFT]
+        assert sum(each.likelihood for each in prediction.candidates) == pytest.approx(0.98, abs=1e-3)

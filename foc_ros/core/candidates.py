@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -69,7 +69,7 @@ def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier
     ]
     sides = _find_all_sides([each.path for each in starts], problems)
     return [
-        start if _is_in_class(each, found) else cold_start(each.guess)
+        start if each.contains(found) else cold_start(each.guess)
         for each, start, found in zip(candidates, starts, sides, strict=True)
     ]
 
@@ -84,13 +84,9 @@ def _find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list
     return [found[row] for row in range(len(problems))]
 
 
-def _is_in_class(candidate: Candidate, sides: Mapping[str, int]) -> bool:
-    return all(sides.get(identity, side) == side for identity, side in candidate.sides)
-
-
 def _classify(candidate: Candidate, solution: Solution, sides: dict[str, int]) -> PredictedCandidate:
     """Return a candidate with its solution, which passes obstacles on some sides. The status says if it left its class."""
-    if solution.status.has_likelihood and not _is_in_class(candidate, sides):
+    if solution.status.has_likelihood and not candidate.contains(sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
     return PredictedCandidate(candidate, solution, sides, solution.expected_effort * solution.dt, 0.0)
 
@@ -156,7 +152,7 @@ def _estimate(candidate: PredictedCandidate, known: PredictedCandidate) -> Predi
     failed = candidate.solution
     effort = compare_efforts(candidate.candidate, known) * known.cost / failed.dt
     mean = failed.mean
-    if not _is_in_class(candidate.candidate, candidate.sides):
+    if not candidate.candidate.contains(candidate.sides):
         mean = _derive_states(candidate.candidate.guess, failed.dt, mean.shape[1])
         mean[0] = failed.mean[0]
         mean = as_readonly(mean)
@@ -223,11 +219,19 @@ def estimate_unfollowed(
 
 
 def drop_duplicates(candidates: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
-    """Drop candidates that moved into a class that another candidate solved, so that no class is counted twice."""
-    if all(each.status is not Status.LEFT_CLASS for each in candidates):
-        return list(candidates)
-    solved = {_identify_class(each) for each in candidates if each.has_likelihood}
-    return [each for each in candidates if each.status is not Status.LEFT_CLASS or _identify_class(each) not in solved]
+    """Drop candidates whose paths are in the class of an earlier one, so that no class is counted twice.
+
+    The solver has moved a path into another class, or the obstacle that told two classes apart moves out of the way.
+    """
+    first: dict[tuple[int, frozenset[tuple[str, int]]], PredictedCandidate] = {}
+    for each in candidates:
+        if each.has_likelihood:
+            first.setdefault(_identify_class(each), each)
+    return [
+        each
+        for each in candidates
+        if first.get(_identify_class(each), each) is each or not (each.has_likelihood or each.status is Status.LEFT_CLASS)
+    ]
 
 
 def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple[str, int]]]:

@@ -102,7 +102,9 @@ def predict(
     rest = Rest(unknown)
     if unknown < 1.0:
         spread_m, prior = config.foc.endpoint_stddev, config.likelihood.other_goal
-        other = find_other_share(scene.hand, ends, scene.durations_s, prior, spread_m)
+        led_to = sorted({each.candidate.goal for each in compared if each.has_likelihood})
+        times_s = [scene.durations_s[goal] for goal in led_to]
+        other = find_other_share(scene.hand, ends[led_to], times_s, prior, spread_m)
         rest = Rest((1.0 - other) * unknown, other)
     known_share = 1.0 - sum(rest)
     shared = [replace(each, likelihood=known_share * each.likelihood) for each in pooled]
@@ -132,8 +134,7 @@ def predict(
         other=rest.other,
     )
     following = Tracks(
-        known.follow(predicted, matched, solved, stamp_ns),
-        absent,
+        *known.follow(predicted, matched, solved, absent, stamp_ns),
         stamp_ns,
         goals,
         obstacles,
@@ -251,7 +252,7 @@ def _hold_track(track: Track, candidate: Candidate, hand: HandState, reason: str
     rest = take_rest(track.solution, age_s, hand.mean[:2], reason)
     if rest is None:
         return None
-    return PredictedCandidate(candidate, rest, dict(candidate.sides), rest.expected_effort * rest.dt, 0.0, age_s, track.number)
+    return PredictedCandidate(candidate, rest, track.sides, rest.expected_effort * rest.dt, 0.0, age_s, track.number)
 
 
 def warm_up(config: Config) -> None:

@@ -154,7 +154,8 @@ class PredictedCandidate:
         Returns
         -------
         ndarray of shape (2, 2) or (q, 2, 2)
-            Covariance [m^2]: within a step the quintic through the values and their first two derivatives at both ends.
+            Covariance [m^2]: within a step the quintic through the values and their first two derivatives at both ends; evenly
+            between both values for a plant whose state has no acceleration.
 
         Raises
         ------

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -113,6 +113,10 @@ class Candidate(Record):
     def description(self) -> str:
         """The homotopy class in words, such as `goal0: left of l1, right of l2`."""
         return describe_class(self.sides, self.goal_name or name_goal(self.goal))
+
+    def contains(self, sides: Mapping[str, int]) -> bool:
+        """Tell whether a path is in this class that passes obstacles on these sides, LEFT or RIGHT by id."""
+        return all(sides.get(identity, side) == side for identity, side in self.sides)
 
 
 class Status(Enum):

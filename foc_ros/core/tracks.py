@@ -18,7 +18,7 @@ prediction, l_i before (0 for a new class), and the time h between both,
     l_i <- ((1 - g) l_i + g p_i) / sum,   g = min(1, h / (`FULL_CHANGE_S` max_i |p_i - l_i|)).
 
 Small changes are not delayed. With a new goal all likelihoods are those of this prediction, because a goal of which nothing was
-known is not unlikely.
+known is not unlikely. What a class had that no candidate continues was not won by the others: it counts as unknown before.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ class Track(Record):
     """A homotopy class that is followed.
 
     number: stays for as long as the class is followed; candidate: as it was last, at the stamp seen_ns; likelihood: its last one;
-    solution: the last one, found at solved_ns, None if there is none; has_failed: whether the class could not be solved since.
+    solution: the last one, found at solved_ns, None if there is none, and the sides on which it passes obstacles, by id;
+    has_failed: whether the class could not be solved since.
     """
 
     number: int
@@ -63,6 +64,7 @@ class Track(Record):
     likelihood: float = 0.0
     solution: Solution | None = None
     solved_ns: int = 0
+    sides: dict[str, int] = field(default_factory=dict)
     has_failed: bool = False
 
     def in_row(self, row: int) -> Track:
@@ -173,10 +175,10 @@ class Tracks(Record):
         self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int
     ) -> tuple[list[PredictedCandidate], Rest]:
         """Return candidates with likelihoods p_i with the likelihoods l_i, ranked, and what no candidate has likewise."""
-        known = (*self.followed, *self.absent)
-        before, goals = {each.number: each.likelihood for each in known}, {each.candidate.goal for each in known}
         taking_part = [each for each in predicted if each.has_likelihood]
-        old = np.array([*(before.get(each.way, 0.0) for each in taking_part), *self.rest])
+        before, lost = self._hand_down(taking_part)
+        goals = {each.candidate.goal for each in (*self.followed, *self.absent)}
+        old = np.array([*(before.get(each.way, 0.0) for each in taking_part), self.rest.unknown + lost, self.rest.other])
         change = np.array([*(each.likelihood for each in taking_part), *rest]) - old
         largest, allowed = float(abs(change).max()), self.measure_time(stamp_ns) / FULL_CHANGE_S
         is_new = all(each.way not in before for each in taking_part) or any(
@@ -188,6 +190,25 @@ class Tracks(Record):
         ranked = [replace(each, likelihood=factor * weight) for each, weight in zip(taking_part, weights, strict=True)]
         ranked.sort(key=lambda each: (-each.likelihood, each.label))
         return ranked + [each for each in predicted if not each.has_likelihood], Rest(factor * unknown, factor * other)
+
+    def _hand_down(self, taking_part: Sequence[PredictedCandidate]) -> tuple[dict[int, float], float]:
+        """Return the likelihoods before by the numbers of the tracks, and what belongs to tracks that no candidate continues.
+
+        Where two classes have become one, because the obstacle that told them apart is no more between their paths, their
+        likelihoods are added.
+        """
+        known, lost = (*self.followed, *self.absent), 0.0
+        before, present = {each.number: each.likelihood for each in known}, {each.way for each in taking_part}
+        for track in known:
+            if track.number in present:
+                continue
+            heirs = [each for each in taking_part if _inherits(each, track.candidate)]
+            if heirs:
+                heir = max(heirs, key=lambda each: each.likelihood).way
+                before[heir] = before.get(heir, 0.0) + track.likelihood
+            else:
+                lost += track.likelihood
+        return before, lost
 
     def choose_most_likely(self, predicted: Sequence[PredictedCandidate]) -> PredictedCandidate | None:
         """Return the most likely of ranked candidates; the one of before stays until another leads by more than `LEAD`."""
@@ -203,21 +224,23 @@ class Tracks(Record):
         predicted: Sequence[PredictedCandidate],
         matched: Sequence[Track],
         solved: Sequence[PredictedCandidate],
+        absent: Sequence[Track],
         stamp_ns: int,
-    ) -> tuple[Track, ...]:
-        """Return the tracks of the candidates after a prediction, with new solutions where there are.
+    ) -> tuple[tuple[Track, ...], tuple[Track, ...]]:
+        """Return the tracks of the candidates after a prediction, with new solutions where there are, and the absent ones.
 
         predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found, or
-        with the rest of what it had found before.
+        with the rest of what it had found before; absent: the tracks that are no candidates.
         """
         likelihoods = {each.way: each.likelihood for each in predicted}
         present = []
         for track, found in zip(matched, solved, strict=True):
             seen = Track(track.number, found.candidate, stamp_ns, likelihoods.get(track.number, 0.0))
             is_new = found.has_likelihood and not found.age_s
-            newest = (found.solution, stamp_ns) if is_new else (track.solution, track.solved_ns)
-            present.append(replace(seen, solution=newest[0], solved_ns=newest[1], has_failed=not found.has_likelihood))
-        return tuple(present)
+            newest = (found.solution, stamp_ns, found.sides) if is_new else (track.solution, track.solved_ns, track.sides)
+            known = replace(seen, solution=newest[0], solved_ns=newest[1], sides=newest[2])
+            present.append(replace(known, has_failed=not found.has_likelihood))
+        return tuple(present), tuple(replace(each, likelihood=likelihoods.get(each.number, 0.0)) for each in absent)
 
     def _find_recent(self, stamp_ns: int) -> list[Track]:
         """Return the tracks that were seen in the last `HOLD_S` before a stamp [ns]."""
@@ -232,6 +255,13 @@ def count_shared(before: Candidate, now: Candidate) -> int | None:
     if before.goal != now.goal or not agrees(frozenset(before.sides), frozenset(now.sides)):
         return None
     return min(len(before.sides), len(now.sides))
+
+
+def _inherits(candidate: PredictedCandidate, before: Candidate) -> bool:
+    """Tell whether a candidate is a class that was followed before, under any name, or its path is in that class."""
+    if count_shared(before, candidate.candidate) is not None:
+        return True
+    return candidate.candidate.goal == before.goal and before.contains(candidate.sides)
 
 
 def take_rest(solution: Solution, age_s: float, position: Array, reason: str) -> Solution | None:

@@ -98,12 +98,12 @@ def find_decisions(
 ) -> Decisions:
     """Find the decisions of classes that pass obstacles on sides (k, n) and lead to goals (k,), rows of goals (g, 2) [m].
 
-    The side 0, of an obstacle in which a path ends, decides nothing.
+    The side 0, of an obstacle in which a path ends, is neither of the two: to go there is a gap of its own.
     """
     here, start = hand.mean[:2], hand.mean[:2] if hand.onset_position is None else hand.onset_position
     direction = find_direction(start, goals)
     is_open = (sides == LEFT).any(axis=0) & (sides == RIGHT).any(axis=0)
-    open_obstacles, is_left = np.flatnonzero(is_open), sides[:, is_open] == LEFT
+    open_obstacles = np.flatnonzero(is_open)
     obstacles = obstacles.take(open_obstacles)
     row, along = find_rows(obstacles, direction, start, goals), obstacles.centre @ direction
     is_ahead = np.append(locate_rows(along, row) > here @ direction, False)[row]  # a wall is in the last row here
@@ -112,18 +112,18 @@ def find_decisions(
     if not len(order):
         number = np.unique(goal, return_inverse=True)[1]
         return Decisions(number, number, np.zeros(len(sides), dtype=np.intp))
-    row, is_left = row[order], is_left[:, order]
-    turns_back = np.zeros_like(is_left)
-    turns_back[:, 1:] = (is_left[:, 1:] > is_left[:, :-1]) & (row[1:] == row[:-1])
+    row, sides = row[order], sides[:, open_obstacles[order]]
+    turns_back = np.zeros(sides.shape, dtype=np.bool_)
+    turns_back[:, 1:] = (sides[:, 1:] == LEFT) & (sides[:, :-1] == RIGHT) & (row[1:] == row[:-1])
     begins = np.flatnonzero(np.diff(row, prepend=WALL))
     far_end = np.maximum.reduceat(_find_extents(obstacles.take(order), direction)[1], begins)
     is_passed = (goals @ direction)[goal][:, None] >= far_end
     woven = (np.logical_or.reduceat(turns_back, begins, axis=1) & is_passed).sum(axis=1)
     is_next = row == row[0]
-    return Decisions(_number_rows(is_left[:, is_next]), _number_rows(is_left), woven, open_obstacles[order[is_next]])
+    return Decisions(_number_rows(sides[:, is_next]), _number_rows(sides), woven, open_obstacles[order[is_next]])
 
 
-def _number_rows(table: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _number_rows(table: NDArray[np.int8]) -> NDArray[np.intp]:
     """Return a number (k,) for each row of a table (k, n), the same for equal rows."""
     numbers = dict[bytes, int]()
     return np.array([numbers.setdefault(each.tobytes(), len(numbers)) for each in table], dtype=np.intp)

@@ -182,14 +182,15 @@ def compute_branch_times(passages: Passages) -> BranchTimes:
     """Compute when the mean paths of candidates separate.
 
     Two paths from one hand pass an obstacle on different sides if the angles that they sweep about it differ by more than half a
-    turn. They separate at the first such obstacle, when the first of the two is nearest to it. A parabola through three
-    steps gives this time, so that it does not jump.
+    turn, or if one of them ends in it. They separate at the first such obstacle, when the first of the two is nearest to it. A
+    parabola through three steps gives this time, so that it does not jump.
     """
     if not len(passages.dt):
         return BranchTimes(np.zeros((0, 0)), np.zeros(0, dtype=np.intp))
     swept, is_passed = passages.swept, passages.is_passed
     passing_s = passages.dt[:, None] * _find_minima(passages.distance)
     is_opposite = (np.abs(swept[:, None] - swept) > np.pi) & is_passed[:, None] & is_passed
+    is_opposite |= is_passed[:, None] != is_passed
     after_s = np.where(is_opposite, np.minimum(passing_s[:, None], passing_s), np.inf).min(axis=2, initial=np.inf)
     return BranchTimes(after_s, np.isinf(after_s).argmax(axis=1))
 

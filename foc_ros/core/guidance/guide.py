@@ -55,6 +55,9 @@ EVIDENCE = 1.5
 LATE_PERIODS = 2.0
 """Longest time between two updates for which the tank is guaranteed, in periods of `guidance.rate_hz`."""
 
+HEADING_M = 0.02
+"""How far ahead on the paths a heading points at least [m]."""
+
 
 class GuidanceStatus(StrEnum):
     """What guidance does. All but GUIDING are dead-man conditions, in which the force becomes zero within `guidance.ramp_s`.
@@ -145,7 +148,8 @@ class Followed(Record):
 class GuidanceState(Record):
     """What the next update needs of this one.
 
-    energy: content of the tank [J], None before the first update; t, position (2,), force (2,) and authority: of the last update.
+    energy: content of the tank [J], None before the first update; t, position (2,), force (2,), authority and heading (2,): of
+    the last update.
     """
 
     energy: float | None = None
@@ -153,6 +157,7 @@ class GuidanceState(Record):
     position: Array = field(default_factory=lambda: np.zeros(2))
     force: Array = field(default_factory=lambda: np.zeros(2))
     authority: float = 0.0
+    heading: Array = field(default_factory=lambda: np.zeros(2))
     followed: Followed = field(default_factory=Followed)
 
 
@@ -185,16 +190,18 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
         progress = advance_progress(followed.paths, followed.progress, given.position, given.velocity, dt)
         followed = replace(followed, progress=progress)
         demand = _compute_demand(settings, followed, seen, given)
-    target = demand.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
+    target, heading = demand.force, demand.heading
+    if status is not GuidanceStatus.GUIDING:  # a command in which the share of guidance falls to zero keeps its direction
+        target, heading = _release(settings, state.force, dt), turn_along(seen, HEADING_M * state.heading, state.heading)
     longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
     force = step_force(state.force, target, settings.slew * min(dt, longest), partial(_find_bound, settings, seen, energy))
     change = dt / settings.ramp_s
     authority = state.authority + min(max(demand.authority - state.authority, -change), change)
     reference = given.position + find_deflection(demand.stiffness, force)
     output = GuidanceOutput(
-        given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, demand.heading, energy
+        given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, heading, energy
     )
-    return output, GuidanceState(energy, given.t, given.position, force, authority, followed)
+    return output, GuidanceState(energy, given.t, given.position, force, authority, heading, followed)
 
 
 def find_status(settings: GuidanceConfig, given: GuidanceInput) -> GuidanceStatus:
@@ -257,7 +264,7 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
     forces = (stiffness @ errors[..., None])[..., 0]
     weights = weigh_candidates(paths.likelihoods, forces, given.acceleration, *shares)
     force, agreement = combine(weights, forces, find_crossing(need, errors))
-    places = paths.locate(np.maximum(ahead, progress + 0.02))  # a heading points at least 20 mm ahead
+    places = paths.locate(np.maximum(ahead, progress + HEADING_M))
     lines = paths.interpolate(paths.points, places) - given.position
     heading = paths.likelihoods @ normalize(lines)
     return _Demand(
