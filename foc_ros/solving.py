@@ -78,8 +78,8 @@ def solve(
     start : array_like of shape (2,) or (6,)
         Position of a hand at rest [m], or its state x, y, vx, vy, ax, ay [m, m/s, m/s^2].
     goal : array_like of shape (2,), or Goal
-        Position at which the hand comes to rest [m]. An obstacle that holds it, or that a `Goal` names as its object, does not
-        block the path to it.
+        Position at which the hand comes to rest [m]. An obstacle that holds it, now and when the hand is there, or that a `Goal`
+        names as its object, does not block the path to it.
     obstacles : iterable of Circle, Box, Capsule and Hull, or one of them, or Obstacles
         The obstacles.
     eta : float, optional

@@ -51,6 +51,16 @@ def test_the_object_of_a_goal_blocks_all_goals_but_its_own(hand_radius):
     assert {each.candidate.sides[0][0] for each in to_back} == {'front'}
 
 
+@pytest.mark.parametrize(('speed', 'is_goal'), [(0.0, True), (0.02, True), (0.2, False)])
+def test_an_obstacle_that_moves_on_before_the_hand_is_there_is_not_the_goal(speed, is_goal):
+    cup = foc_ros.Circle((0.3, 0.0), 0.03, 0.001, velocity=(-speed, 0.0), name='cup')
+    named = foc_ros.Goal((0.3, 0.0), object='cup')
+    for goal, is_in_the_way in (((0.3, 0.0), not is_goal), (named, False)):
+        for found in foc_ros.solve_classes((0.0, 0.0), goal, cup, duration_s=1.2):
+            centre = np.array([0.3, 0.0]) - found.times[:, None] * [speed, 0.0]
+            assert (np.hypot(*(found.mean[:, :2] - centre).T).min() > 0.03) == is_in_the_way
+
+
 def test_an_obstacle_is_the_goal_that_the_grown_obstacle_holds():
     beside = np.array([[0.235, 0.0]])
     assert find_holders(beside, CUPS).tolist() == [[False, False]]

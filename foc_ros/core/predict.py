@@ -187,7 +187,7 @@ def _prepare_scene(
     cleared = heights.find_cleared(grown, goals, durations_s)
     blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
     near = cull_obstacles(blocking, hand.mean[:2], goals, max(durations_s), config.scene.max_obstacles)
-    in_the_way = take_in_the_way(near, goals, objects)
+    in_the_way = take_in_the_way(near, goals, durations_s, objects)
     return _PredictionScene(hand, goals, durations_s, blocking, near, in_the_way, cleared, heights, covariances, objects)
 
 
@@ -269,9 +269,14 @@ def _find_durations(hand: HandState, goals: Array, known: Tracks, config: Config
     return [limit_change(each, known.durations_s.get(goal, each), elapsed_s) for goal, each in enumerate(durations)]
 
 
-def take_in_the_way(obstacles: Obstacles, goals: Array, objects: Sequence[str | None] = ()) -> list[Obstacles]:
-    """Return for each of the goals (g, 2) [m] the obstacles on the way to it: all but those that hold it, or are its object."""
-    holds = find_holders(goals, obstacles, objects)
+def take_in_the_way(
+    obstacles: Obstacles, goals: Array, times_s: Sequence[float], objects: Sequence[str | None] = ()
+) -> list[Obstacles]:
+    """Return for each of the goals (g, 2) [m] the obstacles on the way to it: all but those that hold it, or are its object.
+
+    times_s: the time to go to each goal [s].
+    """
+    holds = find_holders(goals, obstacles, objects, times_s)
     return [obstacles.take(np.flatnonzero(~each)) if each.any() else obstacles for each in holds]
 
 

@@ -24,7 +24,7 @@ from .types import Array
 def build_scene_problems(scene: ReachingScene) -> list[Problem]:
     """Return the problem of every goal. An uncertain start is as uncertain to the operator, so it counts in the constraint."""
     config = scene.config
-    in_the_way = take_in_the_way(scene.avoided, scene.goals, scene.goal_objects)
+    in_the_way = take_in_the_way(scene.avoided, scene.goals, [scene.duration_s] * len(scene.goals), scene.goal_objects)
     problems = [
         build_problem(config, scene.hand, around, goal, scene.duration_s)
         for around, goal in zip(in_the_way, scene.goals, strict=True)
@@ -46,7 +46,7 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
     """
     config, avoided = scene.config, scene.avoided
     if scene.guess is not None:
-        in_the_way = take_in_the_way(avoided, scene.goals, scene.goal_objects)[0]
+        in_the_way = take_in_the_way(avoided, scene.goals, [scene.duration_s], scene.goal_objects)[0]
         candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, in_the_way),)
     else:
         timing, turn = GuessTiming([scene.duration_s] * len(scene.goals), config.foc.steps), Turn(objects=scene.goal_objects)

@@ -39,7 +39,8 @@ class Goal(Record):
         What `Prediction.goals`, descriptions and pictures call the goal; by default ``goal0`` and so on, by its place in the list
         of goals. Labels keep this number.
     object : str, optional
-        Name of an obstacle that is this goal, even if it does not hold the position: it does not block the way to this goal.
+        Name of an obstacle that is this goal, even if it does not hold the position, or moves away from it: it does not block
+        the way to this goal.
 
     Raises
     ------

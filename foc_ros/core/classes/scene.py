@@ -93,7 +93,7 @@ class SearchScene:
         kept = {*self._near.ids}
         self._others = obstacles.take([row for row, name in enumerate(obstacles.ids) if name not in kept])
         self._clearance, self._max_states = config.clearance, STATES + STATES_PER_CANDIDATE * config.max_candidates
-        blocks = ~find_holders(goals, self._now, objects)
+        blocks = ~find_holders(goals, self._now, objects, duration_s)
         self.names = find_names(self._hand, self._goals, self._near, blocks, config.clearance, previous)
         ids, fitting = {*obstacles.ids}, [each for each in previous if each.goal < len(goals)]
         known = [PathClass(each.length, each.label, each.goal, each.sides, each.guess, each) for each in fitting]

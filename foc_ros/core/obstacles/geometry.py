@@ -124,9 +124,17 @@ def measure_offsets(points: Array, obstacles: Obstacles, centres: Array | None =
     return offsets, found.distance
 
 
-def find_holders(goals: Array, obstacles: Obstacles, objects: Sequence[str | None] = ()) -> NDArray[np.bool_]:
-    """Tell which of n obstacles are goals (g, 2) [m], (g, n): those that hold a goal, or are named as the object of it."""
+def find_holders(
+    goals: Array, obstacles: Obstacles, objects: Sequence[str | None] = (), times_s: Sequence[float] = ()
+) -> NDArray[np.bool_]:
+    """Tell which of n obstacles are goals (g, 2) [m], (g, n): those that hold a goal, or are named as the object of it.
+
+    times_s: the time to go to each goal [s], at which an obstacle has to hold it, too: one that moves over a goal is not the goal.
+    """
     is_held: NDArray[np.bool_] = measure_offsets(goals, obstacles)[1] < obstacles.radius
+    if len(times_s) and obstacles.velocity.any():
+        centres = obstacles.centre + np.reshape(times_s, (-1, 1, 1)) * obstacles.velocity
+        is_held &= measure_offsets(goals, obstacles, centres)[1] < obstacles.radius
     for row, name in enumerate(objects):
         if name is not None:
             is_held[row] |= np.array([each == name for each in obstacles.ids], dtype=bool)
