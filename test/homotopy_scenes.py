@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes for the tests of the homotopy classes, and a brute-force search for these that shares nothing with the package."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -42,16 +41,6 @@ def find(
 def measure_clear(path: np.ndarray, obstacles: Obstacles, clearance: float = CLEARANCE) -> float:
     """Least distance of a path's points from the obstacles with the clearance [m]."""
     return float((measure_offsets(path, obstacles)[1] - obstacles.radius - clearance).min())
-
-
-def avoiding() -> tuple[Obstacles, np.ndarray]:
-    """The six cylinders and four goals of the Avoiding task."""
-    with (AVOIDING / 'obstacles.csv').open() as file:
-        rows = list(csv.DictReader(file))
-    with (AVOIDING / 'goals.csv').open() as file:
-        goals = [[float(row['x_m']), float(row['y_m'])] for row in csv.DictReader(file)]
-    centre, radius = [[float(row['x_m']), float(row['y_m'])] for row in rows], [float(row['radius_m']) for row in rows]
-    return make_obstacles(centre, radius, ids=tuple(row['obstacle'] for row in rows)), np.array(goals)
 
 
 HAND = np.zeros(2)
