@@ -24,27 +24,22 @@ SHAPES: dict[str, list[Shape]] = {
 STARTS = {'certain': np.zeros((6, 6)), 'uncertain': 1e-6 * (np.eye(6) + 0.3)}
 
 
-def make_problem(name, start):
-    """Return a problem, and a control (2N,) in units of `Horizon.gain` that passes near its obstacle."""
-    obstacles = collect_obstacles(SHAPES[name])
-    made = reach(obstacles, goal=GOAL, steps=STEPS, noise=(0.1, 0.15), initial_covariance=STARTS[start])
-    solution = solved(made, bowed((0, 0), GOAL, STEPS, 0.08), 'fixed', tau=1e-3, lam=1e4)
+def make_problem(name, start, mass=None):
+    """Return a problem, and a control (2N,) in units of `Horizon.gain` that passes near its obstacle; mass: a damped one."""
+    obstacles, noise = collect_obstacles(SHAPES[name]), np.array([0.1, 0.15])
+    if mass is None:
+        made = reach(obstacles, goal=GOAL, steps=STEPS, noise=noise, initial_covariance=STARTS[start])
+    else:
+        horizon = condense(discretise_damped_mass(1.0 / STEPS, mass, 4.0), STEPS)
+        made = rest_to_goal(horizon, np.zeros(4), np.array(GOAL), obstacles, noise, 0.9)
+    solution = solved(made, bowed((0, 0), GOAL, STEPS, 0.08), 'fixed', tau=1e-3, lam=1e4 if mass is None else 10.0)
     return made, solution.control.T.ravel() * made.horizon.gain
 
 
-def make_mass_problem(name):
-    """Return the same for a damped mass."""
-    horizon = condense(discretise_damped_mass(1.0 / STEPS, 1.5, 4.0), STEPS)
-    made = rest_to_goal(horizon, np.zeros(4), np.array(GOAL), collect_obstacles(SHAPES[name]), np.array([0.1, 0.15]), 0.9)
-    solution = solved(made, bowed((0, 0), GOAL, STEPS, 0.08), 'fixed', tau=1e-3, lam=10.0)
-    return made, solution.control.T.ravel() * horizon.gain
-
-
 MADE = {
-    **{f'{name}, {start} start': (make_problem, name, start) for name in SHAPES for start in STARTS},
-    **{f'{name}, damped mass': (make_mass_problem, name) for name in ('circle', 'box')},
+    **{f'{name}, {start} start': (name, start) for name in SHAPES for start in STARTS},
+    **{f'{name}, damped mass': (name, 'certain', 1.5) for name in ('circle', 'box')},
 }
-EVERY = pytest.mark.parametrize('case', MADE)
 
 
 def linearise(margins, control, times, k=K, slides=True, is_free=False):
@@ -77,10 +72,6 @@ def find_least(margins, control, time, is_free=False):
     return time, float(values.min())
 
 
-def random_directions(control, count=3):
-    return np.abs(control).max() * np.random.default_rng(2).standard_normal((count, len(control)))
-
-
 def is_smooth(margins, control, time):
     """Return whether the nearest point is on one side or one corner around a time."""
     none, times = np.zeros(5, dtype=np.intp), time + np.linspace(-0.1, 0.1, 5)
@@ -90,7 +81,8 @@ def is_smooth(margins, control, time):
 
 def check_derivatives(made, control, find, least, rate, within):
     """Compare the derivatives at a control with differences of `find`, a function of the control, times a rate."""
-    for direction in 1e-3 * random_directions(control):
+    directions = np.random.default_rng(2).standard_normal((3, len(control)))
+    for direction in 1e-3 * np.abs(control).max() * directions:
         more, less = (find(control + sign * direction) for sign in (1, -1))
         along = made.factors[0] @ direction
         added = made.diagonal[0] @ direction**2 + along @ made.weights[0] @ along
@@ -98,15 +90,14 @@ def check_derivatives(made, control, find, least, rate, within):
         assert added == pytest.approx(-rate * (more - 2 * least + less), rel=2e-2, abs=within)
 
 
-@EVERY
+@pytest.mark.parametrize('case', MADE)
 @pytest.mark.parametrize('is_free', [False, True], ids=['margin', 'safety factor'])
 def test_the_hessian_is_that_of_the_least_margin_which_slides_or_of_the_least_safety_factor(case, is_free):
     """Second differences of G(u) = min_t g(u, t), minus those that a unit of the multiplier adds to the Lagrangian.
 
     Where the safety factor is free, those of min_t k(u, t), times the rate r by which a margin falls with k.
     """
-    make, *given = MADE[case]
-    problem, control = make(*given)
+    problem, control = make_problem(*MADE[case])
     margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
     for near in list_minima(margins, control):
         time, least = find_least(margins, control, near, is_free)
