@@ -16,7 +16,8 @@ from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, wr
 from message_helpers import marker, marker_array, read_columns, transform
 from rosbags.highlevel import AnyReader
 
-from foc_ros.analysis.replay import Replay, replay
+import foc_ros
+from foc_ros.analysis.replay import Replay
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, GuidanceConfig, replace_values
 from foc_ros.io.bags import BagReader
@@ -121,7 +122,7 @@ def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path):
             message.header.frame_id = '/tool'
         given.append((topic, stamp_ns, message))
     bag, config = write_bag(tmp_path / 'slashes', given), replace_values(CONFIG, {'frame_id': '/world'})
-    assert len(list(replay(bag, config))) == len(reach(FEW))
+    assert len(list(foc_ros.replay(bag, config))) == len(reach(FEW))
 
 
 def test_a_hand_that_does_not_move_is_told(tmp_path, capsys):
@@ -203,7 +204,7 @@ def test_an_independent_reader_finds_topics_counts_and_numbers_in_the_output_bag
     information = yaml.safe_load((tmp_path / 'out' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
     assert (information['version'], information['storage_identifier']) == (9, 'mcap')
     assert (information['message_count'], information['relative_file_paths']) == (sum(map(len, found.values())), ['out.mcap'])
-    for prediction, cloud in zip(replay(bag, CONFIG), found['/foc/prediction'], strict=True):
+    for prediction, cloud in zip(foc_ros.replay(bag, CONFIG), found['/foc/prediction'], strict=True):
         table, first = read_columns(cloud), next(each for each in prediction if each.label == prediction.most_likely)
         assert np.allclose(table['x'][table['candidate'] == 0], first.mean[:, 0], atol=1e-6)
         assert np.allclose(table['likelihood'][table['candidate'] == 0], first.likelihood)
@@ -254,9 +255,9 @@ def test_the_transforms_of_a_recording_are_applied(tmp_path, capsys):
     items = sorted([*seen_by_camera(messages(0.24)), *transforms], key=lambda item: item[1])
     config = replace_values(CONFIG, {'frame_id': FRAME})
     bag, still = write_bag(tmp_path / 'moving', items), write_bag(tmp_path / 'still', messages(0.24))
-    moving = list(replay(bag, config))
+    moving = list(foc_ros.replay(bag, config))
     assert len(moving) == len(reach(0.24))
-    by_stamp = {each.stamp_ns: each for each in replay(still, config)}
+    by_stamp = {each.stamp_ns: each for each in foc_ros.replay(still, config)}
     for prediction in moving[2:]:
         (obstacle,), (expected,) = (each.obstacles.centre for each in (prediction, by_stamp[prediction.stamp_ns]))
         np.testing.assert_allclose(obstacle, expected, atol=1e-6)
