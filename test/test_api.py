@@ -269,8 +269,8 @@ def solve_with(**changed):
 
 NO_GOALS = [], [(0.3, 0.0, 0.1, 0.0)], [(0.3, float('inf'))], [(0.3, 0.0, float('nan'))], 0.3
 NO_SCENES = [
-    ({'obstacles': [(0.1, 0.0, 0.02)]}, 'obstacles'),
-    ({'obstacles': [CUP, CUP]}, r'obstacles\.ids'),
+    ({'obstacles': [(0.1, 0.0, 0.02)]}, r'obstacles\[0\]'),
+    ({'obstacles': [CUP, CUP]}, 'obstacles'),
     ({'start': [0.0, 0.0, 0.0, 0.0]}, 'start'),
     ({'start': (0.0, float('nan'))}, 'start'),
     ({'start': (0.15, 0.0)}, 'start'),

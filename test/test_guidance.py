@@ -52,20 +52,22 @@ def test_the_stiffness_is_linear_in_the_precision_between_its_bounds(stddev, sha
     assert stiffness[0] == pytest.approx(share * 100.0 * np.eye(2), abs=1e-3)
 
 
-def test_a_force_is_the_mean_of_those_that_help_times_its_expected_benefit():
-    none = np.zeros(2, dtype=bool)
-    force, agreement = combine(np.array([0.6, 0.4]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
-    assert (force[0], agreement) == (pytest.approx(1.4), pytest.approx(1.0))
-    force, agreement = combine(np.array([0.6, 0.2]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
-    assert (force[0], agreement) == (pytest.approx(0.6 * 1.25), pytest.approx(0.6)), 'nobody knows for 0.2'
-    for opposing in (0.5, 0.4):
-        force, _ = combine(np.array([0.5, opposing]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
-        assert force.tolist() == [0.0, 0.0], 'it helps with a probability of one half at most'
-    force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
-    assert (force[1], agreement) == (pytest.approx(0.5 / 0.75 * 0.5), pytest.approx(0.5))
-    force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]), np.array([False, True]))
-    assert (force[1], agreement) == (pytest.approx(0.5), pytest.approx(0.5))
-    assert combine(np.array([0.75, 0.25]), np.zeros((2, 2)), none)[1] == 1.0, 'none pulls'
+@pytest.mark.parametrize(
+    ('weights', 'forces', 'is_crossing', 'force', 'expected'),
+    [
+        pytest.param([0.6, 0.4], [1.0, 2.0], False, 1.4, 1.0, id='both help'),
+        pytest.param([0.6, 0.2], [1.0, 2.0], False, 0.6 * 1.25, 0.6, id='nobody knows for 0.2'),
+        pytest.param([0.5, 0.5], [1.0, -1.0], False, 0.0, None, id='it helps with one half'),
+        pytest.param([0.5, 0.4], [1.0, -1.0], False, 0.0, None, id='it helps with one half at most'),
+        pytest.param([0.75, 0.25], [1.0, -1.0], False, 0.5 / 0.75 * 0.5, 0.5, id='one is against it'),
+        pytest.param([0.75, 0.25], [1.0, -1.0], True, 0.5, 0.5, id='the other leads across an obstacle'),
+        pytest.param([0.75, 0.25], [0.0, 0.0], False, 0.0, 1.0, id='none pulls'),
+    ],
+)
+def test_a_force_is_the_mean_of_those_that_help_times_its_expected_benefit(weights, forces, is_crossing, force, expected):
+    found, agreement = combine(np.array(weights), np.array([[0.0, each] for each in forces]), np.array([False, is_crossing]))
+    assert found == pytest.approx([0.0, force])
+    assert expected is None or agreement == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(('across', 'odds'), [(0.0, 3.0), (EVIDENCE, 3.0 * np.e**2), (-EVIDENCE, 3.0 / np.e**2)])
