@@ -39,7 +39,6 @@ def find(
 
 
 def measure_clear(path: np.ndarray, obstacles: Obstacles, clearance: float = CLEARANCE) -> float:
-    """Least distance of a path's points from the obstacles with the clearance [m]."""
     return float((measure_offsets(path, obstacles)[1] - obstacles.radius - clearance).min())
 
 

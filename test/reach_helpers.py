@@ -26,14 +26,13 @@ KINDS = {'': Circle, 'box': Box, 'capsule': Capsule, 'circle': Circle, 'hull': H
 
 def reference_cases() -> list:
     """Return the reference cases as pytest parameters: ours, and those of an optional folder, skipped where it is absent."""
-    cases = [pytest.param(case, id=f'case{i}') for i, case in enumerate(json.loads(REFERENCE.read_text('utf-8')))]
-    if not MORE_REFERENCE.is_file():
-        reason = 'optional data: ../shared/reference/cases.json is absent'
-        return [*cases, pytest.param({}, id='shared', marks=pytest.mark.skip(reason=reason))]
-    return [
-        *cases,
-        *(pytest.param(case, id=f'shared{i}') for i, case in enumerate(json.loads(MORE_REFERENCE.read_text('utf-8')))),
-    ]
+    files = {name: file for name, file in (('case', REFERENCE), ('shared', MORE_REFERENCE)) if file.is_file()}
+    found = {name: json.loads(file.read_text('utf-8')) for name, file in files.items()}
+    cases = [pytest.param(case, id=f'{name}{row}') for name, given in found.items() for row, case in enumerate(given)]
+    if 'shared' not in found:
+        absent = pytest.mark.skip(reason='optional data: ../shared/reference/cases.json is absent')
+        cases.append(pytest.param({}, id='shared', marks=absent))
+    return cases
 
 
 def bowed(start, goal, steps: int, amplitude: float) -> np.ndarray:

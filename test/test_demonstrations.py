@@ -186,7 +186,6 @@ MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)
 
 
 def find_taken(prediction):
-    """Return the candidate on the sides of the recording."""
     return next(each for each in prediction.candidates if dict(each.candidate.sides).items() <= sides_of(ABOVE).items())
 
 

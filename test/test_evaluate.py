@@ -56,7 +56,6 @@ def evaluate(data, *options, code=0, workers='--workers=1'):
 
 @pytest.fixture(scope='module')
 def whole(tmp_path_factory):
-    """Return the answer about the three reaches."""
     return evaluate(write_three(tmp_path_factory.mktemp('whole') / 'data'))
 
 

@@ -143,8 +143,8 @@ def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does():
         exact = one.covariance[:, :2, :2]
         assert_allclose(other.covariance[:, :2, :2], exact, atol=0.03 * np.abs(exact).max())
         assert other.likelihood == pytest.approx(one.likelihood, rel=1e-6)
-    noise = make_plant_model(config.foc).compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
-    exact = TRIPLE_INTEGRATOR.compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
+    models = make_plant_model(config.foc), TRIPLE_INTEGRATOR
+    noise, exact = (model.compute_process_covariance(0.02, STEPS, False)[:, 0, 0] for model in models)
     assert_allclose(noise, exact, atol=0.02 * exact.max())
 
 

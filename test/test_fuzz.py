@@ -177,7 +177,6 @@ def write_recording(folder, source):
 
 
 def change_bytes(data, source):
-    """Change bits, cut the end, or leave out or double a part."""
     start, size, kind = source.randrange(len(data)), source.choice((1, 9, 200)), source.randrange(4)
     if kind == 0:
         changed = bytearray(data)
@@ -190,7 +189,6 @@ def change_bytes(data, source):
 
 
 def change_records(data, source):
-    """Leave out or double one record of an MCAP file."""
     places = [8]
     while places[-1] < len(data) - 8:
         places.append(places[-1] + 9 + struct.unpack_from('<Q', data, places[-1] + 1)[0])

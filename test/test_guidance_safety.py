@@ -58,7 +58,6 @@ def test_ten_thousand_hostile_hands(batch):
 
 
 def build_guiding_state(config):
-    """Return a state with a force near the largest one."""
     candidate = outcome('goal0:', 1.0)
     mean = candidate.mean.copy()
     mean[:, :2] = np.column_stack([np.linspace(0.0, 0.3, len(mean)), np.full(len(mean), 0.05)])

@@ -135,7 +135,6 @@ def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(monk
 
 @pytest.mark.parametrize('horizon_s', [1000.0, 0.0])
 def test_what_is_seen_and_not_followed_is_unknown(horizon_s):
-    """The share of the classes that are not followed is about what they have where they are, by the same rule."""
     config = replace_values(SHARE_CONFIG, {'likelihood.planning_horizon_s': horizon_s})
     whole, one = ask(config), ask(replace_values(config, {'homotopy.max_candidates': 1}))
     assert whole.unknown == 0.0 and len(whole.candidates) == 4 and len(one.candidates) == 1

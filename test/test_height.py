@@ -57,7 +57,6 @@ def boxes(*heights, x=0.2, velocity=0.0):
 
 
 def predict_over(obstacles, height, goal_height, **changes):
-    """Return the prediction of a hand at a height that goes to a goal at another one."""
     config = replace_values(CONFIG, PRECISE | {name.replace('__', '.'): value for name, value in changes.items()})
     return predict(config, hand_at(height), obstacles, GOAL, NO_TRACKS, goal_heights=np.array([goal_height]))[0]
 

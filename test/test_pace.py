@@ -108,7 +108,6 @@ DISPERSION_CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 
 
 
 def place_hand(stamp_ns, position=(0.0, 0.0)):
-    """Return a moving hand at a position."""
     mean = np.array([*position, 0.0, 0.0, 0.0, 0.0])
     return HandState(stamp_ns, mean, np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 
@@ -144,7 +143,6 @@ AROUND = move_along(np.column_stack([x := np.linspace(0.0, 0.3, 101), 0.06 * np.
 
 
 def reach_around(pipeline):
-    """Pass a reach around an obstacle through a pipeline that predicts; return the predictions."""
     return follow(pipeline, AROUND, goals=GOAL, obstacles=make_obstacles([[0.15, 0.0]], 0.03, 0.001), is_predicting=True)
 
 

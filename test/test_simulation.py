@@ -52,7 +52,6 @@ class Misled(Assistance):
     """Takes a wrong way to be the likeliest, and draws back."""
 
     def compute_force(self, step, position, velocity, acceleration):
-        """Return a constant force."""
         self.is_wrong = True
         return np.array([-1.0, 0.0])
 

@@ -55,7 +55,6 @@ def write_metadata(folder, names, count):
 
 
 def write_either(file):
-    """Write an MCAP or an SQLite file."""
     file.parent.mkdir(exist_ok=True)
     if file.suffix == '.mcap':
         write_mcap(file, SHORT)
@@ -65,7 +64,6 @@ def write_either(file):
 
 
 def change_rows(database, statement, values):
-    """Change the rows of a file that is written, and close it."""
     database.executemany(statement, values)
     database.commit()
     database.close()
