@@ -265,6 +265,7 @@ def test_every_plane_has_the_same_heights(plane):
     assert made.cleared == expected.cleared == (True, True, False)
     for one, other in zip(made.candidates, expected.candidates, strict=True):
         assert one.height is not None and other.height is not None
+        assert_allclose(one.mean, other.mean, atol=1e-9)
         assert_allclose(one.height.mean, other.height.mean, atol=1e-12)
         assert_allclose(one.height.covariance, other.height.covariance, atol=1e-12)
     rows = np.frombuffer(encode_outputs(made, plane, TYPES, ['prediction'])['prediction'].data, CLOUD_ROW)
