@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.core.config import FocConfig
+import foc_ros
+from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
@@ -64,6 +65,14 @@ def make_shape(kind: str = '', **fields) -> Shape:
 
 def case_guess(case: dict) -> np.ndarray:
     return bowed(case['start'], case['goal'], case['steps'], case['guess']['amplitude'])
+
+
+def make_predictor(config: Config, goals, obstacles=None) -> foc_ros.Predictor:
+    predictor = foc_ros.Predictor(config)
+    predictor.set_goals(goals)
+    if obstacles is not None:
+        predictor.set_obstacles(obstacles)
+    return predictor
 
 
 def reach(

@@ -12,6 +12,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from prediction_samples import outcome, prediction
+from reach_helpers import make_predictor
 
 import foc_ros
 import foc_ros.api
@@ -54,10 +55,7 @@ def test_the_import_is_lazy_and_fast():
 
 
 def predictor_of_one_cup():
-    predictor = foc_ros.Predictor(FAST)
-    predictor.set_goals([(0.3, 0.0)])
-    predictor.set_obstacles([CUP])
-    return predictor
+    return make_predictor(FAST, [(0.3, 0.0)], [CUP])
 
 
 def test_a_predictor_follows_a_movement_and_forgets_it():
@@ -98,9 +96,8 @@ def test_a_sample_that_cannot_be_used_is_refused_and_changes_nothing(t, position
 
 
 def test_an_outlier_is_refused_and_the_movement_goes_on():
-    predictor, plain = foc_ros.Predictor(FAST), foc_ros.Predictor(FAST)
+    predictor, plain = (make_predictor(FAST, [(0.3, 0.0)]) for _ in range(2))
     for each in (predictor, plain):
-        each.set_goals([(0.3, 0.0)])
         each.update(0.0, (0.0, 0.0))
     with pytest.raises(foc_ros.InputError, match=r'^position: expected a position within 0\.11 m .*, got one that is 0\.115 m'):
         predictor.update(0.02, (0.069, 0.092))
@@ -169,10 +166,7 @@ TWO = [Goal((0.3, -0.1), name='bowl'), (0.3, 0.1)]
 @pytest.fixture(scope='module')
 def predicted():
     """Predict towards two goals, of which one has a name, past one obstacle that is given without a list."""
-    predictor = foc_ros.Predictor(FAST)
-    predictor.set_goals(TWO)
-    predictor.set_obstacles(CUP)
-    return predictor.update(0.0, (0.0, 0.0))
+    return make_predictor(FAST, TWO, CUP).update(0.0, (0.0, 0.0))
 
 
 def test_goals_have_names_and_likelihoods(predicted):
@@ -322,9 +316,7 @@ def test_what_cannot_be_meant_is_refused_in_one_sentence(create, text):
 
 @pytest.mark.parametrize('goals', [(0.3, 0.0), np.array([0.3, 0.0]), Goal((0.3, 0.0)), [(0.3, 0.0)], iter([(0.3, 0.0)])])
 def test_one_goal_needs_no_list(goals):
-    predictor = foc_ros.Predictor(FAST)
-    predictor.set_goals(goals)
-    assert [each.name for each in predictor.update(0.0, (0.0, 0.0)).goals] == ['goal0']
+    assert [each.name for each in make_predictor(FAST, goals).update(0.0, (0.0, 0.0)).goals] == ['goal0']
 
 
 def test_both_spellings_of_the_centre_are_taken():

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from reach_helpers import make_predictor
 
 import foc_ros
 from foc_ros.core.config import Config
@@ -67,10 +68,7 @@ def test_paths_to_a_goal_behind_obstacles_are_solved_beside_a_free_goal():
     obstacles = [foc_ros.Box((0.01, 0.15), (0.3, 0.02), name='wall'), foc_ros.Circle((-0.05, 0.22), 0.03, 0.003, name='cup')]
 
     def solve_paths_to_last(goals):
-        predictor = foc_ros.Predictor(Config(budget_s=0.0))
-        predictor.set_goals(goals)
-        predictor.set_obstacles(obstacles)
-        prediction = predictor.update(0.0, (0.0, 0.0))
+        prediction = make_predictor(Config(budget_s=0.0), goals, obstacles).update(0.0, (0.0, 0.0))
         found = [each for each in prediction.solved_candidates if each.candidate.goal == len(goals) - 1]
         return {each.candidate.sides: pytest.approx(each.effort, rel=1e-5) for each in found}, prediction.goals[-1].likelihood
 
@@ -80,11 +78,9 @@ def test_paths_to_a_goal_behind_obstacles_are_solved_beside_a_free_goal():
 
 
 def test_the_predictor_takes_the_object_of_a_goal():
-    predictor = foc_ros.Predictor(Config().with_values({'budget_s': 0.0}))
-    predictor.set_obstacles([foc_ros.Circle((0.2, 0.0), 0.03, name='cup')])
     for given, label in ((None, 'goal0:+cup'), ('cup', 'goal0:')):
-        predictor.set_goals([foc_ros.Goal((0.25, 0.001), object=given)])
-        assert label in [each.label for each in predictor.update(0.0 if given is None else 10.0, (0.0, 0.0)).candidates]
+        goal, cup = foc_ros.Goal((0.25, 0.001), object=given), foc_ros.Circle((0.2, 0.0), 0.03, name='cup')
+        assert label in [each.label for each in make_predictor(Config(budget_s=0.0), goal, cup).update(0.0, (0.0, 0.0))]
 
 
 def test_likelihoods_do_not_depend_on_the_side_on_which_a_path_ends_in_its_goal():

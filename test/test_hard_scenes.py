@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from bag_helpers import TYPES
 from prediction_samples import outcome as make_outcome
+from reach_helpers import make_predictor
 
 import foc_ros
 from foc_ros.core import candidates
@@ -55,10 +56,9 @@ def test_a_hand_inside_an_obstacle_leaves_it_or_says_why_not():
 
 
 def test_a_class_whose_search_goes_astray_for_a_moment_is_not_unlikely():
-    predictor = foc_ros.Predictor(Config().with_values({'budget_s': 0.0, 'scene.hand_radius': 0.005}))
-    predictor.set_obstacles([foc_ros.Circle((0.0214, 0.0277), 0.03), foc_ros.Box((0.15, -0.0185), (0.04, 0.06))])
-    predictor.set_goals([(0.35, 0.0)])
-    first = {each.label: each for each in predictor.update(0.0, (0.0, 0.0)).candidates}
+    config = Config().with_values({'budget_s': 0.0, 'scene.hand_radius': 0.005})
+    obstacles = foc_ros.Circle((0.0214, 0.0277), 0.03), foc_ros.Box((0.15, -0.0185), (0.04, 0.06))
+    first = {each.label: each for each in make_predictor(config, (0.35, 0.0), obstacles).update(0.0, (0.0, 0.0))}
     assert first['goal0:+0+1'].status is Status.SOLVED
     assert first['goal0:+0+1'].likelihood > 0.05
 

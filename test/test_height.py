@@ -13,6 +13,7 @@ from object_messages import collision_object, detection, detections
 from prediction_samples import DT as MESSAGE_DT
 from prediction_samples import STEPS as MESSAGE_STEPS
 from prediction_samples import outcome, prediction
+from reach_helpers import make_predictor
 from scipy.spatial.transform import Rotation
 
 import foc_ros
@@ -151,10 +152,8 @@ def test_an_obstacle_is_cleared_on_the_way_to_every_goal_or_blocks():
 
 
 def test_a_predictor_with_heights_predicts_and_clears():
-    predictor = foc_ros.Predictor(CONFIG)
-    predictor.set_goals((0.4, 0.0, 0.25))
     low, post = foc_ros.Circle((0.2, 0.0), 0.03, heights=(0.0, 0.1), name='low'), foc_ros.Circle((0.2, 0.1), 0.03, name='post')
-    predictor.set_obstacles([low, post])
+    predictor = make_predictor(CONFIG, (0.4, 0.0, 0.25), [low, post])
     for tick in range(20):
         t = 0.01 * tick
         prediction = predictor.update(t, (t**2, 0.0, 0.3 - 0.1 * t**2))

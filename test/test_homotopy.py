@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from homotopy_scenes import CLEARANCE, GOAL, HAND, find, make_box, measure_clear, random_shapes, shortest_by_pattern, turn
+from homotopy_scenes import CLEARANCE, GOAL, HAND, find, measure_clear, random_shapes, shortest_by_pattern, turn
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -96,13 +96,13 @@ def test_guesses_are_clear_and_pass_as_their_names_say(seed):
         assert np.hypot(*np.diff(one.guess, axis=0).T).sum() == pytest.approx(one.length, rel=0.02)
 
 
-WALLS = [make_box(0.6, 0.02, 0.0), make_box(0.6, 0.02, 0.0), make_box(0.02, 0.32, 0.0), make_box(0.02, 0.32, 0.0)]
+WALLS = [make_box_polygon(size, 0.0) for size in ((0.6, 0.02), (0.6, 0.02), (0.02, 0.32), (0.02, 0.32))]
 WALL_CENTRES = [[0.175, 0.15], [0.175, -0.15], [-0.115, 0.0], [0.465, 0.0]]
 
 
 @pytest.mark.parametrize('yaw', [0.0, 0.2])
 def test_in_a_closed_workspace_all_ways_stay_inside(yaw):
-    boxes = [*WALLS, make_box(0.05, 0.08, 0.4)]
+    boxes = [*WALLS, make_box_polygon((0.05, 0.08), 0.4)]
     centre = turn(np.array([*WALL_CENTRES, [0.17, 0.01]]), yaw)
     obstacles = make_obstacles(centre, 0.0, ids=('n', 's', 'w', 'e', 'box'), polygons=[turn(box, yaw) for box in boxes])
     found = find(obstacles, turn(GOAL[None], yaw), k=8)
@@ -117,7 +117,7 @@ def test_in_a_closed_workspace_all_ways_stay_inside(yaw):
 
 @pytest.mark.parametrize('centre', [(0.033, 0.0), (0.028, 0.004), (0.01, 0.002), (0.02, -0.01)])
 def test_a_hand_in_a_box_or_in_its_margin_gets_out_on_both_sides(centre):
-    obstacles = make_obstacles([centre], 0.0, polygons=[make_box(0.06, 0.04, 0.1)])
+    obstacles = make_obstacles([centre], 0.0, polygons=[make_box_polygon((0.06, 0.04), 0.1)])
     found = find(obstacles)
     assert found.notes == {'hand_inside': 1}
     assert {one.label for one in found.candidates} == {'goal0:+0', 'goal0:-0'}
@@ -128,11 +128,11 @@ def test_a_hand_in_a_box_or_in_its_margin_gets_out_on_both_sides(centre):
 
 
 def test_a_goal_in_a_box_is_reached_and_so_is_one_in_its_margin():
-    box = make_box(0.04, 0.04, 0.3)
+    box = make_box_polygon((0.04, 0.04), 0.3)
     inside = find(make_obstacles([GOAL + 0.01], 0.0, polygons=[box]))
     assert [one.label for one in inside.candidates] == ['goal0:'] and inside.notes == {'goal_inside': 1}
     assert inside.candidates[0].length == pytest.approx(GOAL[0])
-    obstacles = make_obstacles([GOAL + np.array([0.0, 0.025])], 0.0, polygons=[make_box(0.04, 0.04, 0.0)])
+    obstacles = make_obstacles([GOAL + np.array([0.0, 0.025])], 0.0, polygons=[make_box_polygon((0.04, 0.04), 0.0)])
     near = find(obstacles, clearance=0.01)
     assert near.notes == {'goal_near': 1} and near.candidates
     assert all(measure_clear(one.guess, obstacles, 0.0) > 0.0 for one in near.candidates)
@@ -140,7 +140,7 @@ def test_a_goal_in_a_box_is_reached_and_so_is_one_in_its_margin():
 
 def test_a_gap_that_was_taken_stays_open_while_it_is_a_little_too_narrow():
     y = 0.03 + CLEARANCE
-    boxes = [make_box(0.04, 0.06, 0.0)] * 2
+    boxes = [make_box_polygon((0.04, 0.06), 0.0)] * 2
     before = find(make_obstacles([[0.15, y + 1e-4], [0.15, -y]], 0.0, polygons=boxes), k=3)
     narrow = make_obstacles([[0.15, y - 2e-3], [0.15, -y]], 0.0, polygons=boxes)
     assert {'0': -1, '1': 1} not in [dict(one.sides) for one in find(narrow, k=3).candidates]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from message_helpers import cloud, marker, marker_array, message_types, obstacle_table, pose_stamped
 from object_messages import collision_object
+from reach_helpers import make_predictor
 
 import foc_ros
 from foc_ros.core import pipeline as module
@@ -241,10 +242,8 @@ def test_poses_stamped_by_ros_time_are_judged_by_it(poses):
     assert freshness.find_not_ready_reason(0.0, FRESH_CONFIG, ()) is None
 
 
-def predictor_of_one_goal():
-    predictor = foc_ros.Predictor(replace_values(CONFIG, {'budget_s': 0.0}))
-    predictor.set_goals([(0.3, 0.0)])
-    return predictor
+def predictor_of_one_goal(*obstacles):
+    return make_predictor(replace_values(CONFIG, {'budget_s': 0.0}), (0.3, 0.0), obstacles or None)
 
 
 @pytest.mark.parametrize('t', [5.0, 0.0, -5.0])
@@ -257,8 +256,7 @@ def test_moving_obstacles_move_on_from_the_update_that_first_sees_them(t):
 
 
 def test_after_a_reset_obstacles_go_on_from_where_they_are_at_any_time():
-    predictor = predictor_of_one_goal()
-    predictor.set_obstacles([foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5))])
+    predictor = predictor_of_one_goal(foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5)))
     for t in (5.0, 5.1):
         predictor.update(t, (0.0, 0.0))
     predictor.reset()
@@ -271,8 +269,7 @@ def test_after_a_reset_obstacles_go_on_from_where_they_are_at_any_time():
 
 def test_a_class_that_a_moving_obstacle_closes_is_not_estimated_from_its_guess():
     """The search knows where obstacles are now: by then this one has come to the other side of the guess."""
-    predictor, closing = predictor_of_one_goal(), foc_ros.Circle((0.15, 0.04), 0.03, velocity=(0.0, -0.15), name='a')
-    predictor.set_obstacles([closing, foc_ros.Circle((0.2, -0.06), 0.02, name='b')])
-    prediction = predictor.update(0.0, (0.0, 0.0))
+    closing = foc_ros.Circle((0.15, 0.04), 0.03, velocity=(0.0, -0.15), name='a')
+    prediction = predictor_of_one_goal(closing, foc_ros.Circle((0.2, -0.06), 0.02, name='b')).update(0.0, (0.0, 0.0))
     assert prediction.most_likely == 'goal0:+a+b'
     assert all(each.label != 'goal0:-a+b' for each in prediction.candidates_with_likelihood)
