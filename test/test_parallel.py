@@ -23,6 +23,12 @@ SQUARES = [(name, number**2) for name, number in ITEMS]
 LIMIT_S = 60.0
 
 
+def parse_study(*given):
+    """Return the options of a study, as a command reads them."""
+    _, bound, _ = app.parse_args(['simulate', *given], exit_on_error=False, print_error=False)
+    return bound.arguments['study']
+
+
 @pytest.mark.parametrize('count', [None, 1, 2, 3])
 def test_results_come_in_order_and_an_exception_is_the_failure_of_its_item_whatever_the_workers(count):
     with nullcontext() if count is None else open_workers(count):
@@ -105,10 +111,8 @@ def test_a_scheduler_that_is_not_there_or_has_no_workers_is_refused(monkeypatch)
     distributed = pytest.importorskip('distributed', reason='the extra cluster is not installed')
     monkeypatch.setattr('foc_ros.analysis.parallel.CONNECT_S', 0.3)
     for address in ('tcp://127.0.0.1:9', 'nonsense://host'):
-        given = ['simulate', '--scheduler', address]
-        study = app.parse_args(given, exit_on_error=False, print_error=False)[1].arguments['study']
         refused = pytest.raises(InputError, match='--scheduler: expected the address of a Dask scheduler')
-        with refused, study.open_workers():
+        with refused, parse_study('--scheduler', address).open_workers():
             pass
     with distributed.LocalCluster(n_workers=0, dashboard_address=':0') as cluster:
         refused = pytest.raises(InputError, match='--scheduler: expected a Dask scheduler with workers, got none at')

@@ -256,9 +256,9 @@ def test_the_transforms_of_a_recording_are_applied(tmp_path, capsys):
     bag, still = write_bag(tmp_path / 'moving', items), write_bag(tmp_path / 'still', messages(0.24))
     moving = list(foc_ros.replay(bag, config))
     assert len(moving) == len(reach(0.24))
-    by_stamp = {each.stamp_ns: each for each in foc_ros.replay(still, config)}
+    same = {each.stamp_ns: each for each in foc_ros.replay(still, config)}
     for prediction in moving[2:]:
-        (obstacle,), (expected,) = (each.obstacles.centre for each in (prediction, by_stamp[prediction.stamp_ns]))
+        (obstacle,), (expected,) = (each.obstacles.centre for each in (prediction, same[prediction.stamp_ns]))
         np.testing.assert_allclose(obstacle, expected, atol=1e-6)
     assert run(bag, '--output', str(tmp_path / 'out'), config=config) == 0
     with BagReader(tmp_path / 'out') as reader:

@@ -45,6 +45,7 @@ PROCESS = (
     # another process or a ROS graph
     'test_node_*.py::*',
     'test_parallel.py::*',
+    'test_environment.py::*',
     'test_api.py::test_the_import_*',
     'test_command_line.py::test_the_program_*',
     'test_command_line.py::test_help_imports_*',
@@ -53,7 +54,7 @@ PROCESS = (
     'test_demo.py::*',
     'test_demo_parts.py::test_the_n*',
     'test_demo_parts.py::test_a_domain_*',
-    'test_optional_packages.py::test_[aopt]*',
+    'test_optional_packages.py::test_[apt]*',
     'test_packaging.py::test_[anrsw]*',
     'test_packaging.py::*_the_wheel',
     'test_parameters.py::test_a_node_*',
