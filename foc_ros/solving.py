@@ -54,10 +54,10 @@ class Solution(core_solution.Solution):
 
     def plot(self, axes: Any = None) -> Any:
         """Draw the solution in its scene; see `Prediction.plot`."""
-        from foc_ros.reporting.views import parse_label
+        from foc_ros.reporting.views import parse_sides
 
-        _, sides = parse_label(self.label, self.obstacles.ids)
-        candidate = Candidate(self.label, 0, tuple(sides.items()), self.path, 0.0)
+        sides = tuple(parse_sides(self.label, self.obstacles.ids).items())
+        candidate = Candidate(self.label, 0, sides, self.path, 0.0)
         return plot_candidates([PredictedCandidate(candidate, self, {}, 0.0, 1.0)], axes)
 
 

@@ -79,7 +79,7 @@ def replayed() -> tuple[HandTrajectory, list[Prediction]]:
 
 def scene(hand: HandTrajectory, snapshots: list[Prediction]) -> Figure:
     """Return the picture of the chosen prediction."""
-    span = hand.find_movements(Config().estimator.onset_speed)[MOVEMENT - 1]
+    span = hand.find_movements()[MOVEMENT - 1]
     wanted_ns = span[0] + int(AFTER_S * NANOSECONDS)
     snapshot = min(snapshots, key=lambda each: abs(each.stamp_ns - wanted_ns))
     return make_moment_figure(hand, snapshot, span)
@@ -87,7 +87,7 @@ def scene(hand: HandTrajectory, snapshots: list[Prediction]) -> Figure:
 
 def pictures(hand: HandTrajectory, snapshots: list[Prediction]) -> Iterator[tuple[Figure, int]]:
     """Yield the pictures, each with its duration [ms]."""
-    spans = hand.find_movements(Config().estimator.onset_speed)
+    spans = hand.find_movements()
     goals = np.unique(np.concatenate([each.goal_positions for each in snapshots]), axis=0)
     bounds = compute_bounds(snapshots[0].obstacles, goals, (), hand.positions)
     for start_ns, end_ns in (spans[number] for number in SHOWN_MOVEMENTS):

@@ -30,7 +30,6 @@ from page import ROOT
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.optimize import minimize
 
-from foc_ros.core.config import Config
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter
 from foc_ros.io.topics import HAND
@@ -180,7 +179,7 @@ def write_tables(directory: Path) -> None:
     """Write recordings.csv, obstacles.csv and goals.csv of two movements of the packaged recording."""
     with BagReader(PACKAGED) as reader:
         hand = build_hand_trajectory([decode_hand_sample(item.message, 'xy') for item in reader if item.role == HAND])
-    spans = hand.find_movements(Config().estimator.onset_speed)
+    spans = hand.find_movements()
     samples = []
     for name, number in zip('ab', MOVEMENTS, strict=True):
         begin_ns, end_ns = spans[number][0] - LEAD_NS, spans[number][1]

@@ -9,6 +9,7 @@ import numpy as np
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
 from ros_helpers import Graph
 
+from foc_ros.io import topics
 from foc_ros.ros.messages.encode_prediction import OTHER, OUTPUTS, UNKNOWN
 from foc_ros.ros.messages.types import RclpyTypes, find_message_class
 
@@ -22,13 +23,7 @@ QUICK = {'foc.steps': 20, 'homotopy.max_candidates': 2, 'scene.timeout_s': 0.0, 
 """Parameters for quick predictions, without time limits that a slow machine would exceed."""
 RELIABLE = {f'qos_overrides./{name}.subscription.reliability': 'reliable' for name in ('hand_pose', 'obstacles')}
 """Reliable inputs, so that a test can wait until all of them are received."""
-INPUTS = {
-    'hand_pose': 'geometry_msgs/msg/PoseStamped',
-    'obstacles': 'sensor_msgs/msg/PointCloud2',
-    'obstacle_markers': 'visualization_msgs/msg/MarkerArray',
-    'goals': 'geometry_msgs/msg/PoseArray',
-    'goal_pose': 'geometry_msgs/msg/PoseStamped',
-}
+INPUTS = {name: kind for name, kind in topics.TYPES.items() if name not in topics.OPTIONAL}
 
 
 def hand_path(count: int, rate_hz: float = 100.0, start_s: float = 10.0) -> list[Any]:

@@ -19,7 +19,7 @@ from foc_ros.core.errors import LostHandError, MessageError, RecordingError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.polygons import make_box_polygon
 from foc_ros.io.topics import OPTIONAL, TYPES, assign_topics
-from foc_ros.ros.messages.decode_objects import CollisionTable, decode_detections
+from foc_ros.ros.messages.decode_objects import ObjectTable, decode_detections
 from foc_ros.ros.messages.decode_poses import MAX_GOALS, decode_goal, decode_goals, decode_hand_sample
 from foc_ros.ros.messages.plane import Transform, compute_rotation
 
@@ -27,10 +27,10 @@ BOX, SPHERE, CYLINDER, CONE = 1, 2, 3, 4
 QUARTER = {'z': math.sqrt(0.5), 'w': math.sqrt(0.5)}
 
 
-def after(*given):
-    table = CollisionTable()
+def after(*given, plane='xy'):
+    table = ObjectTable()
     for message in given:
-        table = table.with_message(message)
+        table = table.with_collision_object(message, plane)
     return table
 
 
@@ -43,7 +43,7 @@ def check_polygon(obstacles, row, centre, size, yaw):
 
 def test_primitives_stand_where_the_poses_of_object_and_primitive_say():
     parts = (BOX, (0.4, 0.2, 0.1), (0.5, 0, 0)), (SPHERE, (0.05,), (0, 0.3, 0)), (CYLINDER, (0.4, 0.02), (0, 0, 0))
-    obstacles = after(collision_object(*parts, place=(1, 2, 3), turned=QUARTER)).obstacles('xy', 0.01)
+    obstacles = after(collision_object(*parts, place=(1, 2, 3), turned=QUARTER)).obstacles(0, 0.01)
     assert obstacles.ids == ('table/0', 'table/1', 'table/2')
     check_polygon(obstacles, 0, (1.0, 2.5), (0.4, 0.2), math.pi / 2)
     check_polygon(obstacles, 1, (0.7, 2.0), (0, 0), 0)
@@ -52,7 +52,7 @@ def test_primitives_stand_where_the_poses_of_object_and_primitive_say():
 
 
 def test_a_lying_cylinder_is_a_capsule():
-    obstacles = after(collision_object((CYLINDER, (0.4, 0.02), (0, 0, 0)))).obstacles('xz', 0.0)
+    obstacles = after(collision_object((CYLINDER, (0.4, 0.02), (0, 0, 0))), plane='xz').obstacles(0, 0.0)
     check_polygon(obstacles, 0, (0.0, 0.0), (0.0, 0.4), 0.0)
     assert obstacles.radius.tolist() == [0.02]
 
@@ -60,18 +60,18 @@ def test_a_lying_cylinder_is_a_capsule():
 def test_objects_are_added_appended_moved_and_removed():
     ball = (SPHERE, (0.05,), (0, 0, 0))
     held = [collision_object(ball), collision_object(ball, name='cup'), collision_object(ball, ball, operation=2)]
-    assert after(*held).obstacles('xy', 0.0).ids == ('table/0', 'table/1', 'table/2', 'cup/0')
-    assert after(*held, collision_object(ball)).obstacles('xy', 0.0).ids == ('table/0', 'cup/0')
-    moved = after(*held, collision_object(name='cup', place=(1, 2, 0), operation=3)).obstacles('xy', 0.0)
+    assert after(*held).obstacles(0, 0.0).ids == ('table/0', 'table/1', 'table/2', 'cup/0')
+    assert after(*held, collision_object(ball)).obstacles(0, 0.0).ids == ('table/0', 'cup/0')
+    moved = after(*held, collision_object(name='cup', place=(1, 2, 0), operation=3)).obstacles(0, 0.0)
     np.testing.assert_allclose(moved.centre[-1], [1, 2])
-    assert after(*held, collision_object(operation=1)).obstacles('xy', 0.0).ids == ('cup/0',)
-    assert not len(after(*held, collision_object(name='', operation=1, frame_id='')).obstacles('xy', 0.0))
+    assert after(*held, collision_object(operation=1)).obstacles(0, 0.0).ids == ('cup/0',)
+    assert not len(after(*held, collision_object(name='', operation=1, frame_id='')).obstacles(0, 0.0))
 
 
 def test_what_is_no_shape_is_counted():
     mesh = OBJECT_TYPES.make('shape_msgs/msg/Mesh')
     table = after(collision_object((CONE, (0.1, 0.1), (0, 0, 0)), (SPHERE, (0.1,), (0, 0, 0)), meshes=[mesh]))
-    assert dict(table.dropped) == {'not_a_shape': 2} and table.obstacles('xy', 0.0).ids == ('table/0',)
+    assert dict(table.dropped) == {'not_a_shape': 2} and table.obstacles(0, 0.0).ids == ('table/0',)
 
 
 @pytest.mark.parametrize(
@@ -148,9 +148,9 @@ def test_both_inputs_are_transformed():
     given = detections(detection((0.5, 0, 0), (0.4, 0.2, 0.1), frame_id='camera'), frame_id='camera')
     array = decode_detections(given, 'xy', 0.0, lambda _: ('world', found))
     thing = collision_object((BOX, (0.4, 0.2, 0.1), (0, 0, 0)), place=(0.5, 0, 0), frame_id='camera')
-    table = CollisionTable().with_message(thing, lambda _: ('world', found))
+    table = ObjectTable().with_collision_object(thing, 'xy', lambda _: ('world', found))
     assert (array.frame_id, table.frame_id) == ('world', 'world')
-    for obstacles in (array.obstacles, table.obstacles('xy', 0.0)):
+    for obstacles in (array.obstacles, table.obstacles(0, 0.0)):
         check_polygon(obstacles, 0, (1.0, 0.5), (0.4, 0.2), math.pi / 2)
 
 

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from foc_ros.core.errors import MessageError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.ros.messages import decode_objects
-from foc_ros.ros.messages.decode_objects import MarkerTable
+from foc_ros.ros.messages.decode_objects import ObjectTable
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
 from foc_ros.ros.messages.plane import project
 
@@ -180,7 +180,7 @@ def test_the_number_of_obstacles_is_bounded(monkeypatch):
     monkeypatch.setattr(decode_objects, 'MAX_ROWS', 3)
     markers = after(marker_array(BAGS, *[marker(BAGS, id=i) for i in range(3)]))
     with pytest.raises(MessageError, match='markers: expected at most 3 obstacles held at a time, got 4'):
-        markers.with_message(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy', 0.0)
+        markers.with_markers(marker_array(BAGS, marker(BAGS, id=3)), SECOND, 'xy')
 
 
 NAMES = ['x', 'y', 'z', 'radius', 'radius_stddev', 'id', 'vx', 'size_x', 'yaw', 'rgb']
@@ -209,23 +209,23 @@ def test_any_bytes_are_decoded_or_refused(layout, data, given_sizes):
     assert (scene.obstacles.radius >= 0).all()
 
 
-def after(*messages, now_ns=SECOND, stddev=0.0):
-    scene = MarkerTable()
+def after(*messages, now_ns=SECOND):
+    scene = ObjectTable()
     for message in messages:
-        scene = scene.with_message(message, now_ns, 'xy', stddev)
+        scene = scene.with_markers(message, now_ns, 'xy')
     return scene
 
 
 def ids(scene, now_ns=SECOND):
-    return scene.obstacles(now_ns).ids
+    return scene.obstacles(now_ns, 0.0).ids
 
 
 @both_kinds
 def test_spheres_and_cylinders_become_circles(types):
     sphere = marker(types, (1, 2, 3), (0.1, 0.2, 0.4), id=1, frame_id='base', stamp_ns=5 * SECOND)
     cylinder = marker(types, (4, 5, 6), (0.1, 0.2, 0.4), id=2, type=3, ns='b', frame_id='base', stamp_ns=4 * SECOND)
-    scene = after(marker_array(types, sphere, cylinder), stddev=0.01)
-    obstacles = scene.obstacles(5 * SECOND)
+    scene = after(marker_array(types, sphere, cylinder))
+    obstacles = scene.obstacles(5 * SECOND, 0.01)
     assert (scene.frame_id, scene.stamp_ns, dict(scene.dropped)) == ('base', 5 * SECOND, {})
     assert obstacles.ids == ('a/1', 'b/2')
     np.testing.assert_array_equal(obstacles.centre, [[1, 2], [4, 5]])
@@ -240,7 +240,7 @@ def test_a_tilted_cube_covers_its_projected_points_and_no_more(plane):
     for i in range(20):
         quaternion, size, centre = rng.normal(size=4) * (i > 0), rng.uniform(0.05, 0.4, 3), rng.normal(size=3)
         cube = marker(BAGS, centre, size, type=1, turned=dict(zip('xyzw', quaternion, strict=True)))
-        table = MarkerTable().with_message(marker_array(BAGS, cube), SECOND, plane, 0.0).obstacles(SECOND)
+        table = ObjectTable().with_markers(marker_array(BAGS, cube), SECOND, plane).obstacles(SECOND, 0.0)
         assert 4 <= table.corners[0] <= 6 and table.radius[0] == 0.0
         # an orientation that was never set is none
         rotation = Rotation.from_quat(quaternion).as_matrix() if i else np.eye(3)
@@ -255,18 +255,16 @@ def test_a_tilted_cube_covers_its_projected_points_and_no_more(plane):
 def test_add_replaces_and_delete_removes():
     first = marker_array(BAGS, marker(BAGS, (1, 0, 0), id=1), marker(BAGS, (2, 0, 0), id=2))
     moved = marker_array(BAGS, marker(BAGS, (3, 0, 0), id=1))
-    assert after(marker_array(BAGS)).obstacles(0).centre.shape == (0, 2)
+    assert after(marker_array(BAGS)).obstacles(0, 0.0).centre.shape == (0, 2)
     scene = after(first, moved)
     assert ids(scene) == ('a/1', 'a/2')
-    np.testing.assert_array_equal(scene.obstacles(0).centre[:, 0], [3, 2])
+    np.testing.assert_array_equal(scene.obstacles(0, 0.0).centre[:, 0], [3, 2])
     assert ids(after(first, marker_array(BAGS, marker(BAGS, id=1, action=2)))) == ('a/2',)
     assert ids(after(first, marker_array(BAGS, marker(BAGS, id=9, action=2)))) == ('a/1', 'a/2')
     ordered = marker_array(BAGS, marker(BAGS, (1, 0, 0), id=1), marker(BAGS, id=1, action=2), marker(BAGS, (5, 0, 0), id=1))
-    np.testing.assert_array_equal(after(ordered).obstacles(0).centre, [[5, 0]])
-    scene.with_message(marker_array(BAGS, marker(BAGS, action=3, ns='')), SECOND, 'xy', 0.0)
+    np.testing.assert_array_equal(after(ordered).obstacles(0, 0.0).centre, [[5, 0]])
+    scene.with_markers(marker_array(BAGS, marker(BAGS, action=3, ns='')), SECOND, 'xy')
     assert ids(scene) == ('a/1', 'a/2'), 'an update does not change the old table'
-    with pytest.raises(TypeError):
-        scene.markers['a', 1] = None  # type: ignore[index]
 
 
 @pytest.mark.parametrize(('ns', 'left'), [('', ('b/2',)), ('a', ('c/3', 'b/2')), ('zz', ('a/1', 'c/3', 'b/2'))])
@@ -277,17 +275,14 @@ def test_delete_all_empties_its_namespace_or_everything(ns, left):
 
 def test_a_lifetime_starts_at_the_stamp_or_now_if_the_marker_has_none_and_the_time_is_known():
     scene = after(marker_array(BAGS, marker(BAGS, id=1, lifetime=0.5, stamp_ns=4 * SECOND), marker(BAGS, id=2)))
-    assert scene.find_unchanged_interval(4 * SECOND) == (-math.inf, 4.5 * SECOND)
-    assert scene.find_unchanged_interval(5 * SECOND) == (4.5 * SECOND, math.inf)
-    assert ids(scene, int(4.5 * SECOND) - 1) == ('a/1', 'a/2')
-    assert ids(scene, int(4.5 * SECOND)) == ('a/2',)
-    later = scene.with_message(marker_array(BAGS), 5 * SECOND, 'xy', 0.0)
-    assert list(later.markers) == [('a', 2)]
-    assert later.find_unchanged_interval(5 * SECOND) == (-math.inf, math.inf)
+    for now_ns, expected in ((int(4.5 * SECOND) - 1, ('a/1', 'a/2')), (int(4.5 * SECOND), ('a/2',))):
+        assert ids(scene, now_ns) == expected and scene.count_expired(now_ns) == 2 - len(expected)
+    assert list(scene.with_markers(marker_array(BAGS), 5 * SECOND, 'xy').held) == [('a', 2)]
     message = marker_array(BAGS, marker(BAGS, lifetime=0.5, stamp_ns=0))
-    assert after(message, now_ns=7 * SECOND).find_unchanged_interval(7 * SECOND) == (-math.inf, 7.5 * SECOND)
-    assert after(message, now_ns=0).find_unchanged_interval(0) == (-math.inf, math.inf)
-    assert after(message).stamp_ns == 0
+    for known_ns, expected in ((7 * SECOND, [0, 1]), (0, [0, 0])):
+        scene = after(message, now_ns=known_ns)
+        assert [scene.count_expired(int(seconds * SECOND)) for seconds in (7.4, 7.5)] == expected
+        assert scene.stamp_ns == 0
 
 
 @both_kinds
@@ -296,7 +291,7 @@ def test_a_lifetime_starts_at_the_stamp_or_now_if_the_marker_has_none_and_the_ti
 def test_a_marker_that_is_not_finite_does_not_replace_the_old_one(types, value, where):
     bad = marker(types, **{where: (0.1, value, 0.1)})
     scene = after(marker_array(types, marker(types, (1, 0, 0))), marker_array(types, bad, marker(types, (2, 0, 0), id=5)))
-    np.testing.assert_array_equal(scene.obstacles(0).centre[:, 0], [1, 2])
+    np.testing.assert_array_equal(scene.obstacles(0, 0.0).centre[:, 0], [1, 2])
     assert scene.dropped == {'not_finite': 1}
     scene = after(marker_array(types, *[marker(types, id=kind, type=kind, turned={'w': value}) for kind in (1, 2)]))
     assert ids(scene) == ('a/2',) and scene.dropped == {'not_finite': 1}, 'a sphere needs no orientation'
@@ -326,7 +321,7 @@ def test_another_type_replaces_an_obstacle_and_is_counted():
 def test_a_message_with_a_wrong_marker_is_refused(types, changes, words):
     scene = after(marker_array(types, marker(types, id=7)))
     with pytest.raises(MessageError, match=re.escape(words)):
-        scene.with_message(marker_array(types, marker(types, id=1), marker(types, id=2, **changes)), SECOND, 'xy', 0.0)
+        scene.with_markers(marker_array(types, marker(types, id=1), marker(types, id=2, **changes)), SECOND, 'xy')
     assert ids(scene) == ('a/7',)
 
 

@@ -32,7 +32,7 @@ from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 from foc_ros.io.json_output import encode_prediction
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.decode_objects import CollisionTable, MarkerTable, decode_detections
+from foc_ros.ros.messages.decode_objects import ObjectTable, decode_detections
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
 from foc_ros.ros.messages.plane import Transform, lift
@@ -210,19 +210,19 @@ def test_markers_say_their_heights(plane):
     kinds = (CUBE, (0.2, 0.2, 0.2), turned), *((kind, (0.1, 0.1, size), {'w': 1.0}) for kind, size in UPRIGHT)
     markers = (marker(TYPES, place, size, type=kind, id=i, turned=by) for i, (kind, size, by) in enumerate(kinds))
     half = 0.1 * np.sqrt(2.0) if plane == 'xy' else 0.1
-    obstacles = MarkerTable().with_message(marker_array(TYPES, *markers), SECOND, plane, 0.0).obstacles(SECOND)
+    obstacles = ObjectTable().with_markers(marker_array(TYPES, *markers), SECOND, plane).obstacles(SECOND, 0.0)
     assert_allclose(obstacles.heights, [[0.5 - half, 0.5 + half], [0.35, 0.65], UNKNOWN, UNKNOWN], rtol=1e-12)
-    assert MarkerTable().obstacles(SECOND).heights.shape == (0, 2)
+    assert ObjectTable().obstacles(SECOND, 0.0).heights.shape == (0, 2)
 
 
 def test_objects_and_detections_say_their_heights():
     tilted = {'x': np.sin(np.pi / 8), 'w': np.cos(np.pi / 8)}
     parts = (1, (0.4, 0.2, 0.1), (0, 0, 0.5)), (2, (0.05,), (0, 0, 0.5)), (3, (0.4, 0.02), (0, 0, 0.5))
-    heights = CollisionTable().with_message(collision_object(*parts)).obstacles('xy', 0.0).heights
+    heights = ObjectTable().with_collision_object(collision_object(*parts), 'xy').obstacles(0, 0.0).heights
     assert_allclose(heights, [[0.45, 0.55], UNKNOWN, [0.3, 0.7]])
-    leaning = CollisionTable().with_message(collision_object((3, (0.4, 0.02), (0, 0, 0)), turned=tilted)).obstacles('xy', 0.0)
+    leaning = ObjectTable().with_collision_object(collision_object((3, (0.4, 0.02), (0, 0, 0)), turned=tilted), 'xy')
     half = (0.2 + 0.02) * np.sqrt(0.5)
-    assert_allclose(leaning.heights, [[-half, half]])
+    assert_allclose(leaning.obstacles(0, 0.0).heights, [[-half, half]])
     found = decode_detections(detections(detection((0, 0, 0.5), (0.2, 0.3, 0.4))), 'xy', 0.0).obstacles
     assert_allclose(found.heights, [[0.3, 0.7]])
     assert decode_detections(detections(), 'xy', 0.0).obstacles.heights.shape == (0, 2)

@@ -47,7 +47,8 @@ class Guided(Bench):
         kinds = {'reference': PoseStamped, 'stiffness': Float64MultiArray, 'twist': TwistStamped, 'wrench_unstamped': Wrench}
         self.guided = {name: ros.collect(self.player, kind, f'foc/guidance/{name}') for name, kind in kinds.items()}
         self.commands = self.player.create_publisher(TwistStamped, 'command_twist', 10)
-        ends = *self.node._guidance.publishers.values(), self.commands
+        guided = [each for name, each in self.node._outputs.items() if name.startswith('guidance/')]
+        ends = *guided, self.commands
         ros.spin_until(lambda: all(each.get_subscription_count() for each in ends), 'the topics of guidance')
         self.publish_scene()
 
@@ -106,7 +107,7 @@ def test_guidance_updates_only_while_it_is_enabled(ros, monkeypatch):
 
     monkeypatch.setattr(guidance.GuidanceLoop, 'update', count)
     bench = Guided(ros, **{'guidance.enabled': False})
-    assert 'guidance/wrench_unstamped' not in bench.node._guidance.publishers
+    assert 'guidance/wrench_unstamped' not in bench.node._outputs
     bench.drive(60)
     bench.wait_for('prediction', 1)
     assert not updates and not bench.wrenches

@@ -263,5 +263,5 @@ def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library(
 
 def test_the_diagnostics_count_movements():
     pipeline, _ = learn(move_along(ABOVE), move_along(0.7 * BELOW), REST)
-    health = Monitor(Intake(pipeline), Freshness(), 0.0).report(1.0, 'active', None, 0.0, [])
+    health = Monitor(Intake(pipeline), Freshness(pipeline), 0.0).report(1.0, 'active', 0.0, [])
     assert any('1 movements recorded, 1 refused' in value for value in health.values.values())

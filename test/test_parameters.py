@@ -187,9 +187,9 @@ def test_node_and_commands_refuse_the_same_files(tmp_path, text, words):
             read(file)
 
 
-def test_numbers_with_an_exponent_need_no_point(tmp_path):
-    config = load(tmp_path, 'foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1, rate_hz: .5e2}}')
-    assert (config.budget_s, config.scene.timeout_s, config.rate_hz) == (0.001, 20.0, 50.0)
+def test_numbers_with_an_exponent_need_no_point_and_those_with_a_sign_no_zero(tmp_path):
+    config = load(tmp_path, 'foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1, rate_hz: .5e2, foc.eta: +.5}}')
+    assert (config.budget_s, config.scene.timeout_s, config.rate_hz, config.foc.eta) == (0.001, 20.0, 50.0, 0.5)
     with pytest.raises(ParameterError, match=r"rate_hz: expected a finite number in .*, got '1_0'"):  # a text for ROS
         load(tmp_path, 'foc: {ros__parameters: {rate_hz: 1_0}}')
 

@@ -123,6 +123,8 @@ def test_a_table_that_never_held_a_marker_is_no_source(intake):
     assert seen(intake) == ('a/0',)
     assert show(intake, nothing) is SampleStatus.ACCEPTED
     assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
+    assert intake.take('collision_objects', collision_object(operation=1)) is SampleStatus.ACCEPTED
+    assert list(intake.pipeline.scene.sources) == ['markers'], 'nor is one of collision objects'
 
 
 def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):
@@ -232,14 +234,17 @@ ENDLESS_CONFIG = replace_values(Config(), {'estimator.hand_timeout_s': 0.0, 'sce
     ],
 )
 def test_poses_stamped_by_ros_time_are_judged_by_it(poses):
-    freshness = Freshness()
+    pipeline = Pipeline(FRESH_CONFIG)
+    freshness = Freshness(pipeline)
     for stamp_s, clock_s, is_restart, words in poses:
-        freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), 0.5, is_restart=is_restart)
-        found = freshness.find_not_ready_reason(0.0, FRESH_CONFIG, ())
+        freshness.note_pose(round(stamp_s * NANOSECONDS), round(clock_s * NANOSECONDS), is_restart=is_restart)
+        found = freshness.find_not_ready_reason(0.0)
         assert (found is not None) == bool(words) and words in (found or ('', ''))[1]
-        assert freshness.find_not_ready_reason(0.0, ENDLESS_CONFIG, ()) is None
+        pipeline.config = ENDLESS_CONFIG
+        assert freshness.find_not_ready_reason(0.0) is None
+        pipeline.config = FRESH_CONFIG
     freshness.forget_clock()
-    assert freshness.find_not_ready_reason(0.0, FRESH_CONFIG, ()) is None
+    assert freshness.find_not_ready_reason(0.0) is None
 
 
 def predictor_of_one_goal(*obstacles):

@@ -112,11 +112,13 @@ def test_a_fit_and_its_comparison(tmp_path, monkeypatch):
 
     async def run():
         fitted = await work(page, 'fit')
-        assert fitted['columns'] == ['parameter', 'before', 'after']
-        assert 'duration.fitts_b_s' in [row[0] for row in fitted['rows']]
+        assert fitted['state'] == 'done'
+        assert page.last('result')['columns'] == ['parameter', 'before', 'after']
+        assert 'duration.fitts_b_s' in [row[0] for row in page.last('result')['rows']]
         compared = await work(page, 'compare')
         assert 'on the trials of the fit' in compared['text']
-        assert [row[0] for row in compared['rows']][:2] == ['path class: correct [%]', 'path class: log-likelihood [nat]']
+        scores = [row[0] for row in page.last('result')['rows']]
+        assert scores[:2] == ['path class: correct [%]', 'path class: log-likelihood [nat]']
 
     use_few_predictions(monkeypatch)
     monkeypatch.setattr(jobs, 'run_command', run_here)
@@ -167,7 +169,7 @@ def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_s
     configs = {'standard': Config(), 'mine': replace_values(Config(), FITTED)}
     fitted = fit_with_errors(page, monkeypatch, 0.063, after_m, UNUSED)
     assert fitted['text'] == f'{text} Not used: trial_002 (nothing could be predicted).'
-    assert fitted['rows'] == [['likelihood.beta', '4', '7.5']]
+    assert page.last('result')['rows'] == [['likelihood.beta', '4', '7.5']]
     assert (page.last('settings')['parameters'], page.last('settings')['fitted']) == (used, True)
     assert page.session.predictor.configs[-1] == configs[used]
     page.send({'type': 'parameters', 'name': 'mine'})

@@ -130,12 +130,12 @@ def test_results_are_told_in_plain_words_first():
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none():
-    spans = build_hand_trajectory(samples(3)).find_movements(0.05)
+    spans = build_hand_trajectory(samples(3)).find_movements()
     np.testing.assert_allclose((np.array(spans) - START_NS) * 1e-9, [[0.5, 1.5], [2.0, 3.0], [3.5, 4.5]], atol=0.15)
     random = np.random.default_rng(3)
     hand = HandTrajectory(START_NS + np.arange(300) * 10_000_000, random.normal(scale=0.003, size=(300, 2)))
-    assert np.linalg.norm(hand.velocity, axis=1).max() > 0.05
-    assert hand.find_movements(0.05) == []
+    assert hand.speed.max() > 0.05
+    assert hand.find_movements() == []
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])

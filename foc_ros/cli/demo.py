@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -26,17 +25,20 @@ from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import Scene
-from foc_ros.core.types import NANOSECONDS, HandSample
+from foc_ros.core.types import NANOSECONDS
 from foc_ros.io import topics
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter, Item
+from foc_ros.io.outputs import make_folder
 from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
-from foc_ros.reporting.report import describe_late, write_report
-from foc_ros.reporting.views import HandTrajectory, build_hand_trajectory, read_snapshot
+from foc_ros.reporting.report import ReportCollector, describe_late
+from foc_ros.reporting.views import HandTrajectory, read_snapshot
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, isolated_graph
 from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, STAMP
+
+from .options import warn_all
 
 RECORDING = Path(__file__).resolve().parents[1] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
@@ -46,22 +48,20 @@ RECEIVED = {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()} | {'/di
 PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
 
 
-class Recorder:
-    """Keeps all messages of a demo.
+class Recorder(ReportCollector):
+    """Keeps the hand samples that a demo sends and the predictions that it receives.
 
-    Attributes: samples, the hand samples sent; snapshots, the predictions received; delays [s], from sending a hand sample to
-    receiving its prediction; health, the values of the node's diagnostics by name.
+    Attributes: delays [s], from a hand sample to its prediction; health, the values of the node's diagnostics by name.
     """
 
     def __init__(self, config: Config) -> None:
-        self.samples: list[HandSample] = []
-        self.snapshots: list[Prediction] = []
+        super().__init__()
         self.delays: list[float] = []
         self.health: dict[str, str] = {}
         # This pipeline never predicts. It decodes the inputs and holds the scene at each of them.
         self._intake = Intake(Pipeline(config))
         self._sent: dict[int, tuple[float, Scene]] = {}
-        self._halves: dict[str, Any] = {}
+        self._halves: dict[int, dict[str, Any]] = {}
 
     def add_sent(self, item: Item, now: float) -> None:
         """Record a message to the node; now [s]: of a monotonic clock."""
@@ -76,17 +76,16 @@ class Recorder:
             self.health = {each.key: each.value for status in message.status for each in status.values}
         if name not in PAIR:
             return
-        if name == PAIR[0]:
-            self.delays.append(now - self._sent.get(decode_stamp(message.header), (now, None))[0])
-        key = f'{STAMP}{decode_stamp(message.header)}' if name == PAIR[0] else message.layout.dim[2].label
-        other = self._halves.pop(key, None)
-        if other is None:
-            self._halves[key] = message
-            return
-        cloud, likelihoods = (message, other) if name == PAIR[0] else (other, message)
-        stamp_ns, pipeline = decode_stamp(cloud.header), self._intake.pipeline
-        scene = self._sent.get(stamp_ns, (0.0, pipeline.scene))[1]
-        if scene.goals is not None:
+        is_cloud, pipeline = name == PAIR[0], self._intake.pipeline
+        stamp_ns = decode_stamp(message.header) if is_cloud else int(message.layout.dim[2].label.removeprefix(STAMP))
+        sent_s, scene = self._sent.get(stamp_ns, (now, pipeline.scene))
+        if is_cloud:
+            self.delays.append(now - sent_s)
+        halves = self._halves.setdefault(stamp_ns, {})
+        halves[name] = message
+        if len(halves) == len(PAIR) and scene.goals is not None:
+            del self._halves[stamp_ns]
+            cloud, likelihoods = (halves[each] for each in PAIR)
             known = pipeline.config.plane, scene.obstacles(stamp_ns), scene.goals
             self.snapshots.append(read_snapshot(cloud, likelihoods, *known))
 
@@ -117,7 +116,7 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
         if not recorder.snapshots and not stopped.is_set():
             raise NodeDiedError('the node sent no prediction')
     except NodeDiedError as error:
-        print(f'foc_ros demo: {error}', file=sys.stderr)
+        warn_all('demo', [str(error)])
         return 1
     if stopped.is_set():
         print(f'interrupted; the messages recorded so far are in {output / "bag"}')
@@ -130,13 +129,12 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
         'hand samples': str(len(recorder.samples)),
         'delay from hand sample to prediction': f'{median:.1f} ms (median), {late:.1f} ms (99th percentile)',
     }
-    hand = build_hand_trajectory(recorder.samples)
     counters = {'counters of the node': ', '.join(counts)}
-    write_report(output / 'report', 'Reaching among obstacles, live', hand, recorder.snapshots, {**facts, **counters})
+    page = recorder.write(output / 'report', 'Reaching among obstacles, live', {**facts, **counters})
     show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
-    show_text(describe_lead(hand, recorder.snapshots))
+    show_text(describe_lead(recorder.hand, recorder.snapshots))
     print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
-    show_address(output / 'report' / 'index.html')
+    show_address(page)
     if words := describe_late(recorder.snapshots):
         show_text(words)
     return 0
@@ -146,14 +144,11 @@ def prepare(output: Path) -> None:
     """Make the output directory and remove bag and report of an earlier demo; refuse a directory with other contents."""
     if output.exists() and not (output / MARK).exists() and (not output.is_dir() or any(output.iterdir())):
         raise InputError('--output', 'a new or empty directory, or one of an earlier demo', f'{output}, which has other contents')
-    try:
-        output.mkdir(parents=True, exist_ok=True)
+    with make_folder('--output', output):
         (output / MARK).write_text('The next demo replaces bag and report beside this file.\n', encoding='utf-8')
         for name in ('bag', 'report'):
             if (output / name).exists():
                 shutil.rmtree(output / name)
-    except OSError as error:
-        raise InputError('--output', 'a directory that can be written', f'{output}: {error.strerror}') from error
 
 
 def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: threading.Event) -> None:

@@ -14,7 +14,6 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -189,7 +188,9 @@ class Study:
         """Return what writes the report, so that a missing library is reported before the work; without one it does nothing."""
         if self.report is None:
             return lambda *_: None
-        return partial(getattr(import_module('foc_ros.reporting.study_pages'), f'write_{kind}'), self.report)
+        from foc_ros.reporting import study_pages
+
+        return partial(getattr(study_pages, f'write_{kind}'), self.report)
 
     def show(self, answer: object, tables: Iterable[Table], sentences: Iterable[str], page: str, commands: str = '') -> None:
         """Print an answer as JSON, or as tables, sentences, commands as they are, and the address of the report."""

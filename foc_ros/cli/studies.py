@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json as json_format
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -75,13 +74,11 @@ def fit(data: Data, /, *, output: Path, allow: options.Allowed = (), study: Stud
         found = fitting.fit_parameters(recordings, study.params, may_lower_eta='eta' in allow)
     answer = fitting.make_answer(found, study.params, output)
     losses = fitting.find_worse_positions(found.comparison)
-    for loss in losses:
-        print(f'foc_ros fit: {loss}', file=sys.stderr)
+    warn_all('fit', losses)
     if losses and 'positions' not in allow and not options.confirm(f'Write {output} all the same?'):
         answer['output'] = None
         replace(study, report=None).show(answer, fitting.make_tables(answer), fitting.make_sentences(answer), FIT_PAGE)
-        print(f'foc_ros fit: {output} is not written; --allow positions writes it all the same', file=sys.stderr)
-        return 2
+        return warn_all('fit', [f'{output} is not written; --allow positions writes it all the same'])
     write_parameter_file('--output', output, found.config)
     write_report(data.resolve().name, answer, recordings, found.config)
     study.show(answer, fitting.make_tables(answer), fitting.make_sentences(answer), FIT_PAGE, fitting.list_commands(answer))
@@ -110,7 +107,7 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
         observed, failed = observations.observe_all(recordings, study.params, in_order)
         warn_all('evaluate', [f'{name}: {reason}' for name, reason in failed.items()])
         if not observed:
-            print(f'foc_ros evaluate: none of the {len(failed)} recordings could be evaluated', file=sys.stderr)
+            warn_all('evaluate', [f'none of the {len(failed)} recordings could be evaluated'])
             return 3
         answer = report.evaluate(observed, study.params)
         if unannounced:

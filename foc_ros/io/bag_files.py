@@ -12,7 +12,6 @@ import re
 import shutil
 import sqlite3
 import struct
-from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -27,7 +26,7 @@ from zlib import crc32
 
 from mcap.exceptions import EndOfFile
 from mcap.records import Channel as ChannelRecord
-from mcap.records import Message, Schema, Statistics
+from mcap.records import Footer, Message, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import parse_qos
@@ -111,65 +110,60 @@ class Channel:
         return MessageError('message', f'a serialized {self.msgtype}', f'{len(raw)} other bytes ({reason})')
 
 
-class StoredFile(ABC):
-    """A file of a recording, opened by `_open`, to be closed after use; :class:`McapFile` has its attributes."""
+class McapFile:
+    """An MCAP file, read by the library mcap; a stack closes it.
+
+    It is read from begin to end once before its messages are, which compares the checksums of the chunks and of the data section.
+    So no optional record is needed: neither the summary nor any index. A file without its footer, whose recorder was killed, is
+    read up to its last whole chunk.
+
+    Attributes, also of :class:`SqliteFile`: channels; message_count, of all channels and of messages without one; times_ns, of
+    the first and the last message; loss, why messages that the recorder received are missing, empty if the file is whole; doubt,
+    why they may be missing where nothing states their number; is_counted, whether the file itself states how many messages it
+    has, and has them.
+    """
 
     doubt = ''
 
-    def __init__(self, path: Path) -> None:
-        self._stack = ExitStack()
-        try:
-            self._open(path)
-        except BaseException:
-            self.close()
-            raise
-
-    @abstractmethod
-    def _open(self, path: Path) -> None:
-        """Open the file and set the attributes."""
-
-    def close(self) -> None:
-        """Close the file, and remove its copy if there is one."""
-        self._stack.close()
-
-
-class McapFile(StoredFile):
-    """An MCAP file, to be closed after use.
-
-    It is read from begin to end once before its messages are, by the library mcap, which compares the checksums of the chunks and
-    of the data section. So no optional record is needed: neither the summary nor any index. A file without its footer, whose
-    recorder was killed, is read up to its last whole chunk.
-
-    Attributes: channels; message_count, of all channels; times_ns, of the first and the last message; loss, why messages that the
-    recorder received are missing, empty if the file is whole; doubt, why they may be missing where nothing states their number;
-    is_counted, whether the file itself states how many messages it has, and has them.
-    """
+    def __init__(self, path: Path, stack: ExitStack) -> None:
+        self._stream = stack.enter_context(path.open('rb'))
+        self._stream.seek(max(self._stream.seek(0, 2) - FOOTER_BYTES, len(MAGIC)))
+        is_ended = self._stream.read().endswith(MAGIC)
+        self.loss = '' if is_ended else 'the recorder was killed; read up to the last whole chunk'
+        schemas, records = {0: Schema(id=0, data=b'', encoding='', name='')}, dict[int, ChannelRecord]()
+        counts, stated, first_ns, last_ns, self._is_in_order = Counter[int](), None, 1 << 64, 0, True
+        for record in self._read_records(is_checked=True):
+            match record:
+                case Message():
+                    counts[record.channel_id] += 1
+                    self._is_in_order &= last_ns <= record.log_time
+                    first_ns, last_ns = min(first_ns, record.log_time), max(last_ns, record.log_time)
+                case Schema():
+                    schemas[record.id] = record
+                case ChannelRecord():
+                    records[record.id] = record
+                case Statistics():
+                    stated = record.message_count
+                case Footer():
+                    self._check_summary(record)
+        self.message_count, self.times_ns, self.is_counted = counts.total(), (first_ns, last_ns), stated is not None
+        if stated not in (None, self.message_count):
+            raise RecordingError(f'damaged or cut short: {self.message_count} of its {stated} messages can be read')
+        self.channels = []
+        for key, each in records.items():
+            schema, qos = schemas.get(each.schema_id, schemas[0]), each.metadata.get('offered_qos_profiles', '')
+            definition = schema.encoding, schema.data.decode(errors='replace')
+            self.channels.append(Channel(key, each.topic, schema.name, each.message_encoding, *definition, qos, counts[key]))
 
     def messages(self, channels: list[Channel]) -> Iterator[tuple[Channel, int, bytes]]:
         """Yield channel, log time [ns] and bytes of every message of some channels, in the order of their log times."""
         by_key = {each.key: each for each in channels}
-        records = self._records(is_checked=False)
+        records = self._read_records(is_checked=False)
         found = (each for each in records if isinstance(each, Message) and each.channel_id in by_key)
         for message in found if self._is_in_order else sorted(found, key=lambda each: each.log_time):
             yield by_key[message.channel_id], message.log_time, message.data
 
-    def _has_footer(self) -> bool:
-        """Return whether the file ends as a whole one does; raise RecordingError if its summary differs from its checksum.
-
-        The library mcap does not compare that.
-        """
-        size = self._stream.seek(0, 2)
-        self._stream.seek(max(size - FOOTER_BYTES, 0))
-        end = self._stream.read()
-        if size <= FOOTER_BYTES + len(MAGIC) or not (end.startswith(b'\x02') and end.endswith(MAGIC)):
-            return False
-        start, _, stated = struct.unpack_from('<QQI', end, 9)
-        self._stream.seek(start or size - FOOTER_BYTES)
-        if stated and stated != crc32(self._stream.read()[: -len(MAGIC) - 4]):
-            raise RecordingError('damaged: the summary section differs from its checksum')
-        return True
-
-    def _records(self, *, is_checked: bool) -> Iterator[object]:
+    def _read_records(self, *, is_checked: bool) -> Iterator[object]:
         """Yield the records of the file, those of its chunks too; without a footer, up to the last whole one."""
         self._stream.seek(0)
         try:
@@ -178,35 +172,13 @@ class McapFile(StoredFile):
             if not self.loss:
                 raise
 
-    def _open(self, path: Path) -> None:
-        """Find the channels and count the messages, which must be as many as the statistics state if there are any."""
-        self._stream = self._stack.enter_context(path.open('rb'))
-        self.loss = '' if self._has_footer() else 'the recorder was killed; read up to the last whole chunk'
-        schemas: dict[int, Schema] = {}
-        records: dict[int, ChannelRecord] = {}
-        counts, stated, first_ns, last_ns, self._is_in_order = Counter[int](), None, 1 << 64, 0, True
-        for record in self._records(is_checked=True):
-            if isinstance(record, Message):
-                counts[record.channel_id] += 1
-                self._is_in_order &= last_ns <= record.log_time
-                first_ns, last_ns = min(first_ns, record.log_time), max(last_ns, record.log_time)
-            elif isinstance(record, Schema):
-                schemas.setdefault(record.id, record)
-            elif isinstance(record, ChannelRecord):
-                records.setdefault(record.id, record)
-            elif isinstance(record, Statistics):
-                stated = record.message_count
-        self.message_count, self.times_ns, self.is_counted = counts.total(), (first_ns, last_ns), stated is not None
-        if stated not in (None, self.message_count):
-            raise RecordingError(f'damaged or cut short: {self.message_count} of its {stated} messages can be read')
-        if lost := sum(count for key, count in counts.items() if key not in records):
-            raise RecordingError(f'damaged: {lost} of its {self.message_count} messages belong to no channel')
-        self.channels = []
-        for key, each in records.items():
-            schema = schemas.get(each.schema_id)
-            name, form, text = ('', '', b'') if schema is None else (schema.name, schema.encoding, schema.data)
-            qos, definition = each.metadata.get('offered_qos_profiles', ''), text.decode(errors='replace')
-            self.channels.append(Channel(key, each.topic, name, each.message_encoding, form, definition, qos, counts[key]))
+    def _check_summary(self, footer: Footer) -> None:
+        """Raise RecordingError if the summary section differs from its checksum, which the library does not compare."""
+        end = self._stream.tell()  # of the footer
+        self._stream.seek(footer.summary_start or end + len(MAGIC) - FOOTER_BYTES)
+        if footer.summary_crc not in (0, crc32(self._stream.read(end - self._stream.tell() - 4))):
+            raise RecordingError('damaged: the summary section differs from its checksum')
+        self._stream.seek(end)
 
 
 def add_checksums(file: Path) -> None:
@@ -232,14 +204,44 @@ def add_checksums(file: Path) -> None:
             start = end
 
 
-class SqliteFile(StoredFile):
-    """A file of SQLite in any version that rosbag2 has written.
+class SqliteFile:
+    """A file of SQLite in any version that rosbag2 has written; a stack closes it.
 
     A file whose recorder was killed has a log of its last transactions beside it. It is read with them, from a copy: SQLite would
     otherwise write into the recording.
     """
 
     is_counted = False
+
+    def __init__(self, path: Path, stack: ExitStack) -> None:
+        path = path.resolve()  # the logs are beside the file itself, not beside a link to it
+        beside = [path.with_name(path.name + end) for end in ('-wal', '-journal')]
+        logs = [log for log in beside if log.exists() and log.stat().st_size]
+        self.loss = f'the recorder was killed: what it had not written to {logs[0].name} is missing' if logs else ''
+        if logs:
+            folder = Path(stack.enter_context(TemporaryDirectory()))
+            for each in (path, *logs):
+                shutil.copyfile(each, folder / each.name)
+            path = folder / path.name
+        mode = 'rw' if logs else 'ro&immutable=1'
+        # in a URI, a file name may not contain %, # and ? as they are
+        self._database = sqlite3.connect(f'file:{quote(bytes(path))}?mode={mode}', uri=True)
+        stack.callback(self._database.close)
+        (state,) = self._database.execute('PRAGMA quick_check(1)').fetchone()
+        if state != 'ok':
+            raise RecordingError(f'damaged: {" ".join(state.split())}')
+        self._find_channels()
+        found = "count(*), sum(typeof(timestamp) <> 'integer'), max(rowid) - min(rowid) + 1, min(timestamp), max(timestamp)"
+        row = self._database.execute(f'SELECT {found} FROM messages NOT INDEXED').fetchone()  # noqa: S608
+        self.message_count, untimed, written, *self.times_ns = row
+        if untimed:
+            raise RecordingError(f'damaged: {untimed} of its {self.message_count} messages have no time')
+        gaps = (written or 0) - self.message_count
+        self.doubt = f'{gaps} messages between its first and its last are missing' if gaps else ''
+        with path.open('rb') as stream:
+            is_logged = stream.read(19)[18:] == b'\2'  # there was a `-wal` beside it while it was written
+        if is_logged and not logs:
+            self.doubt = 'written with a -wal file, which is not here; the last messages may be missing'
 
     def messages(self, channels: list[Channel]) -> Iterator[tuple[Channel, int, bytes]]:
         """Yield channel, log time [ns] and bytes of every message of some channels, in the order of their log times."""
@@ -249,47 +251,18 @@ class SqliteFile(StoredFile):
         for key, log_ns, raw in self._database.execute(query):
             yield by_key[key], log_ns, raw if isinstance(raw, bytes) else b''
 
-    def _open(self, path: Path) -> None:
-        path = path.resolve()  # the logs are beside the file itself, not beside a link to it
-        beside = [path.with_name(path.name + end) for end in ('-wal', '-journal')]
-        logs = [log for log in beside if log.exists() and log.stat().st_size]
-        self.loss = f'the recorder was killed: what it had not written to {logs[0].name} is missing' if logs else ''
-        if logs:
-            folder = Path(self._stack.enter_context(TemporaryDirectory()))
-            for each in (path, *logs):
-                shutil.copyfile(each, folder / each.name)
-            path = folder / path.name
-        mode = 'rw' if logs else 'ro&immutable=1'
-        # in a URI, a file name may not contain %, # and ? as they are
-        self._database = sqlite3.connect(f'file:{quote(bytes(path))}?mode={mode}', uri=True)
-        self._stack.callback(self._database.close)
-        (state,) = self._database.execute('PRAGMA quick_check(1)').fetchone()
-        if state != 'ok':
-            raise RecordingError(f'damaged: {" ".join(state.split())}')
-        with path.open('rb') as stream:
-            is_logged = stream.read(19)[18:] == b'\2'  # there was a `-wal` beside it while it was written
-        self.channels = list(self._list_channels())
-        found = "count(*), sum(typeof(timestamp) <> 'integer'), max(rowid) - min(rowid) + 1, min(timestamp), max(timestamp)"
-        row = self._database.execute(f'SELECT {found} FROM messages NOT INDEXED').fetchone()  # noqa: S608
-        self.message_count, untimed, written, *times_ns = row
-        if untimed:
-            raise RecordingError(f'damaged: {untimed} of its {self.message_count} messages have no time')
-        self.times_ns = times_ns[0] or 0, times_ns[1] or 0
-        gaps = (written or 0) - self.message_count
-        self.doubt = f'{gaps} messages between its first and its last are missing' if gaps else ''
-        if is_logged and not logs:
-            self.doubt = 'written with a -wal file, which is not here; the last messages may be missing'
-        if lost := self.message_count - sum(each.count for each in self.channels):
-            raise RecordingError(f'damaged: {lost} of its {self.message_count} messages belong to no topic')
-
-    def _list_channels(self) -> Iterator[Channel]:
-        columns = {row[1] for row in self._database.execute('PRAGMA table_info(topics)')}
-        qos = 'offered_qos_profiles' if 'offered_qos_profiles' in columns else "''"
+    def _find_channels(self) -> None:
         definitions = {}
         if self._database.execute('PRAGMA table_info(message_definitions)').fetchone():  # since ROS 2 Iron
             query = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
             definitions = {kind: (form, text) for kind, form, text in self._database.execute(query)}
         counts = dict(self._database.execute('SELECT topic_id, count(*) FROM messages NOT INDEXED GROUP BY topic_id'))
-        query = f'SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id'  # noqa: S608
-        for key, topic, kind, encoding, offered in self._database.execute(query):
-            yield Channel(key, topic, kind or '', encoding, *definitions.get(kind, ('', '')), offered, counts.get(key, 0))
+        topics = self._database.execute('SELECT * FROM topics ORDER BY id')
+        names = [name for name, *_ in topics.description]
+        self.channels = []
+        for row in topics:
+            topic = dict(zip(names, row, strict=True))
+            key, kind, qos = topic['id'], topic['type'] or '', topic.get('offered_qos_profiles', '')
+            definition = definitions.get(kind, ('', ''))
+            encoding = topic['serialization_format']
+            self.channels.append(Channel(key, topic['name'], kind, encoding, *definition, qos, counts.get(key, 0)))

@@ -11,14 +11,12 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
-from types import TracebackType
 from typing import Any
 
 import yaml
@@ -74,48 +72,38 @@ class BagReader:
         self._chosen, self._is_whole = chosen, is_whole
 
     def __enter__(self) -> BagReader:
-        self._stack = ExitStack()
-        try:
-            with _named_errors(self.path):
-                self._open()
-        except BaseException:
-            self._stack.close()
-            raise
+        check_bag(self.path)
+        with ExitStack() as stack, _named_errors(self.path):
+            self._open(stack)
+            self._stack = stack.pop_all()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
 
     def __iter__(self) -> Iterator[Item]:
         """Yield every message of an input."""
-        roles = {topic: role for role, topic in self.roles.items()} | self._transforms
-        needed = [[each for each in file.channels if each.is_read and each.topic in roles] for file in self._files]
-        counts: Counter[str] = Counter()
         with _named_errors(self.path):
-            parts = [file.messages(channels) for file, channels in zip(self._files, needed, strict=True)]
+            needed = [each for each in self._channels if each.is_read and each.topic in self._names]
+            parts = [file.messages([each for each in file.channels if each in needed]) for file in self._files]
             for channel, log_ns, stored in merge(*parts, key=lambda each: each[1]):
-                counts[channel.topic] += 1
                 raw = _decompress(stored) if stored.startswith(b'\x28\xb5\x2f\xfd') else stored  # CDR begins with a zero
-                yield Item(roles[channel.topic], channel.topic, log_ns, channel.decode(raw), raw)
-            if missing := sum(each.count for channels in needed for each in channels) - counts.total():
-                found = self.message_count - missing
-                raise RecordingError(f'damaged or cut short: {found} of its {self.message_count} messages can be read')
-            if not counts[self.roles[topics.HAND]]:
-                raise RecordingError(f'topic {self.roles[topics.HAND]} holds no message')
+                yield Item(self._names[channel.topic], channel.topic, log_ns, channel.decode(raw), raw)
 
     def find_channel(self, topic: str) -> Channel:
         """Return the channel of a topic that is read."""
         return next(each for each in self._channels if each.topic == topic and each.is_read)
 
-    def _open(self) -> None:
-        _refuse_unreadable(self.path)
+    def _open(self, stack: ExitStack) -> None:
         paths, stated, missing = _list_files(self.path) if self.path.is_dir() else ([self.path], None, '')
-        self._files = [self._open_file(each) for each in paths]
+        self._files = [_open_file(each, stack) for each in paths]
         self._channels = [each for file in self._files for each in file.channels]
         self.message_count = sum(file.message_count for file in self._files)
         if not self.message_count:
             is_cut = any(file.loss for file in self._files)
             raise RecordingError('damaged or cut short: no whole chunk' if is_cut else 'holds no messages')
+        if lost := self.message_count - sum(each.count for each in self._channels):
+            raise RecordingError(f'damaged: {lost} of its {self.message_count} messages belong to no topic')
         times_ns = [each for file in self._files if file.message_count for each in file.times_ns]
         self.duration_s = (max(times_ns) - min(times_ns)) * 1e-9
         for path, file in zip(paths, self._files, strict=True):
@@ -131,23 +119,19 @@ class BagReader:
                 warn(f'{self.path}: metadata.yaml is wrong: it {words}')
             else:
                 self._report_loss(f'metadata.yaml {words}')
-        # a topic that is read hides one of the same name that is not
+        self._assign_topics()
+
+    def _assign_topics(self) -> None:
+        """Find the topics of the inputs; a topic that is read hides one of the same name that is not."""
         kinds = {each.topic: each.msgtype for each in sorted(self._channels, key=lambda each: each.is_read)}
         self.roles = topics.assign_topics(kinds, self._chosen)
+        self._names = {topic: role for role, topic in self.roles.items()} | topics.find_transforms(kinds)
         for each in self._channels:
             if each.is_read and each.topic in self.roles.values() and each.msgtype != kinds[each.topic]:
                 raise RecordingError(f'topic {each.topic}: expected one message type, got {each.msgtype} and {kinds[each.topic]}')
-        self._transforms = topics.find_transforms({each.topic: each.msgtype for each in self._channels})
-
-    def _open_file(self, path: Path) -> McapFile | SqliteFile:
-        if path.suffix in COMPRESSED:
-            folder = Path(self._stack.enter_context(TemporaryDirectory()))
-            with zstandard.open(path, 'rb') as packed, (folder / path.stem).open('wb') as unpacked:
-                shutil.copyfileobj(packed, unpacked)
-            path = folder / path.stem
-        file = FILE_TYPES[path.suffix](path)
-        self._stack.callback(file.close)
-        return file
+        hand = self.roles[topics.HAND]
+        if not any(each.count for each in self._channels if each.topic == hand and each.is_read):
+            raise RecordingError(f'topic {hand} holds no message')
 
     def _report_loss(self, text: str) -> None:
         if self._is_whole:
@@ -170,19 +154,16 @@ class BagWriter:
             check_new_bag(self.path)
             self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.open()
+        self._undo = ExitStack()
+        self._undo.callback(shutil.rmtree, self.path, ignore_errors=True)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        is_finished = False
-        try:
-            with self._named_errors():
-                self._writer.__exit__(kind, error, trace)
-                if kind is None:
-                    add_checksums(self.path / f'{self.path.name}.mcap')
-                is_finished = kind is None
-        finally:
-            if not is_finished:
-                shutil.rmtree(self.path, ignore_errors=True)
+    def __exit__(self, *error: Any) -> None:
+        with self._undo, self._named_errors():
+            self._writer.__exit__(*error)
+            if error[0] is None:
+                add_checksums(self.path / f'{self.path.name}.mcap')
+                self._undo.pop_all()
 
     def write(self, topic: str, message: Any, log_ns: int) -> None:
         """Write a message made with :data:`TYPESTORE`."""
@@ -218,7 +199,16 @@ class BagWriter:
 def check_bag(path: Path) -> None:
     """Raise RecordingError for a path that is clearly no bag, without opening it."""
     with _named_errors(path):
-        _refuse_unreadable(path)
+        if not path.exists():
+            raise RecordingError('no such file or directory')
+        if path.is_dir() and not any(map(is_bag_file, path.iterdir())):
+            raise RecordingError('no .mcap or .db3 file in the directory: not a bag')
+        if path.is_file() and path.suffix == '.bag':
+            raise RecordingError('a bag of ROS 1: convert it to ROS 2, for example with rosbags-convert')
+        if not path.is_dir() and not is_bag_file(path):
+            raise RecordingError('expected a bag directory, a .mcap or a .db3 file')
+        if path.is_file() and not path.stat().st_size:
+            raise RecordingError('the file is empty')
 
 
 def check_new_bag(path: Path) -> None:
@@ -234,6 +224,15 @@ def is_bag_file(path: Path) -> bool:
 
 def _strip_compression(name: str) -> str:
     return PurePath(name).stem if name.endswith(COMPRESSED) else name
+
+
+def _open_file(path: Path, stack: ExitStack) -> McapFile | SqliteFile:
+    if path.suffix in COMPRESSED:
+        folder = Path(stack.enter_context(TemporaryDirectory()))
+        with zstandard.open(path, 'rb') as packed, (folder / path.stem).open('wb') as unpacked:
+            shutil.copyfileobj(packed, unpacked)
+        path = folder / path.stem
+    return FILE_TYPES[path.suffix](path, stack)
 
 
 def _decompress(data: bytes) -> bytes:
@@ -254,27 +253,34 @@ def _list_files(folder: Path) -> tuple[list[Path], int | None, str]:
     for path in sorted(folder.iterdir()):
         if is_bag_file(path):
             found.setdefault(_strip_compression(path.name), path)
-    metadata = folder / 'metadata.yaml'
-    if not metadata.exists():
-        return list(found.values()), None, _find_gap(found)
-    try:
-        stated = yaml.safe_load(metadata.read_text('utf-8'))['rosbag2_bagfile_information']
-        count = stated['message_count']
-        names = list(dict.fromkeys(_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']))
-        if not names or type(count) is not int:
-            raise ValueError('it names no file, or no number of messages')
-    except Exception as error:  # whatever stands in it
-        reason = ' '.join(str(error).split()) or type(error).__name__
-        warn(f'{metadata}: not the metadata of a bag, and not used ({type(error).__name__}: {reason})')
-        return list(found.values()), None, _find_gap(found)
-    if not set(names) & set(found):
-        warn(f'{metadata}: of another bag, and not used: it names {", ".join(names)}, and here is {", ".join(found) or "none"}')
+    names, count = _read_metadata(folder / 'metadata.yaml', found)
+    if count is None:
         return list(found.values()), None, _find_gap(found)
     if others := [name for name in found if name not in names]:
         warn(f'{folder}: {", ".join(others)}, which metadata.yaml does not name, is not read')
     missing = ', '.join(name for name in names if name not in found)
     words = f'{missing}, which metadata.yaml names, is missing' if missing else ''
     return [found[name] for name in names if name in found], count, words
+
+
+def _read_metadata(file: Path, found: Collection[str]) -> tuple[list[str], int | None]:
+    """Return the files and the number of messages that a metadata.yaml states, no number if it is not that of the files found."""
+    if not file.exists():
+        return [], None
+    try:
+        stated = yaml.safe_load(file.read_text('utf-8'))['rosbag2_bagfile_information']
+        count = stated['message_count']
+        names = list(dict.fromkeys(_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']))
+        if not names or type(count) is not int:
+            raise ValueError('it names no file, or no number of messages')
+    except Exception as error:  # whatever stands in it
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        warn(f'{file}: not the metadata of a bag, and not used ({type(error).__name__}: {reason})')
+        return [], None
+    if not set(names) & set(found):
+        warn(f'{file}: of another bag, and not used: it names {", ".join(names)}, and here is {", ".join(found) or "none"}')
+        return [], None
+    return names, count
 
 
 def _find_gap(names: Collection[str]) -> str:
@@ -285,20 +291,6 @@ def _find_gap(names: Collection[str]) -> str:
     if missing is None or len(numbers) < max(2, len(names)) or len(stems) > 1:
         return ''
     return f'{parts[0][1]}{missing}{parts[0][3]} is missing, by the numbers of the other files'
-
-
-def _refuse_unreadable(path: Path) -> None:
-    """Raise RecordingError for the usual mistakes; the reader finds the others."""
-    if not path.exists():
-        raise RecordingError('no such file or directory')
-    if path.is_dir() and not any(map(is_bag_file, path.iterdir())):
-        raise RecordingError('no .mcap or .db3 file in the directory: not a bag')
-    if path.is_file() and path.suffix == '.bag':
-        raise RecordingError('a bag of ROS 1: convert it to ROS 2, for example with rosbags-convert')
-    if not path.is_dir() and not is_bag_file(path):
-        raise RecordingError('expected a bag directory, a .mcap or a .db3 file')
-    if path.is_file() and not path.stat().st_size:
-        raise RecordingError('the file is empty')
 
 
 @contextmanager

@@ -17,9 +17,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from foc_ros.core.errors import FocError, RecordingError, collect, collect_all, join_errors, suggest
+from foc_ros.core.support import FARTHEST
 
-FARTHEST_M = 1e4
-"""Bound of coordinates and radii [m]; a larger one has a wrong unit or is in the wrong column."""
 MAX_BYTES = 1_000_000_000
 """Size of a day of motion capture at 200 Hz."""
 MOST_ERRORS = 100
@@ -32,8 +31,8 @@ class Column(NamedTuple):
     """A column of numbers in [low, high]; default: the value in a table without the column, None where it is needed."""
 
     name: str
-    low: float = -FARTHEST_M
-    high: float = FARTHEST_M
+    low: float = -FARTHEST
+    high: float = FARTHEST
     default: float | None = None
 
 
@@ -48,16 +47,15 @@ class Row:
 
     def read_numbers(self, *columns: Column) -> list[float]:
         """Return the cells of some columns; raises RecordingError, with a note for every further wrong cell."""
-        return collect_all(self.read_number, columns)
+        return collect_all(self._read_number, [(each,) for each in columns])
 
-    def read_number(self, column: str, low: float = -FARTHEST_M, high: float = FARTHEST_M, default: float | None = None) -> float:
-        """Return a cell as a number in [low, high]; default: if the table does not have the column."""
-        if column not in self.cells and default is not None:
-            return default
-        value = self.parse_number(column)
-        if not low <= value <= high:
-            hint = ' with a decimal point' if self.decimal_mark == '.' and ',' in self.cells[column] else ''
-            raise self.make_error(column, f'a number{hint} in [{low:.12g}, {high:.12g}]')
+    def _read_number(self, column: Column) -> float:
+        if column.name not in self.cells and column.default is not None:
+            return column.default
+        value = self.parse_number(column.name)
+        if not column.low <= value <= column.high:
+            hint = ' with a decimal point' if self.decimal_mark == '.' and ',' in self.cells[column.name] else ''
+            raise self.make_error(column.name, f'a number{hint} in [{column.low:.12g}, {column.high:.12g}]')
         return value
 
     def parse_number(self, column: str) -> float:

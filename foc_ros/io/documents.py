@@ -55,9 +55,9 @@ class _StrictLoader(yaml.SafeLoader):
 
 _StrictLoader.add_constructor('tag:yaml.org,2002:int', _StrictLoader.construct_yaml_int)
 _StrictLoader.add_constructor('tag:yaml.org,2002:float', _StrictLoader.construct_yaml_float)
-# as for ROS, and YAML 1.2, 1e-3 and .5e2 are numbers; for PyYAML only 1.0e-3 and .5e+2 are
-_EXPONENT = re.compile(r'[-+]?([0-9]+\.?|[0-9]*\.[0-9]+)e[-+]?[0-9]+$', re.IGNORECASE)
-_StrictLoader.add_implicit_resolver('tag:yaml.org,2002:float', _EXPONENT, list('-+.0123456789'))
+# as for ROS, and YAML 1.2, 1e-3, .5e2 and -.5 are numbers; for PyYAML only 1.0e-3, .5e+2 and -0.5 are
+_NUMBER = re.compile(r'[-+]?([0-9]+\.?|[0-9]*\.[0-9]+)e[-+]?[0-9]+$|[-+]\.[0-9]+$', re.IGNORECASE)
+_StrictLoader.add_implicit_resolver('tag:yaml.org,2002:float', _NUMBER, list('-+.0123456789'))
 
 
 def read_document(file: Path) -> Any:

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from foc_ros.core.errors import InputError
@@ -32,6 +34,16 @@ def check_folder(option: str, directory: Path) -> None:
         raise InputError(option, 'a folder', f'{file}, which is a file')
     if not os.access(file, os.W_OK):
         raise InputError(option, 'a directory that can be written', directory)
+
+
+@contextmanager
+def make_folder(option: str, directory: Path) -> Iterator[None]:
+    """Make a folder; raise InputError, which names the option, where that or writing to it within the context is impossible."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise InputError(option, 'a folder that can be written', f'{directory}: {error.strerror}') from error
 
 
 def check_picture(option: str, file: Path) -> None:

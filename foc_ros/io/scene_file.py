@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag, Validat
 
 from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, join_errors
+from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, collect_all, join_errors
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.scene import ReachingScene
@@ -167,11 +167,7 @@ class SceneFields(Fields):
 
     def build_obstacles(self) -> Obstacles:
         """Return the obstacles; raises SceneError, with a note for every further error."""
-        errors: list[FocError] = []
-        shapes = [collect(errors, _build_shape, row, each) for row, each in enumerate(self.obstacles)]
-        if errors:
-            raise join_errors(errors)
-        return collect_obstacles([each for each in shapes if each is not None])
+        return collect_obstacles(collect_all(_build_shape, enumerate(self.obstacles)))
 
 
 KINDS: dict[str, type[Fields]] = {
@@ -195,14 +191,10 @@ def parse_scene(document: object) -> ReachingScene:
     if not isinstance(document, dict):
         raise SceneError('scene', 'a mapping of fields', reprlib.repr(document))
     errors: list[FocError] = []
-    config, fields, obstacles, table = collect(errors, _read_config, document), None, None, None
-    try:
-        fields = SceneFields.model_validate({name: value for name, value in document.items() if name not in PARAMETERS})
-    except ValidationError as invalid:
-        errors += [SceneError(*each) for each in describe_errors(invalid, NAMES)]
-    if fields is not None:
-        obstacles, table = collect(errors, fields.build_obstacles), collect(errors, fields.build_goals)
-    if config is None or fields is None or obstacles is None or table is None or errors:
+    config, fields = collect(errors, _read_config, document), collect(errors, _read_fields, document)
+    obstacles = None if fields is None else collect(errors, fields.build_obstacles)
+    table = None if fields is None else collect(errors, fields.build_goals)
+    if config is None or fields is None or obstacles is None or table is None:
         raise join_errors(errors)
     noise = None if fields.noise is None else np.array([config.foc.noise_x, config.foc.noise_y])
     scene = ReachingScene(fields.build_hand(), table.positions, obstacles, noise, None, config, table.names, table.objects)
@@ -233,6 +225,14 @@ def _read_config(scene: Mapping[str, Any]) -> Config:
     if errors:
         raise join_errors(errors)
     return config
+
+
+def _read_fields(scene: Mapping[str, Any]) -> SceneFields:
+    try:
+        return SceneFields.model_validate({name: value for name, value in scene.items() if name not in PARAMETERS})
+    except ValidationError as invalid:
+        errors = [SceneError(*each) for each in describe_errors(invalid, NAMES)]
+    raise join_errors(errors)
 
 
 def _build_shape(row: int, given: CircleFields | BoxFields | HullFields) -> Shape:

@@ -107,12 +107,12 @@ class Jobs:
             self._job.cancel()
 
     async def _run(self, name: str, recording: Recording) -> None:
-        def say(state: str, text: str, **values: Any) -> None:
-            self._say('job', name=name, state=state, text=text, seconds=self.seconds, **values)
+        def say(state: str, text: str) -> None:
+            self._say('job', name=name, state=state, text=text, seconds=self.seconds)
 
+        work = {'report': self._write_report, 'fit': self._fit, 'compare': self._compare}[name]
         try:
-            work = {'report': self._write_report, 'fit': self._fit, 'compare': self._compare}[name]
-            say('done', **await work(recording, lambda text: say('running', text)))
+            say('done', await work(recording, lambda text: say('running', text)))
         except asyncio.CancelledError:
             say('cancelled', 'cancelled')
             raise
@@ -121,11 +121,11 @@ class Jobs:
             if not isinstance(error, FocError):
                 raise
 
-    async def _write_report(self, recording: Recording, _: Note) -> dict[str, Any]:
+    async def _write_report(self, recording: Recording, _: Note) -> str:
         self.report = await asyncio.to_thread(recording.write_report)
-        return {'text': 'The report is ready.'}
+        return 'The report is ready.'
 
-    async def _fit(self, recording: Recording, note: Note) -> dict[str, Any]:
+    async def _fit(self, recording: Recording, note: Note) -> str:
         """Fit the parameters to the trials without guidance, and write OPERATOR."""
         folder = recording.folder
         options = '--params', folder / PARAMETERS, '--output', folder / OPERATOR, '--allow', 'positions', '--json'
@@ -133,15 +133,17 @@ class Jobs:
         losses = find_worse_positions(answer['comparison'])
         self.operator = folder / OPERATOR
         self._note_fitted(not losses)
-        text = 'predictions now use your parameters.'
-        if losses:
-            text = f'{"; ".join(losses)}. Predictions use the standard parameters, unless you choose yours.'
         fitted = {**answer['parameters'], **answer['chosen']}
         rows = [(name, _format(each['given']), _format(each['value'])) for name, each in fitted.items()]
-        changed, text = [row for row in rows if row[1] != row[2]], text[0].upper() + text[1:] + _name_unused(answer['failed'])
-        return {'text': text, 'columns': ('parameter', 'before', 'after'), 'rows': changed}
+        changed = [row for row in rows if row[1] != row[2]]
+        self._say('result', columns=('parameter', 'before', 'after'), rows=changed)
+        text = 'Predictions now use your parameters.'
+        if losses:
+            words = '; '.join(losses)
+            text = f'{words[0].upper()}{words[1:]}. Predictions use the standard parameters, unless you choose yours.'
+        return text + _name_unused(answer['failed'])
 
-    async def _compare(self, recording: Recording, note: Note) -> dict[str, Any]:
+    async def _compare(self, recording: Recording, note: Note) -> str:
         """Score the trials without guidance of a session, before and after a fit."""
         folder, operator = recording.folder, self.operator
         assert operator is not None
@@ -151,10 +153,10 @@ class Jobs:
         ]
         before, after = map(summarise_evaluation, answers)
         rows = [(name, before[name], after.get(name, '-')) for name in before]
+        self._say('result', columns=('', 'before', 'after'), rows=rows)
         is_same = folder == operator.parent
         text = 'on the trials of the fit; record new trials for an independent comparison' if is_same else 'on new trials'
-        unused = _name_unused({**answers[0]['failed'], **answers[1]['failed']})
-        return {'text': f'Before and after the fit, {text}.{unused}', 'columns': ('', 'before', 'after'), 'rows': rows}
+        return f'Before and after the fit, {text}.{_name_unused({**answers[0]["failed"], **answers[1]["failed"]})}'
 
 
 def summarise_evaluation(answer: Mapping[str, Any]) -> dict[str, str]:

@@ -47,7 +47,6 @@ class Predictor:
     """
 
     def __init__(self, config: Config, receive: Receive) -> None:
-        self.config = config
         self._receive = receive
         self._intake = Intake(Pipeline(config, load_library(config.homotopy.library)))
         self._queue: SimpleQueue[tuple[str, Any] | Config | None] = SimpleQueue()
@@ -58,7 +57,7 @@ class Predictor:
 
     def start(self) -> None:
         """Begin to predict."""
-        warm_up(self.config)
+        warm_up(self._intake.pipeline.config)
         self._guidance.set_released(False)
         self._guidance.start()
         self._thread.start()
@@ -94,27 +93,20 @@ class Predictor:
         return State('well', 'predicting')
 
     def _run(self) -> None:
-        while True:
-            waiting = [self._queue.get()]
-            while not self._queue.empty():
-                waiting.append(self._queue.get())
-            for each in waiting:
-                if each is None:
-                    return
-                self._take(each)
+        while (given := self._queue.get()) is not None:
             try:
-                self._predict()
+                if isinstance(given, Config):
+                    self._intake.pipeline.reconfigure(given)
+                    self._guidance.reconfigure(given)
+                else:
+                    self._take(*given)
+                if self._queue.empty():
+                    self._predict()
             except Exception as error:
                 self._note_error(error)
                 self._intake.pipeline.reset()
 
-    def _take(self, given: tuple[str, Any] | Config) -> None:
-        if isinstance(given, Config):
-            self.config = given
-            self._intake.pipeline.reconfigure(given)
-            self._guidance.reconfigure(given)
-            return
-        role, message = given
+    def _take(self, role: str, message: Any) -> None:
         self._intake.take(role, message)
         if role == HAND:
             self._guidance.note_hand(self._intake.pipeline.hand_state, monotonic())

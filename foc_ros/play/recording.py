@@ -10,7 +10,7 @@ DIR/2026-01-31_12-00-00/guided/           trials with guidance
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.config import Config
-from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.core.errors import RecordingError
 from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, HandSample, as_readonly
 from foc_ros.io.bags import TYPESTORE, BagWriter
+from foc_ros.io.outputs import make_folder
 from foc_ros.io.topics import TYPES
 from foc_ros.reporting.page import Table
-from foc_ros.reporting.report import write_report
-from foc_ros.reporting.views import build_hand_trajectory
+from foc_ros.reporting.report import ReportCollector
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, Place
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import MessageTypes
@@ -51,20 +51,16 @@ class Recording:
 
     def __init__(self, data: Path, config: Config, scene: Mapping[str, Any], types: MessageTypes) -> None:
         name, number = datetime.now().astimezone().strftime('%Y-%m-%d_%H-%M-%S'), 1
-        try:
-            data.mkdir(parents=True, exist_ok=True)
+        with make_folder('--data', data):
             while (folder := data / (name if number == 1 else f'{name}_{number}')).exists():
                 number += 1
             folder.mkdir()
-        except OSError as error:
-            raise InputError('--data', 'a folder that can be written', f'{data}: {error.strerror}') from error
         self.folder = folder
         self.scores: Table | None = None
         self._types, self._scene = types, dict[str, bytes]()
         self._trial: list[tuple[str, bytes, int]] | None = None
         self._trials = {UNGUIDED: 0, GUIDED: 0}
-        self._samples: list[HandSample] = []
-        self._snapshots: list[Prediction] = []
+        self._shown = ReportCollector()
         write_parameter_file('--data', self.folder / PARAMETERS, config)
         self._bag = BagWriter(self.folder / SESSION).__enter__()
         for role, message in scene.items():
@@ -72,11 +68,11 @@ class Recording:
 
     def add_hand(self, stamp_ns: int, position: Point) -> None:
         """Keep a hand sample for the report."""
-        self._samples.append(HandSample(stamp_ns, as_readonly(np.array(position)), 0.0, FRAME))
+        self._shown.samples.append(HandSample(stamp_ns, as_readonly(np.array(position)), 0.0, FRAME))
 
     def add_input(self, role: str, message: Any) -> None:
         """Record a message to the predictor."""
-        now_ns, raw = time_ns(), _serialize(message)
+        now_ns, raw = time_ns(), bytes(TYPESTORE.serialize_cdr(message, TYPES[role]))
         self._bag.write_raw(f'/{role}', TYPES[role], raw, now_ns)
         if role in ('obstacles', 'goals'):
             self._scene[role] = raw
@@ -86,8 +82,9 @@ class Recording:
     def add_prediction(self, prediction: Prediction, snapshot: Prediction) -> None:
         """Record a prediction, and keep its snapshot for the report."""
         # at 20 Hz: the page of an hour would be too large otherwise
-        if not self._snapshots or snapshot.stamp_ns - self._snapshots[-1].stamp_ns >= NANOSECONDS // 20:
-            self._snapshots.append(snapshot)
+        shown = self._shown.snapshots
+        if not shown or snapshot.stamp_ns - shown[-1].stamp_ns >= NANOSECONDS // 20:
+            shown.append(snapshot)
         # markers and path say nothing more
         self._add_outputs(encode_outputs(prediction, 'xy', self._types, ('prediction', 'likelihoods')))
 
@@ -121,15 +118,9 @@ class Recording:
 
     def write_report(self) -> Path:
         """Write the report and return its page; raises InputError where that is impossible."""
-        directory, tables = self.folder / 'report', [] if self.scores is None else [self.scores]
-        title = f'Session {self.folder.name}'
-        files: Sequence[Path] = write_report(directory, title, build_hand_trajectory(self._samples), self._snapshots, {}, tables)
-        return files[0]
+        tables = [] if self.scores is None else [self.scores]
+        return self._shown.write(self.folder / 'report', f'Session {self.folder.name}', {}, tables)
 
     def _add_outputs(self, messages: Mapping[str, Any]) -> None:
         for name, message in messages.items():
-            self._bag.write_raw(f'/foc/{name}', message.__msgtype__, _serialize(message), time_ns())
-
-
-def _serialize(message: Any) -> bytes:
-    return bytes(TYPESTORE.serialize_cdr(message, message.__msgtype__))
+            self._bag.write(f'/foc/{name}', message, time_ns())

@@ -154,6 +154,5 @@ def view_candidates(snapshot: Prediction, slots: Slots) -> list[dict[str, Any]]:
     views: list[dict[str, Any]] = [
         {'slot': slot, 'way': each.way, 'likelihood': round(each.likelihood, 4), **encoded} for each, slot, encoded in given
     ]
-    nothing: dict[str, Any] = {'slot': None, 'way': None, 'likelihood': None, 'motor': [], 'total': []}
-    views += [nothing | encode_unsolved(snapshot, each) for each in lost]
+    views += [{'slot': None, 'way': None, 'likelihood': None} | encode_unsolved(snapshot, each) for each in lost]
     return [view | {'goal': each.candidate.goal} for view, each in zip(views, (*shown, *lost), strict=True)]

@@ -49,11 +49,12 @@ class Session:
         self._scene: scene.PlayScene = scene.FIRST_SCENE
         self._page: Send | None = None
         self._kept: dict[str, dict[str, Any]] = {}
+        self._told: dict[str, dict[str, Any]] = {}
         self._clock, self._slots = messages.PageClock(), Slots()
         self._hands: deque[tuple[int, messages.HandMessage]] = deque(maxlen=256)
         self._tasks: tasks.Tasks | None = None
         self._guided_before = self._is_guided
-        self._force_s, self._touched = 0.0, 0
+        self._force_s = 0.0
 
     @property
     def report(self) -> Path | None:
@@ -77,10 +78,10 @@ class Session:
             # with a spring that is as stiff as guidance at most, the loop of cursor and guidance is stable at any delay
             coupling=max(self._standard.guidance.k_max, 1.0),
         )
-        self._say_settings()
         self._send_scene()  # so that the first status does not miss obstacles
         self._say_scene()
-        self._say_task()
+        self._told.clear()
+        self._tell_state()
         for message in list(self._kept.values()):
             page(message | {'seconds': self._jobs.seconds} if message.get('state') == 'running' else message)
 
@@ -129,11 +130,11 @@ class Session:
                 if self._recording is not None:
                     raise InputError('job', 'a session that has ended', message.name)
                 self._jobs.begin(message.name)
-                self._say_settings()
             case messages.PlainMessage(type='stop'):
                 self._end_tasks()
             case messages.PlainMessage():
                 self._jobs.cancel()
+        self._tell_state()
 
     def tick(self) -> None:
         """Repeat the scene, which grows too old otherwise, and tell the page the state of the predictor; twice a second."""
@@ -152,6 +153,8 @@ class Session:
         if self._tasks is not None:
             self._follow_tasks(self._tasks, stamp_ns * 1e-9, message.position)
 
+    # tasks
+
     def _begin_tasks(self, settings: messages.TasksMessage) -> None:
         self._end_recording()
         self._begin_recording()
@@ -159,21 +162,17 @@ class Session:
         self._kept.pop('score', None)
         self._prepare_trial(self._tasks)
 
-    # tasks
-
     def _prepare_trial(self, running: tasks.Tasks) -> None:
         if self._scene is not running.trial.scene:
             self._set_scene(running.trial.scene)
             self._say_scene()
         self._set_guidance(running.trial.is_guided)
-        self._say_task()
 
     def _follow_tasks(self, running: tasks.Tasks, t: float, position: scene.Point) -> None:
-        trial, scored = running.trial, len(running.scores)
+        trial, scored, touched = running.trial, len(running.scores), running.touched
         phase = running.follow(t, position)
-        if self._touched < running.touched:
+        if running.touched > touched:
             self._say('touched')
-        self._touched = running.touched
         if phase is None:
             return
         if phase is tasks.Phase.REACH:
@@ -184,8 +183,6 @@ class Session:
             self._end_tasks()
         elif phase is tasks.Phase.RETURN and self._tasks is not None:
             self._prepare_trial(running)
-        else:
-            self._say_task()
 
     def _end_tasks(self) -> None:
         if self._tasks is None:
@@ -204,20 +201,17 @@ class Session:
             if self._is_guided != self._guided_before or self._given != self._read_parameters():
                 self._is_guided = self._guided_before
                 self._configure()
-        self._say_task()
 
     # recordings
 
     def _begin_recording(self) -> None:
         self._recording = Recording(self._data, self._standard, self._scene.encode(self._types, time_ns()), self._types)
         self._jobs.recording = self._recording
-        self._say_settings()
 
     def _end_recording(self) -> None:
         if self._recording is not None:
             recording, self._recording = self._recording, None
             recording.close()
-            self._say_settings()
 
     def _record(self, add: Callable[[Recording], None]) -> None:
         """Add to the recording, if there is one; one that cannot be written ends, and the tasks with it."""
@@ -230,7 +224,7 @@ class Session:
             recording.discard(error)
             self._leave_tasks()
             self._say('error', text=str(error))
-            self._say_settings()
+            self._tell_state()
 
     # the predictor
 
@@ -251,7 +245,6 @@ class Session:
         if self._tasks is None:  # the parameters do not change while tasks run, also where a fit ends meanwhile
             self._given = self._read_parameters()
         self.predictor.configure(self._config)
-        self._say_settings()
 
     def _set_guidance(self, is_on: bool) -> None:
         if is_on != self._is_guided:
@@ -303,33 +296,36 @@ class Session:
         message = {'type': kind, **values}
         if kind in ('score', 'job', 'result'):  # repeated to a page that is loaded again
             self._kept[kind] = message
-            if 'rows' in message and kind == 'job':
-                self._kept['result'] = {'type': 'result', 'columns': values['columns'], 'rows': values['rows']}
         if self._page is not None:
             self._page(message)
-        if kind == 'job' and values['state'] == 'done':
-            self._say_settings()
+        if kind == 'job':
+            self._tell_state()
 
     def _say_scene(self) -> None:
         self._say('scene', **self._scene.model_dump())
 
-    def _say_settings(self) -> None:
-        recording = self._jobs.recording
-        self._say(
-            'settings',
-            guided=self._is_guided and not self._is_blind,
-            parameters=self._parameters,
-            fitted=self._jobs.operator is not None,
-            recording=self._recording is not None,
-            session='' if recording is None else str(recording.folder),
-            report=recording is not None and self._jobs.report is not None and self._jobs.report.is_relative_to(recording.folder),
-        )
+    def _tell_state(self) -> None:
+        """Tell settings and task where they have changed."""
+        for kind, values in (('settings', self._list_settings()), ('task', self._describe_task())):
+            if self._told.get(kind) != values:
+                self._told[kind] = values
+                self._say(kind, **values)
 
-    def _say_task(self) -> None:
+    def _list_settings(self) -> dict[str, Any]:
+        recording, report = self._jobs.recording, self._jobs.report
+        return {
+            'guided': self._is_guided and not self._is_blind,
+            'parameters': self._parameters,
+            'fitted': self._jobs.operator is not None,
+            'recording': self._recording is not None,
+            'session': '' if recording is None else str(recording.folder),
+            'report': recording is not None and report is not None and report.is_relative_to(recording.folder),
+        }
+
+    def _describe_task(self) -> dict[str, Any]:
         if self._tasks is None:
-            self._say('task', phase='none')
-            return
+            return {'phase': 'none'}
         running = self._tasks
         goal = running.trial.goal if running.phase is tasks.Phase.REACH else None
         place = {'trial': running.number + 1, 'trials': len(running.trials), 'goal': goal}
-        self._say('task', phase=running.phase.value, **place, blinded=running.settings.blinded)
+        return {'phase': running.phase.value, **place, 'blinded': running.settings.blinded}

@@ -23,10 +23,10 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obstacle
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
-from foc_ros.io.outputs import MARK, PICTURE_SUFFIXES
+from foc_ros.io.outputs import MARK
 from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
 
-from .views import COLOURS, LIKELY, NOTED, SLOTS, HandTrajectory, describe_ghost, list_unsolved
+from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghost
 
 try:
     import matplotlib as mpl
@@ -67,11 +67,8 @@ def open_figure(width_in: float, height_in: float) -> Iterator[Figure]:
         yield Figure(figsize=(width_in, height_in), layout='constrained')
 
 
-def save_figure(figure: Figure, file: Path | str) -> None:
-    """Write a figure as PNG, PDF or SVG, by the file's suffix; raises InputError if that is not possible."""
-    suffix = Path(file).suffix.lower()
-    if suffix not in PICTURE_SUFFIXES:
-        raise InputError('picture file', f'a name that ends in {", ".join(PICTURE_SUFFIXES)}', str(file))
+def save_figure(figure: Figure, file: Path) -> None:
+    """Write a figure as PNG, PDF or SVG, by the file's suffix; raises InputError if it cannot be written."""
     # without its date it is the same file each time
     metadata = {
         '.png': {'Software': MARK},
@@ -79,7 +76,7 @@ def save_figure(figure: Figure, file: Path | str) -> None:
         '.svg': {'Creator': MARK, 'Date': None},
     }
     try:
-        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=metadata[suffix])
+        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=metadata[file.suffix.lower()])
     except OSError as error:
         raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
 
@@ -110,11 +107,6 @@ def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = 
     found = 'estimated' if candidate.is_estimated else 'compromised'
     words = '' if candidate.is_solved else f'; {found}: eta {candidate.eta:.3f}'
     return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
-
-
-def number_labels(snapshot: Prediction) -> dict[str, int]:
-    """Return slots of the candidates of a single prediction, by label; candidates beyond the number of slots have none."""
-    return {each.label: number for number, each in enumerate(snapshot.candidates_with_likelihood[:SLOTS])}
 
 
 def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
@@ -187,34 +179,34 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
     Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
-    has its total uncertainty, too. Ghosts have their reasons beside them. The legend has one line for all below NOTED.
+    has its total uncertainty, too. Ghosts have their reasons beside them. The legend has one line for all below NOTED, and the
+    others in the order of their group identities.
     """
-    goals, lost = len(snapshot.goal_positions), list_unsolved(snapshot)
-    ghosts = [(find_drawn_curve(each), describe_in_legend(each, goals), *describe_ghost(snapshot, each), 4.0) for each in lost]
-    shown = [(each, *describe_ghost(snapshot, each)) for each in snapshot.candidates_with_likelihood]
-    count = sum(each.likelihood < NOTED and not reason for each, reason, _ in shown)
+    goals, entered = len(snapshot.goal_positions), set[str]()
+    order = {each.label: f'candidate {row:04d}' for row, each in enumerate(snapshot.candidates)}
+    views = [(each, *describe_ghost(snapshot, each)) for each in snapshot.candidates]
+    paths = [each for each, reason, _ in views if not reason]
+    count = sum(each.likelihood < NOTED for each in paths)
     more = f'{count} more path{"s, each" if count > 1 else ""} below {100 * NOTED:.0f} %'
-    for rank, (each, reason, place) in reversed(list(enumerate(shown))):
-        slot = slots.get(each.label) if each.likelihood >= NOTED else None
-        letter, curve = get_letter(slot), find_drawn_curve(each)
-        if reason:
-            width = 4.0 if each.likelihood >= NOTED else 1.5
-            ghosts.append((curve, describe_in_legend(each, goals, letter, reason), reason, place, width))
-        else:
-            style = get_candidate_style(slot, each.likelihood, not each.is_solved)
-            if each.likelihood < NOTED:
-                style |= {'linewidth': 0.7, 'alpha': 0.7}  # thinner than the hand later
-            if rank == 0 or each.likelihood >= LIKELY:
-                _draw_ellipses(axes, each, style['color'], is_total=rank == 0)
-            label = describe_in_legend(each, goals, letter) if each.likelihood >= NOTED else more
-            axes.plot(*curve.T, zorder=3, label=label, **style)
-            path = each.solution.path
-            draw_tag(axes, path[int((0.45 + 0.12 * (rank % 3)) * (len(path) - 1))], letter, style['color'])
-    entered: set[str] = set()
-    for number, (curve, label, reason, place, width) in enumerate(ghosts):
-        axes.plot(*curve.T, color=GHOST_COLOUR, linewidth=width, alpha=0.3, solid_capstyle='round', zorder=2, label=label)
+    for rank, each in reversed(list(enumerate(paths))):
+        is_noted, is_first = each.likelihood >= NOTED, each is snapshot.candidates[0]
+        slot = slots.get(each.label) if is_noted else None
+        style = get_candidate_style(slot, each.likelihood, not each.is_solved)
+        if not is_noted:
+            style |= {'linewidth': 0.7, 'alpha': 0.7}  # thinner than the hand later
+        if is_first or each.likelihood >= LIKELY:
+            _draw_ellipses(axes, each, style['color'], is_total=is_first)
+        label = describe_in_legend(each, goals, get_letter(slot)) if is_noted else more
+        axes.plot(*find_drawn_curve(each).T, zorder=3, label=label, gid=order[each.label] if is_noted else None, **style)
+        path = each.solution.path
+        draw_tag(axes, path[int((0.45 + 0.12 * (rank % 3)) * (len(path) - 1))], get_letter(slot), style['color'])
+    for number, (each, reason, place) in enumerate(view for view in reversed(views) if view[1]):
+        is_noted, curve = not each.has_likelihood or each.likelihood >= NOTED, find_drawn_curve(each)
+        label = describe_in_legend(each, goals, get_letter(slots.get(each.label) if is_noted else None), reason)
+        look = {'color': GHOST_COLOUR, 'linewidth': 4.0 if is_noted else 1.5, 'alpha': 0.3, 'solid_capstyle': 'round'}
+        axes.plot(*curve.T, zorder=2, label=label, gid=order[each.label], **look)
         share = 0.5 + 0.15 * (number % 3) if place is None else place
-        if reason and reason not in entered:  # those of one obstacle would cover each other
+        if reason not in entered:  # those of one obstacle would cover each other
             look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
             look['bbox'] = {'facecolor': 'white', 'alpha': 0.7, 'linewidth': 0.0, 'pad': 1.0}
             axes.annotate(reason, curve[round(share * (len(curve) - 1))], annotation_clip=True, **look)

@@ -21,7 +21,7 @@ from foc_ros.core.types import Array
 
 from . import draw
 from .draw import Bounds, Figure, Span, compute_bounds, open_figure
-from .views import NOTED, HandTrajectory, build_snapshot
+from .views import SLOTS, HandTrajectory, build_snapshot
 
 WIDTH_IN = 6.4
 SIZE_PT, COLUMNS = 8.0, 70
@@ -32,16 +32,17 @@ _PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
 """Subplot and place of axes before a legend took a part of it."""
 
 
-def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array | None = None) -> None:
+def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array | None = None, is_alone: bool = False) -> None:
     """Draw a scene with the candidates in it, lettered in order of likelihood, the hand and a legend of all that is drawn.
 
-    hand (s, 2): where it is now [m], if it is not drawn yet.
+    hand (s, 2): where it is now [m], if it is not drawn yet; is_alone: whether the figure becomes higher by the legend.
     """
     draw.draw_scene(axes, snapshot.obstacles, snapshot.goal_positions, bounds, names=snapshot.goal_names)
-    draw.draw_candidates(axes, snapshot, draw.number_labels(snapshot))
+    shown = snapshot.candidates_with_likelihood
+    draw.draw_candidates(axes, snapshot, {each.label: slot for slot, each in enumerate(shown[:SLOTS])})
     if hand is not None and len(hand):
         draw.draw_hand_now(axes, hand)
-    draw_legend(axes, None if snapshot.candidates_with_likelihood else 'no candidate could be solved')
+    draw_legend(axes, None if shown else 'no candidate could be solved', is_alone)
 
 
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
@@ -65,26 +66,24 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
 
     snapshot = build_snapshot(prediction)
     hand, bounds = _frame_scene(snapshot)
+    is_alone = axes is None
     with plt.rc_context(draw.STYLE):
         if axes is None:
-            axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds, snapshot)), layout='constrained').subplots()
-        draw_snapshot(axes, snapshot, bounds, hand)
+            axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds)), layout='constrained').subplots()
+        draw_snapshot(axes, snapshot, bounds, hand, is_alone)
     return axes
 
 
-def write_picture(file: Path | str, prediction: Prediction) -> None:
-    """Write a picture of a prediction, in the format of the file's suffix.
-
-    Raises InputError if the suffix is not that of a picture format or the file cannot be written.
-    """
+def write_picture(file: Path, prediction: Prediction) -> None:
+    """Write a picture of a prediction as PNG, PDF or SVG, by the file's suffix; raises InputError if it cannot be written."""
     draw.save_figure(make_scene_figure(build_snapshot(prediction)), file)
 
 
 def make_scene_figure(snapshot: Prediction) -> Figure:
     """Return a figure of one snapshot: scene, candidates and legend."""
     hand, bounds = _frame_scene(snapshot)
-    with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
-        draw_snapshot(figure.subplots(), snapshot, bounds, hand)
+    with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
+        draw_snapshot(figure.subplots(), snapshot, bounds, hand, is_alone=True)
     return figure
 
 
@@ -105,10 +104,10 @@ def make_moment_figure(hand: HandTrajectory, snapshot: Prediction, span: Span) -
     """Return a figure of one snapshot with the hand during a movement, whose start and end [ns] are span."""
     paths, during = snapshot.candidates_with_likelihood, hand.positions[hand.between(*span)]
     bounds = compute_bounds(snapshot.obstacles, snapshot.goal_positions, paths, during)
-    with open_figure(WIDTH_IN, _get_height(bounds, snapshot)) as figure:
+    with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
         axes = figure.subplots()
         draw.draw_hand(axes, hand, snapshot.stamp_ns, span)
-        draw_snapshot(axes, snapshot, bounds)
+        draw_snapshot(axes, snapshot, bounds, is_alone=True)
     return figure
 
 
@@ -119,27 +118,16 @@ def _frame_scene(snapshot: Prediction) -> tuple[Array, Bounds]:
     return hand, compute_bounds(snapshot.obstacles, snapshot.goal_positions, snapshot.candidates, hand)
 
 
-def _get_height(bounds: Bounds, snapshot: Prediction | None = None) -> float:
-    """Return the height [in] of a scene with equal axes, its axis labels and a legend of candidates."""
-    height = float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.6
-    if snapshot is None:
-        return height
-    return height + measure_legend(snapshot)
+def _get_height(bounds: Bounds) -> float:
+    """Return the height [in] of a scene with equal axes and its axis labels."""
+    return float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.6
 
 
-def measure_legend(snapshot: Prediction) -> float:
-    """Return the height of the legend of a scene that is as wide as a page [in], with its signs except those of a moving hand."""
-    signs = 7 + any(not each.is_solved for each in snapshot.candidates_with_likelihood)
-    own = [each for each in snapshot if not each.has_likelihood or each.likelihood >= NOTED]
-    texts = [fill(draw.describe_in_legend(each, len(snapshot.goal_positions)), COLUMNS) for each in own]
-    lines = sum(1 + text.count('\n') for text in texts) + -(-signs // 2)
-    return lines * LINE * SIZE_PT / 72.0 + 0.05
-
-
-def draw_legend(axes: Any, title: str | None = None) -> None:
+def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> None:
     """Write everything that is drawn on axes into a legend, in a part of their place.
 
-    The text is as small as the place needs. A second call replaces the legend of the first.
+    is_added: whether the figure becomes higher by it; otherwise the text is as small as the place needs. A second call replaces
+    the legend of the first.
     """
     from matplotlib.lines import Line2D
 
@@ -147,19 +135,21 @@ def draw_legend(axes: Any, title: str | None = None) -> None:
     for earlier in [each for each in figure.axes if each.get_gid() == name]:
         earlier.remove()
     slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
-    width_in, height_in = figure.get_figwidth() * place.width, figure.get_figheight() * place.height
-    is_narrow = width_in < 3.5
-    columns, sign_columns = (40, 1) if is_narrow else (COLUMNS, 2)
+    width_in = figure.get_figwidth() * place.width
+    columns, sign_columns = (40, 1) if width_in < 3.5 else (COLUMNS, 2)
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    shares = {label: float(label.partition('%')[0][1:].strip().replace('-', '-1')) for label in named if '%  ' in label}
-    candidates = sorted(shares, key=lambda label: (-shares[label], label))
+    candidates = sorted((label for label in named if named[label].get_gid()), key=lambda label: (named[label].get_gid(), label))
     if any(line.get_linestyle() == ':' for line in axes.lines):
         named['dotted: not known to avoid as surely as wanted'] = Line2D([], [], color='0.35', linestyle=':', linewidth=2.0)
     signs = [label for label in named if label not in candidates]
     texts = [fill(label, columns, subsequent_indent=' ' * 10) for label in candidates]
     lines = sum(1 + text.count('\n') for text in texts) + -(-len(signs) // sign_columns) + (title is not None)
     size_pt = min(SIZE_PT, 72.0 * width_in / (0.62 * (columns + 5)))
-    wanted_in = min(lines * LINE * size_pt / 72.0 + 0.05, 0.5 * height_in)
+    wanted_in = lines * LINE * size_pt / 72.0 + 0.05
+    if is_added:
+        figure.set_figheight(figure.get_figheight() + wanted_in)
+    height_in = figure.get_figheight() * place.height
+    wanted_in = min(wanted_in, 0.5 * height_in)
     size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (LINE * max(lines, 1)))
     below = _take_place(axes, slot, place, height_in, wanted_in)
     below.set(gid=name)

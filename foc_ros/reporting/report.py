@@ -5,10 +5,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import NANOSECONDS, HandSample
-from foc_ros.io.outputs import MARK, REPORT_FILES, check_page
+from foc_ros.io.outputs import MARK, REPORT_FILES, check_page, make_folder
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
 from .draw import save_figure
@@ -30,8 +29,7 @@ COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candi
 """Facts that the page folds: raw counts, of which the warnings name what matters."""
 
 
-@dataclass(frozen=True)
-class PageWarning:
+class PageWarning(NamedTuple):
     """What went wrong, and the first moment of it: seconds after the first hand sample, None if there is none."""
 
     text: str
@@ -39,22 +37,30 @@ class PageWarning:
 
 
 class ReportCollector:
-    """Collects the steps of a replay for their report."""
+    """Collects what a report shows.
+
+    Attributes: samples, of the hand; snapshots, as `build_snapshot` and `read_snapshot` make them.
+    """
 
     def __init__(self) -> None:
         self.samples: list[HandSample] = []
         self.snapshots: list[Prediction] = []
 
+    @property
+    def hand(self) -> HandTrajectory:
+        """The measured movement."""
+        return build_hand_trajectory(self.samples)
+
     def add(self, step: Step) -> None:
-        """Keep the hand sample and the prediction of a step."""
+        """Keep the hand sample and the prediction of a step of a replay."""
         if step.sample is not None:
             self.samples.append(step.sample)
         if step.prediction is not None:
             self.snapshots.append(build_snapshot(step.prediction))
 
-    def write(self, directory: Path, title: str, summary: Mapping[str, str]) -> None:
-        """Write the report; see :func:`write_report`."""
-        write_report(directory, title, build_hand_trajectory(self.samples), self.snapshots, summary)
+    def write(self, directory: Path, title: str, summary: Mapping[str, str], tables: Sequence[Table] = ()) -> Path:
+        """Write the report and return its page; see :func:`write_report`."""
+        return write_report(directory, title, self.hand, self.snapshots, summary, tables)[0]
 
 
 def write_report(
@@ -90,17 +96,14 @@ def write_report(
         'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
     }
     page_file, numbers_file, overview_file = (directory / name for name in REPORT_FILES)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        solved = [each for each in snapshots if each.candidates_with_likelihood]
+    solved = [each for each in snapshots if each.candidates_with_likelihood]
+    with make_folder('--report', directory):
         if solved:
             goals = np.unique(np.concatenate([each.goal_positions for each in solved]), axis=0)
             bounds = compute_recording_bounds(hand, solved)
             save_figure(make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds), overview_file)
         page_file.write_text(html, encoding='utf-8', errors='replace')
         numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
-    except OSError as error:
-        raise InputError('report directory', 'a directory that can be written', f'{directory}: {error.strerror}') from error
     return [page_file, numbers_file, *([overview_file] if solved else [])]
 
 
@@ -131,27 +134,22 @@ def _collect_facts(snapshots: Sequence[Prediction]) -> dict[str, str]:
 
 
 def _collect_warnings(snapshots: Sequence[Prediction], origin_ns: int) -> list[PageWarning]:
-    def find(is_found: Callable[[Prediction], bool]) -> list[float]:
-        return [_measure_seconds(each, origin_ns) for each in snapshots if is_found(each)]
-
     if not snapshots:
         return [PageWarning('There is no prediction.')]
-    warnings, count = [], len(snapshots)
-    if at := find(lambda each: not each.candidates_with_likelihood):
-        warnings.append(PageWarning(f'In {len(at)} of {count} predictions no candidate could be solved.', at[0]))
-    if words := describe_late(snapshots):
-        warnings.append(PageWarning(words, find(is_late)[0]))
-    if at := find(lambda each: any(one.status is Status.COMPROMISED for one in each.candidates[:1])):
-        words = f'In {len(at)} of {count} predictions the most likely path avoids the obstacles less surely than wanted'
-        warnings.append(PageWarning(f'{words}. Remedy: {Status.COMPROMISED.remedy}.', at[0]))
-    lost: dict[str, list[float]] = {}
-    for each in snapshots:
-        for view in list_unsolved(each):
-            lost.setdefault(view.status.value, []).append(_measure_seconds(each, origin_ns))
-    for status, at in sorted(lost.items()):
-        words = f'{len(at)} candidate{"s" if len(at) > 1 else ""} ended with status {status}. Remedy: {Status(status).remedy}.'
-        warnings.append(PageWarning(words, at[0]))
-    return warnings
+    count, late = len(snapshots), describe_late(snapshots)
+    unsolved = [each for each in snapshots if not each.candidates_with_likelihood]
+    unsure = [each for each in snapshots if any(one.status is Status.COMPROMISED for one in each.candidates[:1])]
+    words = f'In {len(unsure)} of {count} predictions the most likely path avoids the obstacles less surely than wanted'
+    found = [
+        (f'In {len(unsolved)} of {count} predictions no candidate could be solved.', unsolved),
+        (late, [each for each in snapshots if late and is_late(each)]),
+        (f'{words}. Remedy: {Status.COMPROMISED.remedy}.', unsure),
+    ]
+    for status in sorted(Status, key=lambda each: each.value):
+        lost = [each for each in snapshots for one in list_unsolved(each) if one.status is status]
+        words = f'{len(lost)} candidate{"s" if len(lost) > 1 else ""} ended with status {status.value}. Remedy: {status.remedy}.'
+        found.append((words, lost))
+    return [PageWarning(words, _measure_seconds(each[0], origin_ns)) for words, each in found if each]
 
 
 def _measure_seconds(snapshot: Prediction, origin_ns: int) -> float:

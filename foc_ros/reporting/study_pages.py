@@ -25,11 +25,11 @@ from foc_ros.core.errors import FocError
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE
 
-from .draw import draw_scene, get_class_style
+from .draw import compute_bounds, draw_scene, get_class_style
 from .figures import make_moment_figure
 from .page import Section, explain_tables, make_chart, make_picture, write_page
 from .report import ReportCollector
-from .views import build_hand_trajectory, choose_moment
+from .views import choose_moment
 
 FEW = 20
 """Number of recordings or trials below which a page warns."""
@@ -229,17 +229,12 @@ def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     measures = {'collision_rate': 'collisions in {:.0f} % of the trials', 'completion_s': '{:.2f} s for a movement'}
     sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
     for operator in dict.fromkeys(cell['operator'] for cell in cells):
-        by_rule = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}
-        told = [
-            ' and '.join(
-                words.format(study.COLUMNS[name][1] * by_rule[rule][name])
-                for name, words in measures.items()
-                if by_rule[rule][name] is not None
-            )
-            + f' {"with" if rule == FOC else "without"} guidance'
-            for rule in (FOC, NONE)
-            if rule in by_rule
-        ]
+        by_rule, told = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}, []
+        for rule, words in ((FOC, 'with guidance'), (NONE, 'without guidance')):
+            values = {name: by_rule[rule][name] for name in measures} if rule in by_rule else {}
+            known = [measures[name].format(study.COLUMNS[name][1] * each) for name, each in values.items() if each is not None]
+            if values:
+                told.append(f'{" and ".join(known)} {words}')
         sentences.append(f'{operator.replace("_", " ").capitalize()}: {"; ".join(told)}.')
     return sentences
 
@@ -261,9 +256,8 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
 
 
 def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> None:
-    everything = np.concatenate([task.path[:, 0], task.goals, *(each.position for each in trials.values())])
-    (left, low), (right, high) = (everything.min(axis=0) - 0.04).tolist(), (everything.max(axis=0) + 0.04).tolist()
-    draw_scene(axes, task.obstacles, task.goals, (left, right, low, high))
+    paths = [task.path[:, 0], *(each.position for each in trials.values())]
+    draw_scene(axes, task.obstacles, task.goals, compute_bounds(task.obstacles, task.goals, (), *paths))
     axes.plot(*task.path[:, 0].T, color='black', linestyle='--', linewidth=1.0, label='intended')
     for number, (rule, trial) in enumerate(trials.items()):
         look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
@@ -291,7 +285,7 @@ def draw_example(recordings: Mapping[str, Recording] | None, config: Config | No
                 collected.add(step)
         except FocError:
             continue  # the page lists what cannot be read
-        hand = build_hand_trajectory(collected.samples)
+        hand = collected.hand
         for span in hand.find_movements():
             row = choose_moment(collected.snapshots, *span)
             if row is not None:

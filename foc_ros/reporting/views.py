@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ def _read_candidate(label: str, ids: Collection[str], values: Array, rows: Any, 
     status, dt = STATUSES[int(rows['status'][0])], float(rows['t'][-1]) / max(len(rows) - 1, 1)
     only_motor = None if np.array_equal(total, motor) else motor
     solution = Solution(status, '', dt, mean, total, np.zeros((0, 2)), effort, {}, 0.0, 0.0, eta, motor_covariance=only_motor)
-    sides = parse_label(label, ids)[1]
+    sides = parse_sides(label, ids)
     candidate = Candidate(label, int(rows['goal'][0]), tuple(sides.items()), mean[:, :2], 0.0)
     return PredictedCandidate(candidate, solution, sides, cost_ratio, likelihood, way=int(rows['way'][0]))
 
@@ -116,9 +117,8 @@ def is_late(snapshot: Prediction) -> bool:
 def count_likely_paths(snapshot: Prediction) -> float:
     """Return the number of likely paths, without estimates and ghosts: exp of the entropy of likelihoods of at least LIKELY."""
     likely = [each for each in snapshot if each.likelihood >= LIKELY and not each.is_estimated]
-    likely = [each for each in likely if not describe_ghost(snapshot, each)[0]]
-    shares = np.array([each.likelihood for each in likely])
-    shares = shares / max(shares.sum(), LIKELY)
+    shares = np.array([each.likelihood for each in likely if not describe_ghost(snapshot, each)[0]])
+    shares /= max(shares.sum(), LIKELY)
     return float(np.exp(-(shares * np.log(shares)).sum())) if len(shares) else 0.0
 
 
@@ -165,28 +165,20 @@ def describe_ghost(snapshot: Prediction, candidate: PredictedCandidate) -> tuple
 
 @dataclass(frozen=True, eq=False)
 class HandTrajectory(Record):
-    """The measured movement of the hand: stamps_ns (n,) increasing, positions (n, 2) [m], velocity (n, 2) [m/s]."""
+    """The measured movement of the hand: stamps_ns (n,) increasing, positions (n, 2) [m]."""
 
     stamps_ns: np.ndarray[tuple[int], np.dtype[np.int64]]
     positions: Array
-    velocity: Array = field(init=False)
 
-    HALF_WIDTH_S = 0.05
-    """Half of the interval of the central difference: wide enough to suppress sensor noise, short compared with a reach."""
-
-    def __post_init__(self) -> None:
-        times = self.seconds_after(int(self.stamps_ns[0]) if len(self.stamps_ns) else 0)
-        begins, ends = (np.clip(times + shift, times[:1], times[-1:]) for shift in (-self.HALF_WIDTH_S, self.HALF_WIDTH_S))
-        axes = self.positions.T if len(times) else ()
-        displacement = [np.interp(ends, times, axis) - np.interp(begins, times, axis) for axis in axes]
-        elapsed = np.where(ends > begins, ends - begins, np.inf)
-        object.__setattr__(self, 'velocity', (np.array(displacement) / elapsed).T.reshape(-1, 2))
-        super().__post_init__()
-
-    @property
+    @cached_property
     def speed(self) -> Array:
-        """Speed (n,) [m/s]."""
-        speed: Array = np.linalg.norm(self.velocity, axis=1)
+        """Speed (n,) [m/s]: central differences over an interval that suppresses sensor noise and is short beside a reach."""
+        if not len(self.stamps_ns):
+            return np.zeros(0)
+        times = self.seconds_after(int(self.stamps_ns[0]))
+        begins, ends = (np.clip(times + shift, times[:1], times[-1:]) for shift in (-0.05, 0.05))
+        moved = [np.interp(ends, times, axis) - np.interp(begins, times, axis) for axis in self.positions.T]
+        speed: Array = np.hypot(*moved) / np.where(ends > begins, ends - begins, np.inf)
         return speed
 
     def seconds_after(self, origin_ns: int) -> Array:
@@ -197,20 +189,17 @@ class HandTrajectory(Record):
         """Return the rows with start_ns <= stamp <= end_ns."""
         return slice(int(np.searchsorted(self.stamps_ns, start_ns)), int(np.searchsorted(self.stamps_ns, end_ns, side='right')))
 
-    def find_movements(self, onset_speed: float = ONSET_SPEED) -> list[tuple[int, int]]:
+    def find_movements(self) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement.
 
-        During it the hand is faster than onset_speed [m/s], pauses shorter than PAUSE_S apart; it extends over more than LEAST_M.
+        During it the hand is faster than ONSET_SPEED, pauses shorter than PAUSE_S apart; it extends over more than LEAST_M.
         """
-        rows = np.flatnonzero(self.speed > onset_speed)
-        if not len(rows):
-            return []
+        rows = np.flatnonzero(self.speed > ONSET_SPEED)
         breaks = np.flatnonzero(np.diff(self.stamps_ns[rows]) > PAUSE_S * NANOSECONDS)
-        spans = zip(np.concatenate([rows[:1], rows[breaks + 1]]), np.concatenate([rows[breaks], rows[-1:]]), strict=True)
         return [
-            (int(self.stamps_ns[first]), int(self.stamps_ns[last]))
-            for first, last in spans
-            if np.ptp(self.positions[first : last + 1], axis=0).max() > LEAST_M
+            (int(self.stamps_ns[each[0]]), int(self.stamps_ns[each[-1]]))
+            for each in np.split(rows, breaks + 1)
+            if len(each) and np.ptp(self.positions[each[0] : each[-1] + 1], axis=0).max() > LEAST_M
         ]
 
 
@@ -222,15 +211,14 @@ def build_hand_trajectory(samples: Sequence[HandSample]) -> HandTrajectory:
     return HandTrajectory(stamps[is_newest], positions[is_newest])
 
 
-def parse_label(label: str, ids: Collection[str]) -> tuple[str, dict[str, int]]:
-    """Split a label into its goal and the sides it names; ids: of the obstacles of the scene, which may contain signs.
+def parse_sides(label: str, ids: Collection[str]) -> dict[str, int]:
+    """Return the sides that a label names; ids: of the obstacles of the scene, which may contain signs.
 
     An obstacle that is not among them may have any name without a sign.
     """
-    goal, _, rest = label.partition(':')
     names = '|'.join([*(re.escape(name) for name in sorted(ids, key=len, reverse=True)), '[^+-]+'])
-    found = re.findall(rf'([+-])({names})(?=[+-]|$)', rest)
-    return goal, {name: LEFT if sign == '+' else RIGHT for sign, name in found}
+    found = re.findall(rf'([+-])({names})(?=[+-]|$)', label.partition(':')[2])
+    return {name: LEFT if sign == '+' else RIGHT for sign, name in found}
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from foc_ros.core.solution import name_goal
 from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
 from .health import THROTTLE_S
+from .messages.decode_poses import decode_stamp
 from .messages.encode_guidance import TWIST_TYPE
 from .messages.encode_prediction import GOAL_LIKELIHOOD_TYPE, encode_goal_likelihoods
 from .messages.plane import Transform, compute_rotation
@@ -31,7 +32,7 @@ from .transforms import TransformUnavailableError
 BEST_EFFORT, RELIABLE = qos.ReliabilityPolicy.BEST_EFFORT, qos.ReliabilityPolicy.RELIABLE
 DEPTH = 10
 HAND_DEPTH = 200
-"""Length of the queue of hand poses: 0.2 s at 1 kHz, during which a prediction may be computed."""
+"""Length of the queue of hand poses: 0.2 s at 1 kHz."""
 INPUTS = {
     GOALS: (RELIABLE, DEPTH),
     GOAL: (RELIABLE, DEPTH),
@@ -59,12 +60,11 @@ def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dic
     publishers. Inputs of `find_missing_packages` have no subscription.
 
     The endpoints here have no event callbacks, because each of them lengthens every wake-up of rclpy's plain executor:
-    `describe_incompatible_publishers` and `describe_incompatible_subscriptions` find the same in the graph.
+    `report_unconnected` finds the same in the graph.
     """
     subscriptions, kinds, missing = {}, TYPES | {COMMAND: TWIST_TYPE}, find_missing_packages()
-    for role, (reliability, depth) in INPUTS.items():
-        if role in missing:
-            continue
+    for role in (role for role in INPUTS if role not in missing):
+        reliability, depth = INPUTS[role]
         name = f'qos_overrides.{node.resolve_topic_name(role)}.subscription.durability'
         if node.has_parameter(name) and node.get_parameter(name).value == 'transient_local':
             reliability = RELIABLE  # messages from before the subscription are sent again to such a one only
@@ -88,6 +88,12 @@ def create_publisher(node: Node, name: str, kind: str) -> Any:
         event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         qos_overriding_options=OVERRIDABLE,
     )
+
+
+def publish(node: Node, publisher: Any, message: Any) -> None:
+    """Publish a message, unless the node's context has been shut down."""
+    if node.context.ok():
+        publisher.publish(message)
 
 
 def _build_qos(reliability: qos.ReliabilityPolicy, depth: int) -> qos.QoSProfile:
@@ -114,20 +120,15 @@ def report_unconnected(node: Node, inputs: Mapping[str, Any], outputs: Iterable[
             loggers[role].error(text, throttle_duration_sec=THROTTLE_S)
     unheard = []
     for role, subscription in inputs.items():
-        if texts := describe_incompatible_publishers(node, role, subscription):
+        topic, wanted = subscription.topic_name, subscription.qos_profile
+        pairs = [(each.node_name, each.qos_profile, wanted) for each in node.get_publishers_info_by_topic(topic)]
+        remedy = f'(see qos_overrides.{topic}.subscription)'
+        if texts := [f'{role} is not heard from {name}, {reason} {remedy}' for name, reason in _find_incompatible(pairs)]:
             loggers[role].warning('; '.join(texts), throttle_duration_sec=THROTTLE_S)
             unheard += texts
     if unserved := [text for each in outputs for text in describe_incompatible_subscriptions(node, each)]:
         node.get_logger().warning('; '.join(unserved), throttle_duration_sec=THROTTLE_S)
     return unheard
-
-
-def describe_incompatible_publishers(node: Node, role: str, subscription: Any) -> list[str]:
-    """Return a text for each present publisher of an input that its subscription cannot hear."""
-    topic, wanted = subscription.topic_name, subscription.qos_profile
-    pairs = [(each.node_name, each.qos_profile, wanted) for each in node.get_publishers_info_by_topic(topic)]
-    remedy = f'(see qos_overrides.{topic}.subscription)'
-    return [f'{role} is not heard from {name}, {reason} {remedy}' for name, reason in _find_incompatible(pairs)]
 
 
 def describe_incompatible_subscriptions(node: Node, publisher: Any) -> list[str]:
@@ -185,8 +186,7 @@ class GoalTopics:
     """
 
     def __init__(self, node: Node) -> None:
-        self._node = node
-        self._goals = 0
+        self._node, self._goals = node, 0
         self.publishers: list[Any] = []
 
     def publish(self, prediction: Prediction, types: MessageTypes) -> None:
@@ -197,8 +197,8 @@ class GoalTopics:
         heard = [row for row in range(self._goals) if self.publishers[row].get_subscription_count()]
         messages = encode_goal_likelihoods(prediction, types) if heard else {}
         for row in heard:
-            if row in messages and self._node.context.ok():
-                self.publishers[row].publish(messages[row])
+            if row in messages:
+                publish(self._node, self.publishers[row], messages[row])
 
     def remove_absent(self) -> None:
         """Remove the topics of goals that the last prediction did not have."""
@@ -231,9 +231,8 @@ class TfListener:
             found = self._buffer.lookup_transform(target, source, Time(nanoseconds=stamp_ns))
         except self._unavailable as error:
             raise TransformUnavailableError(' '.join(str(error).split())) from None
-        shift = found.transform.translation
-        translation = np.array([shift.x, shift.y, shift.z])
-        return Transform(compute_rotation(found.transform.rotation), translation, Time.from_msg(found.header.stamp).nanoseconds)
+        shift, turn = found.transform.translation, found.transform.rotation
+        return Transform(compute_rotation(turn), np.array([shift.x, shift.y, shift.z]), decode_stamp(found.header))
 
     def set_transform(self, transform: Any, authority: str) -> None:
         """Take a transform from the listener."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -46,7 +46,7 @@ ZEROS = 2
 
 @dataclass(frozen=True)
 class Newest:
-    """What guidance knows: the hand and when it was received, the prediction and when its hand was received [s, steady clock].
+    """What guidance knows: the hand and the prediction, and when the hand of each was received [s, steady clock].
 
     is_released: whether the clutch is open or the node is not active.
     """
@@ -84,7 +84,8 @@ class GuidanceLoop:
         self.output: GuidanceOutput | None = None
         self.place: Place | None = None
         self._publish, self._report, self._warn = publish, report, warn
-        self._priority, self._wanted_priority, self._has_warned = 0, 0, False
+        self._priority = self._wanted_priority = 0
+        self._has_warned = False
         self._state, self._zeros = GuidanceState(), ZEROS
         self._end, self._enabled = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
@@ -104,12 +105,15 @@ class GuidanceLoop:
     def reconfigure(self, config: Config) -> None:
         """Use other parameters."""
         self.newest = replace(self.newest, config=config)
-        self._wake()
+        if config.guidance.enabled:
+            self._enabled.set()
+        else:
+            self._enabled.clear()
 
     def start(self) -> None:
         """Begin to update."""
         self._end.clear()
-        self._wake()
+        self.reconfigure(self.newest.config)
         self._thread = threading.Thread(target=self._run, name='guidance', daemon=True)
         self._thread.start()
 
@@ -157,13 +161,6 @@ class GuidanceLoop:
             if self.place is not None:
                 self._publish(self.output, self.place)
 
-    def _wake(self) -> None:
-        """Let the thread update if guidance is enabled."""
-        if self.newest.config.guidance.enabled:
-            self._enabled.set()
-        else:
-            self._enabled.clear()
-
     def _run(self) -> None:
         """Update once in a period; a late update shifts the following ones."""
         due_s = monotonic()
@@ -199,32 +196,20 @@ class GuidanceLoop:
 
 
 class GuidanceTopics:
-    """Publishes guidance for a node between `create` and `destroy`; `report` is called with an exception of an update.
+    """Publishes guidance for a node while `loop` runs; `report` is called with an exception of an update.
 
-    Attributes: loop, which has to be told what is new; publishers, by the name of the topic below the node's name.
+    publishers: of the node, by the name of the topic below the node's name. Attributes: loop, which has to be told what is new.
     """
 
-    def __init__(self, node: Node, config: Config, report: Callable[[Exception], None]) -> None:
-        self._node = node
+    def __init__(self, node: Node, publishers: Mapping[str, Any], config: Config, report: Callable[[Exception], None]) -> None:
+        self._node, self._publishers = node, publishers
         self._thread_types = RclpyTypes()  # messages of the thread of guidance; no other thread uses them
-        self.publishers: dict[str, Any] = {}
         self.loop = GuidanceLoop(config, self._publish_output, report, node.get_logger().warning)
 
-    def create(self) -> None:
-        """Create the publishers and begin to update."""
-        from .endpoints import create_publisher  # needs rclpy, and the loop does not
-
+    def list_kinds(self) -> dict[str, str]:
+        """Return the types of the outputs, by the names of their topics."""
         outputs = LIVE_OUTPUTS if self._node.get_parameter('guidance.unstamped').value else GUIDANCE_OUTPUTS
-        kinds = {name: kind for name, (kind, _) in outputs.items()} | {TWIST: TWIST_TYPE}
-        self.publishers = {name: create_publisher(self._node, name, kind) for name, kind in kinds.items()}
-        self.loop.start()
-
-    def destroy(self) -> None:
-        """End the updates and destroy the publishers."""
-        self.loop.stop()
-        for publisher in self.publishers.values():
-            self._node.destroy_publisher(publisher)
-        self.publishers = {}
+        return {name: kind for name, (kind, _) in outputs.items()} | {TWIST: TWIST_TYPE}
 
     def encode_markers(self, types: MessageTypes) -> list[Any]:
         """Return the markers of the last output, none if guidance is disabled or has no hand."""
@@ -250,9 +235,9 @@ class GuidanceTopics:
     def _publish_output(self, output: GuidanceOutput, place: Place) -> None:
         """Publish an output; this happens in the thread of guidance."""
         for name, (_, encode) in LIVE_OUTPUTS.items():
-            if name in self.publishers and self.publishers[name].get_subscription_count():
+            if name in self._publishers and self._publishers[name].get_subscription_count():
                 self._publish(name, encode(output, place, self._thread_types))
 
     def _publish(self, name: str, message: Any) -> None:
         if self._node.context.ok():
-            self.publishers[name].publish(message)
+            self._publishers[name].publish(message)

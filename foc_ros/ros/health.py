@@ -16,16 +16,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foc_ros.core.config import Config
-from foc_ros.core.pipeline import SampleStatus
+from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS
-from foc_ros.io.topics import CLOUD, COLLISION, DETECTIONS, HAND, MARKERS
+from foc_ros.io.topics import HAND
 
-from .intake import Intake
+from .intake import SOURCES, Intake
 from .messages.types import MessageTypes, make_header
 
-SOURCE_TOPICS = {'cloud': CLOUD, 'markers': MARKERS, COLLISION: COLLISION, DETECTIONS: DETECTIONS}
+SOURCE_TOPICS = {source: role for role, source in SOURCES.items()}
 """Topic of every source of obstacles in the scene."""
 WINDOW = 1000
 """Number of predictions over which the percentiles are computed."""
@@ -45,7 +44,7 @@ THROTTLE_S = 5.0
 
 @dataclass
 class Input:
-    """Messages of one input: how many were received, refused, and received before the last report.
+    """Messages of one input: numbers received, refused, and received before the last report.
 
     And when the last one was received, used and refused, and why it was refused.
     """
@@ -60,13 +59,14 @@ class Input:
 
 
 class Freshness:
-    """Ages of the inputs: the time since their last message, and the age of a hand pose by its stamp, if it has ROS time.
+    """Ages of the inputs of a pipeline: the time since their last message, and the age of a hand pose, if it has ROS time.
 
     Attributes: inputs, by topic.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, pipeline: Pipeline) -> None:
         self.inputs: defaultdict[str, Input] = defaultdict(Input)
+        self._pipeline = pipeline
         self._age_s = 0.0
         self._has_ros_time = self._is_moving = False
 
@@ -80,7 +80,7 @@ class Freshness:
             entry.used_s = now_s
         return entry
 
-    def note_pose(self, stamp_ns: int, clock_ns: int, timeout_s: float, *, is_restart: bool) -> None:
+    def note_pose(self, stamp_ns: int, clock_ns: int, *, is_restart: bool) -> None:
         """Store the age of a hand pose by ROS time.
 
         Ages count once a movement has begun with a pose that is not older or newer than the timeout. If a recording is played
@@ -88,7 +88,7 @@ class Freshness:
         """
         self._age_s = (clock_ns - stamp_ns) / NANOSECONDS
         if clock_ns and (is_restart or not self._is_moving):
-            self._has_ros_time = self._has_ros_time or abs(self._age_s) <= timeout_s
+            self._has_ros_time = self._has_ros_time or abs(self._age_s) <= self._pipeline.config.estimator.hand_timeout_s
             self._is_moving = True
 
     def forget_clock(self) -> None:
@@ -100,37 +100,37 @@ class Freshness:
         used_s = self.inputs[role].used_s
         return now_s if used_s is None else used_s
 
-    def find_not_ready_reason(self, now_s: float, config: Config, sources: Iterable[str]) -> tuple[str, str] | None:
-        """Return why the clocks allow no prediction, as (kind, text); None if they allow it.
+    def find_not_ready_reason(self, now_s: float) -> tuple[str, str] | None:
+        """Return why the clocks allow no prediction, as (kind, text); None if they allow it. The pipeline judges by stamps.
 
-        sources: the sources of obstacles. If one of them is silent, nothing is predicted: its obstacles may still be there.
+        If a source of obstacles is silent, nothing is predicted: its obstacles may still be there.
         """
-        hand, limit_s, age_s = self.inputs[HAND], config.estimator.hand_timeout_s, abs(self._age_s)
+        hand, limit_s, age_s = self.inputs[HAND], self._pipeline.config.estimator.hand_timeout_s, abs(self._age_s)
         limit, silence_s = f'(estimator.hand_timeout_s is {limit_s:g})', now_s - self.used_s(HAND, now_s)
-        if 0.0 < limit_s < silence_s and now_s - hand.refused_s <= limit_s:
-            return 'hand_refused', f'no hand_pose could be used for {silence_s:.1f} s, the last: {hand.refusal}'
         if 0.0 < limit_s < silence_s:
+            if now_s - hand.refused_s <= limit_s:
+                return 'hand_refused', f'no hand_pose could be used for {silence_s:.1f} s, the last: {hand.refusal}'
             return 'hand_silent', f'hand_pose silent for {silence_s:.1f} s {limit}'
         if self._has_ros_time and 0.0 < limit_s < age_s:
             relation = 'older' if self._age_s > 0.0 else 'newer'
             return 'hand_stale', f'the hand pose is {age_s:.3g} s {relation} than the time of the node {limit}'
-        for source in self.find_silent_sources(now_s, config, sources):
-            role = SOURCE_TOPICS[source]
-            silence_s, limit = now_s - self.used_s(role, now_s), f'(scene.timeout_s is {config.scene.timeout_s:g})'
-            return 'obstacles_silent', f'{role} silent for {silence_s:.1f} s {limit}'
+        for source in self.find_silent_sources(now_s):
+            role, limit_s = SOURCE_TOPICS[source], self._pipeline.config.scene.timeout_s
+            silence_s = now_s - self.used_s(role, now_s)
+            return 'obstacles_silent', f'{role} silent for {silence_s:.1f} s (scene.timeout_s is {limit_s:g})'
         return None
 
-    def find_silent_sources(self, now_s: float, config: Config, sources: Iterable[str]) -> list[str]:
+    def find_silent_sources(self, now_s: float) -> list[str]:
         """Return the sources of obstacles that have been silent for more than `scene.timeout_s`."""
-        limit_s = config.scene.timeout_s
+        limit_s, sources = self._pipeline.config.scene.timeout_s, self._pipeline.scene.sources
         return [each for each in sources if 0.0 < limit_s < now_s - self.used_s(SOURCE_TOPICS[each], now_s)]
 
-    def find_late_reason(self, stamp_ns: int, received_s: float, now_s: float, clock_ns: int, config: Config) -> str | None:
+    def find_late_reason(self, stamp_ns: int, received_s: float, now_s: float, clock_ns: int) -> str | None:
         """Return why a prediction is not published now that it is computed, None if it is.
 
         stamp_ns, received_s: stamp of its hand pose [ns], and when that arrived.
         """
-        age_s, limit_s = now_s - received_s, config.estimator.hand_timeout_s
+        age_s, limit_s = now_s - received_s, self._pipeline.config.estimator.hand_timeout_s
         if self._has_ros_time:
             age_s = max(age_s, (clock_ns - stamp_ns) / NANOSECONDS)
         if not 0.0 < limit_s < age_s:
@@ -139,7 +139,7 @@ class Freshness:
 
 
 class Health(NamedTuple):
-    """Level, summary and all values of the diagnostics."""
+    """The diagnostics."""
 
     level: int
     message: str
@@ -147,9 +147,7 @@ class Health(NamedTuple):
 
     def encode(self, node_name: str, stamp_ns: int, types: MessageTypes) -> Any:
         """Return a diagnostic_msgs/DiagnosticArray with one status; node_name: the node's full name, such as '/foc'."""
-        values = [types.fill('diagnostic_msgs/msg/KeyValue', item) for item in self.values.items()]
-        parts = self.level, f'{node_name[1:]}: prediction', self.message, node_name, values
-        status = types.fill('diagnostic_msgs/msg/DiagnosticStatus', parts)
+        status = self.level, f'{node_name[1:]}: prediction', self.message, node_name, list(self.values.items())
         return types.fill('diagnostic_msgs/msg/DiagnosticArray', (make_header(types, stamp_ns, ''), [status]))
 
 
@@ -170,34 +168,35 @@ class Monitor:
         self._reported: Counter[str] = Counter()
         self._reported_s = now_s
 
-    def note_computed(self, prediction: Prediction, budget_s: float) -> None:
-        """Store how long a prediction was computed; budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit."""
+    def note_prediction(self, prediction: Prediction, start_s: float, now_s: float, budget_s: float, late: str | None) -> None:
+        """Count a prediction that was computed and published between two times.
+
+        budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit; late: why it was not published, None if it was.
+        """
         self._solve_ms.append(1e3 * prediction.solve_s)
         self.counts['predict_over_budget'] += 0.0 < budget_s < prediction.solve_s - 0.002
-
-    def note_prediction(self, prediction: Prediction, start_s: float, now_s: float) -> None:
-        """Count a prediction that was computed and published between two times."""
+        if late is not None:
+            self.counts['predict_too_late'] += 1
+            self._late = late
+            return
         self._prediction, self._predicted_s = prediction, now_s
         self.counts['predictions'] += 1
         self.counts.update(f'scene_{name}' for name in ('hand_inside', 'no_way') if prediction.notes.get(name))
         self._cycle_ms.append(1e3 * (now_s - start_s))
-
-    def note_late(self, reason: str) -> None:
-        """Count a prediction that was too old when it had been computed."""
-        self.counts['predict_too_late'] += 1
-        self._late = reason
 
     def note_error(self, error: BaseException) -> None:
         """Count an internal error."""
         self.counts['internal_errors'] += 1
         self._error = f'{type(error).__name__}: {error}'
 
-    def report(self, now_s: float, state: str, not_ready_reason: str | None, busy_s: float, unheard: Iterable[str]) -> Health:
+    def report(self, now_s: float, state: str, busy_s: float, unheard: Iterable[str]) -> Health:
         """Return the health since the last call.
 
-        state: of the managed node; not_ready_reason: text, None if ready; busy_s: for how long the present prediction has been
-        computed, 0 if there is none [s]; unheard: a text for each publisher that cannot be heard.
+        state: of the managed node; busy_s: for how long the present prediction has been computed, 0 if there is none [s];
+        unheard: a text for each publisher that cannot be heard.
         """
+        by_clock = self._freshness.find_not_ready_reason(now_s)
+        not_ready_reason = self._intake.pipeline.not_ready_reason() or (by_clock and by_clock[1])
         totals = Counter(self._intake.counts) + self.counts
         recent = totals - self._reported
         hand, repeated = self._freshness.inputs[HAND], recent['hand_duplicate']
@@ -213,22 +212,18 @@ class Monitor:
         is_fresh = self._predicted_s is not None and now_s - self._predicted_s < BUSY_S
         if is_fresh and not recent['predict_over_budget'] and not recent['predict_too_late']:
             del recent[DROPPED]  # hand samples between predictions that are fresh are not missed
-        level, message = self._judge(recent, state, reasons)
+        if recent['internal_errors']:
+            level, message = ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
+        elif state != 'active' or not self._intake.pipeline.is_engaged:
+            level, message = OK, 'disengaged' if state == 'active' else f'{state}: nothing is predicted'
+        else:
+            faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
+            found = [*reasons, *(f'{name} {count}' for name, count in sorted(faults.items()))]
+            level, message = (WARN, '; '.join(found)) if found else (OK, 'predicting')
         self._reported, self._reported_s = totals, now_s
         for entry in self._freshness.inputs.values():
             entry.reported = entry.received
         return Health(level, '; '.join(filter(None, [message, self._intake.describe_still_hand()])), values)
-
-    def _judge(self, recent: Counter[str], state: str, reasons: list[str]) -> tuple[int, str]:
-        if recent['internal_errors']:
-            return ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
-        if state != 'active':
-            return OK, f'{state}: nothing is predicted'
-        if not self._intake.pipeline.is_engaged:
-            return OK, 'disengaged'
-        faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}
-        parts = reasons + [f'{name} {count}' for name, count in sorted(faults.items())]
-        return (WARN, '; '.join(parts)) if parts else (OK, 'predicting')
 
     def _list_values(self, now_s: float, state: str, totals: Counter[str], recent: Counter[str]) -> dict[str, str]:
         pipeline, seconds = self._intake.pipeline, max(now_s - self._reported_s, 1e-3)

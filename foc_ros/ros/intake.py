@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -15,10 +14,12 @@ from foc_ros.core.pipeline import Pipeline, SampleStatus
 from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
-from .messages.decode_objects import CollisionTable, MarkerTable, decode_detections
+from .messages.decode_objects import ObjectTable, decode_detections
 from .messages.decode_point_cloud import DecodedCloud, decode_point_cloud
 from .messages.decode_poses import Place, decode_goal, decode_goals, decode_hand_sample, decode_stamp, stay
 
+SOURCES = {role: role for role in (topics.COLLISION, topics.DETECTIONS)} | {topics.CLOUD: 'cloud', topics.MARKERS: 'markers'}
+"""Name of the source of obstacles that each input is."""
 DROPPED = '_dropped_'
 """Between input and reason in the name of a count of parts of messages that were left out."""
 STILL_S = 1.0
@@ -51,16 +52,12 @@ class Intake:
         self.sample: HandSample | None = None
         self._still: HandSample | None = None  # the first of those that were used with the same position as the last one
         self.last_refusal: str | None = None
-        self._markers = MarkerTable()
-        self._markers_ns = 0
-        self._markers_unchanged = (-math.inf, math.inf)
-        self._collisions = CollisionTable()
+        self._tables = {topics.MARKERS: ObjectTable(), topics.COLLISION: ObjectTable()}
+        self._expired = dict.fromkeys(self._tables, 0)
         self._counts: Counter[str] = Counter()
         self._handlers: dict[str, Callable[[Any, Place], SampleStatus]] = {
             topics.HAND: self._take_hand,
-            topics.CLOUD: lambda message, place: self._set_obstacles(
-                'cloud', topics.CLOUD, decode_point_cloud(message, pipeline.config.plane, place)
-            ),
+            topics.CLOUD: self._take_cloud,
             topics.MARKERS: self._take_markers,
             topics.COLLISION: self._take_collision_object,
             topics.DETECTIONS: self._take_detections,
@@ -118,10 +115,9 @@ class Intake:
     def remove_source(self, source: str) -> None:
         """Forget the obstacles of one source, such as 'cloud' or 'markers', as if none of its messages had been received."""
         self.pipeline.remove_source(source)
-        if source == topics.COLLISION:
-            self._collisions = CollisionTable()
-        if source == 'markers':
-            self._markers, self._markers_ns, self._markers_unchanged = MarkerTable(), 0, (-math.inf, math.inf)
+        for role in self._tables:
+            if SOURCES[role] == source:
+                self._tables[role], self._expired[role] = ObjectTable(), 0
 
     def _take_hand(self, message: Any, place: Place) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
@@ -129,71 +125,68 @@ class Intake:
             return SampleStatus.SKIPPED
         self.sample = sample = decode_hand_sample(message, self.pipeline.config.plane, place)
         status = self.pipeline.add_hand_sample(sample)
-        still = self._still
-        is_same = still is not None and (*still.position, still.height) == (*sample.position, sample.height)
-        if status.is_taken and (not is_same or status.is_restart):
-            self._still = sample
-        start_ns, end_ns = self._markers_unchanged
-        if status.is_taken and not start_ns <= self.sample.stamp_ns < end_ns:
-            self._set_markers(self._markers)
+        if status.is_taken:
+            still = self._still
+            is_same = still is not None and (*still.position, still.height) == (*sample.position, sample.height)
+            if not is_same or status.is_restart:
+                self._still = sample
+            for role, table in self._tables.items():
+                if table.count_expired(sample.stamp_ns) != self._expired[role]:
+                    self._set_table(role, table)
         return status
 
-    def _set_obstacles(self, source: str, role: str, decoded: DecodedCloud) -> SampleStatus:
-        """Pass the obstacles of a source to the pipeline, and count the parts of their message that were left out."""
-        status = self.pipeline.set_obstacles(source, decoded.obstacles, decoded.stamp_ns or None, decoded.frame_id)
-        return self._count_dropped(role, decoded.dropped, status)
+    def _take_cloud(self, message: Any, place: Place) -> SampleStatus:
+        return self._set_obstacles(topics.CLOUD, decode_point_cloud(message, self.pipeline.config.plane, place))
 
     def _take_detections(self, message: Any, place: Place) -> SampleStatus:
         config = self.pipeline.config
         found = decode_detections(message, config.plane, config.scene.marker_radius_stddev, place)
-        return self._set_obstacles(topics.DETECTIONS, topics.DETECTIONS, found)
+        return self._set_obstacles(topics.DETECTIONS, found)
 
     def _take_collision_object(self, message: Any, place: Place) -> SampleStatus:
-        config = self.pipeline.config
-        before = self._collisions if self.pipeline.frame_id in (None, self._collisions.frame_id) else CollisionTable()
-        table = before.with_message(message, place)
-        table = replace(table, stamp_ns=self._ignore_small_steps_back(before.stamp_ns, table.stamp_ns))
-        obstacles = table.obstacles(config.plane, config.scene.marker_radius_stddev)
-        found = DecodedCloud(obstacles, table.stamp_ns, table.frame_id, table.dropped)
-        status = self._set_obstacles(topics.COLLISION, topics.COLLISION, found)
-        if status.is_taken:
-            self._collisions = table
-        return status
-
-    def _ignore_small_steps_back(self, newest_ns: int, stamp_ns: int) -> int:
-        """Return a stamp, or the newest one if that is at most `estimator.gap_s` after it."""
-        is_slightly_behind = stamp_ns and 0 < newest_ns - stamp_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS
-        return newest_ns if is_slightly_behind else stamp_ns
+        plane = self.pipeline.config.plane
+        return self._update(topics.COLLISION, lambda table: table.with_collision_object(message, plane, place))
 
     def _take_markers(self, message: Any, place: Place) -> SampleStatus:
-        config = self.pipeline.config
-        # markers received before the working frame was known are discarded if they are in another frame
-        before = self._markers if self.pipeline.frame_id in (None, self._markers.frame_id) else MarkerTable()
-        markers = before.with_message(message, self._now_ns(), config.plane, config.scene.marker_radius_stddev, place)
-        return self._count_dropped(topics.MARKERS, markers.dropped, self._set_markers(markers))
+        now_ns, plane = self._now_ns(), self.pipeline.config.plane
+        return self._update(topics.MARKERS, lambda table: table.with_markers(message, now_ns, plane, place))
 
-    def _set_markers(self, markers: MarkerTable) -> SampleStatus:
-        """Pass the existing markers to the pipeline.
+    def _update(self, role: str, change: Callable[[ObjectTable], ObjectTable]) -> SampleStatus:
+        """Change the table of an input.
 
-        Several publishers with different delays may add to the table, so a stamp a little behind the newest one does not make the
-        table late. A table without markers is valid in every frame. One that has never held any is no source: many programs send
-        a DELETEALL once at their start, and no markers after it.
+        What was received before the working frame was known is discarded if it is in another frame. Several publishers with
+        different delays may add to a table, so a stamp at most `estimator.gap_s` behind the newest one does not make it late.
         """
-        stamp_ns = self._ignore_small_steps_back(self._markers_ns, markers.stamp_ns)
-        frame_id = markers.frame_id if markers.markers else self.pipeline.frame_id or markers.frame_id
-        now_ns = self._now_ns()
-        status = SampleStatus.ACCEPTED
-        if markers.markers or 'markers' in self.pipeline.scene.sources:
-            status = self.pipeline.set_obstacles('markers', markers.obstacles(now_ns), stamp_ns or None, frame_id)
+        before = self._tables[role] if self.pipeline.frame_id in (None, self._tables[role].frame_id) else ObjectTable()
+        table = change(before)
+        if table.stamp_ns and 0 < before.stamp_ns - table.stamp_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS:
+            table = replace(table, stamp_ns=before.stamp_ns)
+        return self._note_dropped(role, table.dropped, self._set_table(role, table))
+
+    def _set_table(self, role: str, table: ObjectTable) -> SampleStatus:
+        """Pass the existing objects of a table to the pipeline.
+
+        A table without objects is valid in every frame. One that has never held any is no source: many programs send a DELETEALL
+        once at their start, and no markers after it.
+        """
+        source, status = SOURCES[role], SampleStatus.ACCEPTED
+        if table.held or source in self.pipeline.scene.sources:
+            frame_id = table.frame_id if table.held else self.pipeline.frame_id or table.frame_id
+            obstacles = table.obstacles(self._now_ns(), self.pipeline.config.scene.marker_radius_stddev)
+            status = self.pipeline.set_obstacles(source, obstacles, table.stamp_ns or None, frame_id)
         if status.is_taken:
-            self._markers, self._markers_ns, self._markers_unchanged = markers, stamp_ns, markers.find_unchanged_interval(now_ns)
+            self._tables[role], self._expired[role] = table, table.count_expired(self._now_ns())
+        return status
+
+    def _set_obstacles(self, role: str, decoded: DecodedCloud) -> SampleStatus:
+        status = self.pipeline.set_obstacles(SOURCES[role], decoded.obstacles, decoded.stamp_ns or None, decoded.frame_id)
+        return self._note_dropped(role, decoded.dropped, status)
+
+    def _note_dropped(self, role: str, dropped: Mapping[str, int], status: SampleStatus) -> SampleStatus:
+        """Count the parts of a message that were left out, if the others were used."""
+        for reason, count in dropped.items() if status.is_taken else ():
+            self.count_dropped(role, reason, count)
         return status
 
     def _now_ns(self) -> int:
         return self.pipeline.hand_state.stamp_ns if self.pipeline.hand_state is not None else 0
-
-    def _count_dropped(self, role: str, dropped: Mapping[str, int], status: SampleStatus) -> SampleStatus:
-        if status.is_taken:
-            for reason, count in dropped.items():
-                self.count_dropped(role, reason, count)
-        return status

@@ -19,24 +19,20 @@ from .parameters import check_parameter_files
 
 
 class StopSignals:
-    """Ends the process on SIGINT and SIGTERM: at once while it imports, and by :attr:`is_requested` after :meth:`defer`.
+    """Ends the process on SIGINT and SIGTERM: at once until `is_deferred` is set, and then by `is_requested`.
 
     rclpy's own handlers shut the context down during a callback, and some of the stops then end with an error. This flag ends
     the loop between two callbacks. During an import the process ends without an exception, which some imports would hide.
     """
 
     def __init__(self) -> None:
-        self.is_requested = self._is_deferred = False
+        self.is_requested = self.is_deferred = False
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._request)
 
-    def defer(self) -> None:
-        """Let the signals set the flag from now on."""
-        self._is_deferred = True
-
     def _request(self, _number: int, _frame: FrameType | None) -> None:
         self.is_requested = True
-        if not self._is_deferred:
+        if not self.is_deferred:
             os._exit(0)
 
 
@@ -62,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from .node import FocNode
 
     context = rclpy.Context()
-    stop.defer()
+    stop.is_deferred = True
     try:
         extra = remove_ros_args(given)[1:]
         if extra:

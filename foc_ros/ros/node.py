@@ -8,18 +8,19 @@ from an input that has fallen silent, and publishes none that has become too old
 
 A prediction is computed in another thread, guidance in a third one (`guidance`), and all else in that of the executor. What
 is received or asked for meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state
-of the managed node, nothing that was computed before is published.
+of the managed node, nothing that was computed before is published. A running computation cannot be stopped: its deadline is
+cancelled, it ends when it next checks that, and its result is ignored.
 
 It is a managed node. Once configured it subscribes and keeps the scene; it predicts only while it is active, from the first hand
-pose after its activation. With `autostart`, the default, it is active at once. `player` does what a player has to do whose
-messages must all be received.
+pose after its activation. With `autostart`, the default, it is active at once.
 """
 
 from __future__ import annotations
 
 import traceback
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from time import monotonic, sleep
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -29,8 +30,10 @@ from std_srvs.srv import SetBool, Trigger
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError
-from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.pipeline import Pipeline, PredictionTask
 from foc_ros.core.predict import warm_up
+from foc_ros.core.prediction import Prediction
+from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
@@ -44,7 +47,6 @@ from .messages.types import RclpyTypes
 from .node_parameters import LiveParameters, declare_parameters
 from .parameters import AUTOSTART
 from .transforms import Transforms
-from .worker import Computation, Worker
 
 REST_S, LONGEST_REST_S = 0.004, 0.02
 """Shortest and longest time for which the poses of a fast hand gather before they are taken together [s]."""
@@ -55,10 +57,17 @@ COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
+class Computation(NamedTuple):
+    """A task, when its hand pose arrived and it began [s, steady clock], and its result: the prediction and the tracks."""
+
+    task: PredictionTask
+    received_s: float
+    start_s: float
+    result: Future[tuple[Prediction, Tracks]]
+
+
 class FocNode(LifecycleNode):
     """Node `foc`. Raises ParameterError if it is started with a wrong parameter, FocError if it cannot start."""
-
-    pipeline: Pipeline
 
     def __init__(self, **options: Any) -> None:
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
@@ -72,14 +81,15 @@ class FocNode(LifecycleNode):
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._goal_topics = endpoints.GoalTopics(self)
-        self._guidance = GuidanceTopics(self, self._live_parameters.config, self.report)
+        self._guidance = GuidanceTopics(self, self._outputs, self._live_parameters.config, self.report)
         try:
             self._tf: endpoints.TfListener | None = endpoints.TfListener(self, self._take_held)
         except ImportError:  # tf2 is optional
             self._tf = None
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._retries = self.create_timer(0.01, self._take_held, clock=steady)  # of messages that wait for their transforms
-        self._worker = Worker(self, self._finish)
+        self._thread, self._is_destroyed = ThreadPoolExecutor(1, 'prediction'), False
+        self._computation: Computation | None = None
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(SetBool, '~/engage', self._engage)
@@ -91,12 +101,12 @@ class FocNode(LifecycleNode):
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Create the topics, and prepare what the first prediction needs."""
-        self._create_pipeline()
         try:
             warm_up(self._live_parameters.config)
-            self._outputs = {name: endpoints.create_publisher(self, name, kind) for name, (kind, _) in OUTPUTS.items()}
-            self._inputs = endpoints.create_subscriptions(self, self._receive)
-            self._guidance.create()
+            kinds = {name: kind for name, (kind, _) in OUTPUTS.items()} | self._guidance.list_kinds()
+            self._outputs.update({name: endpoints.create_publisher(self, name, kind) for name, kind in kinds.items()})
+            self._inputs.update(endpoints.create_subscriptions(self, self._receive))
+            self._guidance.loop.start()
         except Exception as error:
             self._destroy_topics()
             self._start_error = ' '.join(str(error).split())
@@ -122,14 +132,12 @@ class FocNode(LifecycleNode):
         self._create_pipeline()
         return self._enter('unconfigured')
 
+    on_error = on_cleanup
+
     def on_shutdown(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Destroy the topics."""
         self._destroy_topics()
         return self._enter('finalized')
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Return to the unconfigured state."""
-        return self.on_cleanup(state)
 
     def rest(self) -> None:
         """Wait after a pose of a fast hand, so that several are taken at once; the end of a prediction ends the wait.
@@ -139,8 +147,8 @@ class FocNode(LifecycleNode):
         if self._is_hand_fast:
             self._is_hand_fast = False
             unneeded_s = 0.0 if self.pipeline.config.guidance.enabled else self.pipeline.until_due_s
-            wait = self.is_busy_after if self.is_busy else sleep
-            wait(min(max(unneeded_s, REST_S), LONGEST_REST_S))
+            pause = self.is_busy_after if self.is_busy else sleep
+            pause(min(max(unneeded_s, REST_S), LONGEST_REST_S))
 
     def report(self, error: Exception) -> None:
         """Count and log an internal error."""
@@ -150,35 +158,37 @@ class FocNode(LifecycleNode):
 
     def destroy_node(self) -> None:
         """Destroy the node; a prediction that is being computed ends at the next check of its deadline."""
-        self._guidance.loop.stop()
-        self._worker.stop()
+        self._is_destroyed = True
+        self._destroy_topics()
+        self._thread.shutdown(wait=False)  # a cancelled future that no thread has taken would never count as done
         super().destroy_node()
 
     @property
     def is_busy(self) -> bool:
-        """Whether a prediction is being computed."""
-        return self._worker.present is not None
+        """Whether a prediction is being computed, or was and is not published yet."""
+        return self._computation is not None
 
     def is_busy_after(self, seconds: float) -> bool:
-        """Return whether a prediction is still being computed after so many seconds."""
-        return self._worker.is_busy_after(seconds)
+        """Wait for the end of the present computation, at most for some seconds; return whether it still runs then."""
+        return self._computation is not None and bool(wait([self._computation.result], seconds).not_done)
 
     def _create_pipeline(self) -> None:
-        if hasattr(self, 'pipeline'):
-            self.pipeline.reset()  # ends a prediction that is being computed
         self.pipeline = Pipeline(self._live_parameters.config, self._library)
-        self.intake, self._freshness = Intake(self.pipeline), Freshness()
+        self.intake, self._freshness = Intake(self.pipeline), Freshness(self.pipeline)
         self._monitor = Monitor(self.intake, self._freshness, monotonic())
         self._transforms = Transforms(self._tf, self.intake)
 
     def _destroy_topics(self) -> None:
-        self._guidance.destroy()
+        """Destroy what `on_configure` creates; a prediction that is being computed is abandoned."""
+        self.pipeline.reset()
+        self._guidance.loop.stop()
         for subscription in self._inputs.values():
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
         self._goal_topics.destroy()
-        self._inputs, self._outputs = {}, {}
+        self._inputs.clear()
+        self._outputs.clear()
 
     def _enter(self, state: str) -> TransitionCallbackReturn:
         self._state = state
@@ -227,7 +237,7 @@ class FocNode(LifecycleNode):
                 break
         if self._retries.is_canceled() and self._transforms.roles:
             self._retries.reset()
-        if is_taken and role == HAND and self.pipeline.is_due:
+        if is_taken and role == HAND:
             self._predict()
 
     def _take(self, role: str, arrival: Arrival) -> bool:
@@ -239,94 +249,87 @@ class FocNode(LifecycleNode):
             self._loggers[role].warning(text, throttle_duration_sec=THROTTLE_S)
         if status is None or not status.is_taken:
             return False
-        if role == HAND and self.intake.sample is not None:
+        if role == HAND and (sample := self.intake.sample) is not None:
             self._guidance.loop.note_hand(self.pipeline.hand_state, arrival.received_s)
-            clock_ns, timeout_s = self.get_clock().now().nanoseconds, self.pipeline.config.estimator.hand_timeout_s
-            self._freshness.note_pose(self.intake.sample.stamp_ns, clock_ns, timeout_s, is_restart=status.is_restart)
+            self._freshness.note_pose(sample.stamp_ns, self.get_clock().now().nanoseconds, is_restart=status.is_restart)
         return True
 
-    def _find_clock_reason(self) -> tuple[str, str] | None:
-        """Return why the clocks allow no prediction, as (kind, text); the pipeline decides all that depends on stamps."""
-        return self._freshness.find_not_ready_reason(monotonic(), self.pipeline.config, self.pipeline.scene.sources)
-
     def _predict(self) -> None:
-        """Begin a prediction; if one is being computed, its end begins the next."""
-        if self.is_busy:
+        """Begin a prediction if one is due; while one is being computed, its end begins the next."""
+        if self.is_busy or not self.pipeline.is_due:
             return
         start_s = monotonic()
-        clock_reason = self._find_clock_reason()
-        if clock_reason is not None:
+        if (clock_reason := self._freshness.find_not_ready_reason(start_s)) is not None:
             self._monitor.counts[f'predict_{clock_reason[0]}'] += 1
             return
         try:
             task = self.pipeline.begin(Deadline(self.pipeline.config.budget_s or None))
         except Exception as error:
-            self._recover(error)
+            self.report(error)
+            self._forget_movement()
             return
         if task is not None:
-            self._worker.start(task, self._freshness.used_s(HAND, start_s), start_s)
+            result = self._thread.submit(task.run)
+            self._computation = Computation(task, self._freshness.used_s(HAND, start_s), start_s, result)
+            result.add_done_callback(self._announce)
+
+    def _announce(self, _: Future[Any]) -> None:
+        """Have the executor publish a prediction; this happens in the thread in which it was computed."""
+        executor = self.executor
+        if executor is not None and not self._is_destroyed:
+            executor.create_task(self._finish)
 
     def _finish(self) -> None:
         """Publish a prediction that was computed, unless it is too old or not wanted any more, and begin the next."""
-        ended = self._worker.take()
-        if ended is None:
+        ended = self._computation
+        if ended is None or not ended.result.done():
             return
+        self._computation = None
         try:
             self._publish_prediction(ended)
         except Exception as error:
-            self._recover(error)
+            self.report(error)
+            self._forget_movement()
         self._receive(HAND)  # the next prediction is made from the newest pose, though the executor had no time for it yet
-        if self.pipeline.is_due:
-            self._predict()
+        self._predict()
 
     def _publish_prediction(self, ended: Computation) -> None:
-        prediction = self.pipeline.finish(ended.task, ended.result.result)
+        prediction, config = self.pipeline.finish(ended.task, ended.result.result), ended.task.config
         if prediction is None:
             return
-        config = ended.task.config
-        self._monitor.note_computed(prediction, config.budget_s)
-        wanted = [name for name, publisher in self._outputs.items() if publisher.get_subscription_count()]
-        if abs(prediction.stamp_ns - self._drawn_ns) < DRAWN_S * NANOSECONDS:
-            wanted = [name for name in wanted if name != 'markers']
-        now_s, clock_ns = monotonic(), self.get_clock().now().nanoseconds
-        reason = self._freshness.find_late_reason(prediction.stamp_ns, ended.received_s, now_s, clock_ns, config)
-        if reason is not None:
-            self._monitor.note_late(reason)
-            return
-        self._guidance.loop.note_prediction(prediction, ended.received_s)
-        for name in wanted:  # one after the other: the markers of 8 candidates take longer than all else, and come last
-            (message,) = encode_outputs(prediction, config.plane, self._types, [name]).values()
-            if name == 'markers':
-                self._drawn_ns = prediction.stamp_ns
-                message.markers.extend(self._guidance.encode_markers(self._types))
-            self._publish(self._outputs[name], message)
-        self._goal_topics.publish(prediction, self._types)
-        self._monitor.note_prediction(prediction, ended.start_s, monotonic())
-        if not self._has_predicted:
+        clock_ns = self.get_clock().now().nanoseconds
+        late = self._freshness.find_late_reason(prediction.stamp_ns, ended.received_s, monotonic(), clock_ns)
+        if late is None:
+            self._guidance.loop.note_prediction(prediction, ended.received_s)
+            # one after the other: the markers of 8 candidates take longer than all else, and come last
+            for name in [name for name in OUTPUTS if self._outputs[name].get_subscription_count()]:
+                if name == 'markers' and abs(prediction.stamp_ns - self._drawn_ns) < DRAWN_S * NANOSECONDS:
+                    continue
+                (message,) = encode_outputs(prediction, config.plane, self._types, [name]).values()
+                if name == 'markers':
+                    self._drawn_ns = prediction.stamp_ns
+                    message.markers.extend(self._guidance.encode_markers(self._types))
+                endpoints.publish(self, self._outputs[name], message)
+            self._goal_topics.publish(prediction, self._types)
+        self._monitor.note_prediction(prediction, ended.start_s, monotonic(), config.budget_s, late)
+        if late is None and not self._has_predicted:
             self._has_predicted = True
             self.get_logger().info(f'predicting in frame {self.pipeline.frame_id}, plane {config.plane}')
 
-    def _recover(self, error: Exception) -> None:
-        self.report(error)
+    def _forget_movement(self) -> None:
         self.pipeline.reset()
         self._guidance.loop.note_hand(None, monotonic())
 
     def _publish_health(self) -> None:
         self._receive(HAND)  # a hand whose poses wait here is not silent
         self._goal_topics.remove_absent()
-        clock_reason, present, now_s = self._find_clock_reason(), self._worker.present, monotonic()
-        not_ready_reason = self.pipeline.not_ready_reason() or (clock_reason and clock_reason[1])
-        busy_s = now_s - present.start_s if present is not None else 0.0
-        publishers = (*self._outputs.values(), *self._guidance.publishers.values())
-        unheard = endpoints.report_unconnected(self, self._inputs, publishers, self._loggers)
-        health = self._monitor.report(now_s, self._state, not_ready_reason, busy_s, unheard)
+        now_s = monotonic()
+        busy_s = 0.0 if self._computation is None else now_s - self._computation.start_s
+        unheard = endpoints.report_unconnected(self, self._inputs, self._outputs.values(), self._loggers)
+        health = self._monitor.report(now_s, self._state, busy_s, unheard)
         health.values.update(self._guidance.loop.describe())
         name, stamp_ns = self.get_fully_qualified_name(), self.get_clock().now().nanoseconds
-        self._publish(self._diagnostics, health.encode(name, stamp_ns, self._types))
-
-    def _publish(self, publisher: Any, message: Any) -> None:
-        if self.context.ok():
-            publisher.publish(message)
+        endpoints.publish(self, self._diagnostics, health.encode(name, stamp_ns, self._types))
 
     def _engage(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         self._is_engaged = bool(request.data)
@@ -336,11 +339,10 @@ class FocNode(LifecycleNode):
         return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        silent = self._freshness.find_silent_sources(monotonic(), self.pipeline.config, self.pipeline.scene.sources)
+        silent = self._freshness.find_silent_sources(monotonic())
         for source in silent:
             self.intake.remove_source(source)
-        self.pipeline.reset()
-        self._guidance.loop.note_hand(None, monotonic())
+        self._forget_movement()
         self._freshness.forget_clock()
         removed = ' and '.join(SOURCE_TOPICS[source] for source in silent)
         without = f' without the obstacles of {removed}, which fell silent' if silent else ''

@@ -18,7 +18,7 @@ from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import FocError, ParameterError, collect, join_errors, suggest
 from foc_ros.core.parameter import Parameter
 
-from .parameters import AUTOSTART, KNOWN, NODE_ONLY
+from .parameters import AUTOSTART, KNOWN, NODE_ONLY, describe_meaning
 
 
 def declare_parameters(node: Any) -> Config:
@@ -49,11 +49,11 @@ def declare_parameters(node: Any) -> Config:
 
 
 def _build_descriptor(parameter: Parameter) -> ParameterDescriptor:
-    bound, choices = parameter.bound, tuple(parameter.bound.choices)
+    bound = parameter.bound
     descriptor = ParameterDescriptor(
         name=parameter.name,
-        description=f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning,
-        additional_constraints=f'one of {", ".join(choices)}' if choices else '',
+        description=describe_meaning(bound),
+        additional_constraints=f'one of {", ".join(bound.choices)}' if bound.choices else '',
         read_only=bound.read_only,
     )
     if bound.low is not None and bound.high is not None:
@@ -76,15 +76,11 @@ class LiveParameters:
 
     def _convert(self, changed: list[RosParameter]) -> list[RosParameter]:
         """Convert integers given for floats; refuse unknown parameters by name, which rclpy does not."""
-        unknown = [each.name for each in changed if not self._node.has_parameter(each.name)]
-        if unknown:
+        if unknown := [each.name for each in changed if not self._node.has_parameter(each.name)]:
             raise ParameterNotDeclaredException(unknown)
-        return [
-            RosParameter(each.name, value=float(each.value))
-            if each.type_ == RosParameter.Type.INTEGER and each.name in KNOWN and isinstance(KNOWN[each.name].default, float)
-            else each
-            for each in changed
-        ]
+        floats = {name for name, parameter in KNOWN.items() if isinstance(parameter.default, float)}
+        is_whole = [each.type_ == RosParameter.Type.INTEGER and each.name in floats for each in changed]
+        return [RosParameter(e.name, value=float(e.value)) if whole else e for e, whole in zip(changed, is_whole, strict=True)]
 
     def _check(self, changed: list[RosParameter]) -> SetParametersResult:
         try:

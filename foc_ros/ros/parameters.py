@@ -15,6 +15,7 @@ import yaml
 
 from foc_ros.core.config import Config, flatten, list_parameters, replace_values
 from foc_ros.core.errors import InputError, ParameterError, warn
+from foc_ros.core.parameter import Bound
 from foc_ros.io.documents import read_document
 
 NODE = '/foc'
@@ -50,23 +51,20 @@ def check_parameter_files(arguments: Sequence[str]) -> None:
 
 
 def _read_values(path: Path | str, node: str, *, is_needed: bool) -> dict[str, object]:
-    """Return the values of a parameter file for a node by dotted name; see `load_parameter_file`.
-
-    is_needed: whether a file without a section for the node is an error.
-    """
+    """Return the values of a parameter file for a node by dotted name; is_needed: whether it must have a section for the node."""
     document = read_document(Path(path))
     expected = f'a section for the node {node}, such as /** or {node}'
     if document is None and not is_needed:
         return {}
     if not isinstance(document, Mapping):
         raise ParameterError(str(path), expected, 'an empty file' if document is None else type(document).__name__)
-    values: dict[str, object] = {}
     sections = list(_list_sections(document, str(path)))
     others = [name for name, _ in sections if not _applies(name, node)]
     if is_needed and len(others) == len(sections):
         raise ParameterError(str(path), expected, ', '.join(others) or 'none')
     if others:
         warn(f'{path}: {", ".join(others)} {"does" if len(others) == 1 else "do"} not apply to the node {node}')
+    values: dict[str, object] = {}
     for name, section in sections:
         if name not in others:
             given = list(_flatten_group(section))
@@ -103,12 +101,15 @@ def _flatten_group(group: Mapping[Any, object], prefix: str = '') -> Iterator[tu
     """Yield every value by dotted name; names in the file may be nested, dotted or both."""
     for key, value in group.items():
         name = f'{prefix}{key}'
-        if name.split('.')[0] in NODE_ONLY:
-            continue
         if isinstance(value, Mapping) and any(known.startswith(f'{name}.') for known in KNOWN):
             yield from _flatten_group(value, f'{name}.')
-        else:
+        elif name.split('.')[0] not in NODE_ONLY:
             yield name, value
+
+
+def describe_meaning(bound: Bound) -> str:
+    """Return what a parameter means, with its unit."""
+    return f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning
 
 
 def dump_parameter_file(config: Config) -> str:
@@ -121,11 +122,11 @@ def dump_parameter_file(config: Config) -> str:
             lines.append(f'    {head}:')
             group = head
         bound, indent = parameter.bound, ' ' * (6 if head else 4)
-        parts = [f'{bound.meaning} [{bound.unit}]' if bound.unit else bound.meaning]
+        parts = [describe_meaning(bound)]
         if bound.low is not None and bound.high is not None:
             parts.append(f'{bound.low:g} to {bound.high:g}')
-        if choices := tuple(bound.choices):
-            parts.append(' | '.join(choices))
+        if bound.choices:
+            parts.append(' | '.join(bound.choices))
         if bound.read_only:
             parts.append('fixed once the node runs')
         value = yaml.safe_dump(values[parameter.name], default_flow_style=True).splitlines()[0]

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from types import TracebackType
 
 import rclpy
@@ -55,19 +56,13 @@ class Player:
         self._executor.add_node(self._node)
         # The node may ask for transient local inputs; only the stream of hand poses does without.
         latched = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        kinds = {role: find_message_class(topics.TYPES[role]) for role in sorted({item.role for item in self._items})}
         self._publishers = {
-            role: self._node.create_publisher(
-                find_message_class(topics.TYPES[role]), role, DEPTH if role == topics.HAND else latched
-            )
-            for role in sorted({item.role for item in self._items})
+            role: self._node.create_publisher(kind, role, DEPTH if role == topics.HAND else latched)
+            for role, kind in kinds.items()
         }
         for topic, kind in self._outputs.items():
-
-            def receive(raw: bytes, topic: str = topic) -> None:
-                self._last_received = time.monotonic()
-                self._receive(topic, raw)
-
-            self._node.create_subscription(find_message_class(kind), topic, receive, DEPTH, raw=True)
+            self._node.create_subscription(find_message_class(kind), topic, partial(self._note, topic), DEPTH, raw=True)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -112,6 +107,10 @@ class Player:
         deadline = self._last_received + LAST_ANSWER_S
         while time.monotonic() < min(deadline, self._last_received + QUIET_S) and self._tick():
             self._spin(0.05)
+
+    def _note(self, topic: str, raw: bytes) -> None:
+        self._last_received = time.monotonic()
+        self._receive(topic, raw)
 
     def _spin(self, seconds: float) -> None:
         end = time.monotonic() + seconds

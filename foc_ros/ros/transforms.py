@@ -14,20 +14,20 @@ from bisect import bisect_right, insort
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from operator import itemgetter
+from operator import attrgetter
 from typing import Any, Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from foc_ros.core.errors import MessageError
-from foc_ros.core.types import NANOSECONDS, Array
+from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.topics import HAND, MARKERS
 
 from .intake import Arrival, Intake
 from .messages.decode_objects import ADD
 from .messages.decode_poses import Place, check_hand_pose, decode_frame, decode_stamp, stay
-from .messages.plane import NO_TRANSFORM, Transform
+from .messages.plane import NO_TRANSFORM, Transform, compute_rotation
 
 KEPT_NS = 10 * NANOSECONDS
 """Time for which transforms are kept, that of tf2 [ns]; one that is older than that means that the recording starts again."""
@@ -47,7 +47,7 @@ class TransformSource(Protocol):
 class Transforms:
     """Queues of messages, one for each input.
 
-    source: None if there is none; intake: that takes the messages. A hand pose that it will skip needs no transform.
+    source: of transforms, or None; intake: that takes the messages. A hand pose that it will skip needs no transform.
     """
 
     def __init__(self, source: TransformSource | None, intake: Intake) -> None:
@@ -88,7 +88,7 @@ class Transforms:
 
     def _find_place(self, role: str, message: Any, is_overdue: bool) -> tuple[Place, bool]:
         """Return the transforms for the headers of a message, and whether the newest one was taken for one of them."""
-        frame_id = self._intake.pipeline.frame_id
+        frame_id, tolerance_s = self._intake.pipeline.frame_id, self._intake.pipeline.config.frames.tolerance_s
         is_unneeded = role == HAND and self._intake.is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
             return stay, False
@@ -106,7 +106,11 @@ class Transforms:
             except TransformUnavailableError as reason:
                 if not is_overdue:
                     raise
-                found[given], is_inexact = self._find_newest(frame_id, *given, reason), True
+                found[given], is_inexact = self._source.look_up(frame_id, given[0], 0), True
+                late_s = (given[1] - found[given].stamp_ns) / NANOSECONDS
+                if abs(late_s) > tolerance_s:
+                    far = f'the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
+                    raise TransformUnavailableError(f'{reason}; {far} (frames.tolerance_s is {tolerance_s:g})') from None
 
         def place(header: Any) -> tuple[str, Transform]:
             transform = found.get(_identify(header))
@@ -114,56 +118,44 @@ class Transforms:
 
         return place, is_inexact
 
-    def _find_newest(self, target: str, source: str, stamp_ns: int, reason: Exception) -> Transform:
-        """Return the newest transform instead of that for a stamp [ns], if its stamp differs by the tolerance at most."""
-        assert self._source is not None
-        tolerance_s = self._intake.pipeline.config.frames.tolerance_s
-        newest = self._source.look_up(target, source, 0)
-        late_s = (stamp_ns - newest.stamp_ns) / NANOSECONDS
-        if abs(late_s) > tolerance_s:
-            text = f'{reason}; the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
-            raise TransformUnavailableError(f'{text} (frames.tolerance_s is {tolerance_s:g})') from None
-        return newest
-
 
 def _identify(header: Any) -> tuple[str, int]:
     """Return frame and stamp [ns] of a header."""
     return decode_frame(header), decode_stamp(header)
 
 
-_STAMP = itemgetter(0)
+_STAMP = attrgetter('stamp_ns')
 
 
 @dataclass
 class _Frame:
-    """A frame with its parent and its poses in it: stamp [ns], rotation, position (3,) [m] of each; a static one has one pose."""
+    """A frame with its parent and its poses in it, by their stamps; a static one has one pose."""
 
     parent: str
     is_static: bool
-    poses: list[tuple[int, Rotation, Array]] = field(default_factory=list)
+    poses: list[Transform] = field(default_factory=list)
 
-    def add(self, stamp_ns: int, rotation: Rotation, position: Array) -> None:
+    def add(self, pose: Transform) -> None:
         """Keep a pose, and forget those that are too old."""
-        if self.is_static or (self.poses and stamp_ns < self.poses[-1][0] - KEPT_NS):
+        if self.is_static or (self.poses and pose.stamp_ns < self.poses[-1].stamp_ns - KEPT_NS):
             self.poses = []
-        insort(self.poses, (stamp_ns, rotation, position), key=_STAMP)
-        del self.poses[: bisect_right(self.poses, self.poses[-1][0] - KEPT_NS, key=_STAMP)]
+        insort(self.poses, pose, key=_STAMP)
+        del self.poses[: bisect_right(self.poses, self.poses[-1].stamp_ns - KEPT_NS, key=_STAMP)]
 
     def find(self, name: str, stamp_ns: int) -> Transform:
         """Return the pose at a stamp; raise TransformUnavailableError outside the known stamps."""
         after = bisect_right(self.poses, stamp_ns, key=_STAMP)
-        if self.is_static or (after and self.poses[after - 1][0] == stamp_ns):
-            _, rotation, position = self.poses[after - 1]
-            return Transform(rotation.as_matrix(), position)
+        if self.is_static or (after and self.poses[after - 1].stamp_ns == stamp_ns):
+            return self.poses[after - 1]
         if not 0 < after < len(self.poses):
-            nearest_ns = self.poses[min(after, len(self.poses) - 1)][0]
+            nearest_ns = self.poses[min(after, len(self.poses) - 1)].stamp_ns
             relation = 'after the newest' if after else 'before the oldest'
             distance = f'{abs(stamp_ns - nearest_ns) / NANOSECONDS:.3g} s'
             raise TransformUnavailableError(f'the stamp is {distance} {relation} transform from {name} to {self.parent}')
-        (begin_ns, earlier, start), (end_ns, later, end) = self.poses[after - 1 : after + 1]
-        share = (stamp_ns - begin_ns) / (end_ns - begin_ns)
-        turn = Slerp([0.0, 1.0], Rotation.concatenate([earlier, later]))(share)
-        return Transform(turn.as_matrix(), (1.0 - share) * start + share * end)
+        start, end = self.poses[after - 1 : after + 1]
+        share = (stamp_ns - start.stamp_ns) / (end.stamp_ns - start.stamp_ns)
+        turn = Slerp([0.0, 1.0], Rotation.from_matrix([start.rotation, end.rotation]))(share)
+        return Transform(turn.as_matrix(), (1.0 - share) * start.translation + share * end.translation)
 
 
 class TransformTree:
@@ -182,33 +174,32 @@ class TransformTree:
         """
         left_out = 0
         for each in message.transforms:
-            position = np.array([getattr(each.transform.translation, axis) for axis in 'xyz'], dtype=float)
-            quaternion = np.array([getattr(each.transform.rotation, axis) for axis in 'xyzw'], dtype=float)
+            shift, turn = each.transform.translation, each.transform.rotation
+            position, quaternion = np.array([shift.x, shift.y, shift.z], dtype=float), (turn.x, turn.y, turn.z, turn.w)
             child, parent = str(each.child_frame_id).lstrip('/'), decode_frame(each.header)
             try:
                 stamp_ns = decode_stamp(each.header)
             except MessageError:
                 stamp_ns = -1
-            if stamp_ns < 0 or not (np.isfinite([*position, *quaternion]).all() and quaternion.any()) or child == parent:
+            if stamp_ns < 0 or not np.isfinite([*position, *quaternion]).all() or not any(quaternion) or child == parent:
                 left_out += 1
                 continue
             frame = self._frames.get(child)
             if frame is None or (frame.parent, frame.is_static) != (parent, is_static):
                 frame = self._frames[child] = _Frame(parent, is_static)
-            frame.add(stamp_ns, Rotation.from_quat(quaternion), position)
+            frame.add(Transform(compute_rotation(turn), position, stamp_ns))
         return left_out
 
     def look_up(self, target: str, source: str, stamp_ns: int) -> Transform:
         """Return a transform as `TransformSource.look_up` says."""
         up, down = self._list_ancestors(source), self._list_ancestors(target)
-        common = next((name for name in up if name in down), None)
-        if common is None:
+        if (common := next((name for name in up if name in down), None)) is None:
             known = ', '.join(sorted({*self._frames, *(each.parent for each in self._frames.values())})) or 'none'
             raise TransformUnavailableError(f'{source} and {target} are not connected; known frames: {known}')
         chain, back = up[: up.index(common)], down[: down.index(common)]
         if not stamp_ns:
             frames = [self._frames[name] for name in (*chain, *back)]
-            stamp_ns = min((frame.poses[-1][0] for frame in frames if not frame.is_static), default=0)
+            stamp_ns = min((frame.poses[-1].stamp_ns for frame in frames if not frame.is_static), default=0)
         pose = self._compose(back, stamp_ns).inverse().compose(self._compose(chain, stamp_ns))
         return pose._replace(stamp_ns=stamp_ns)
 

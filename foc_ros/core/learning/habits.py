@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which goals an operator prefers, and where reaches end: hands stop at the near side of objects, and tools have a length.
 
-By the rule of `core.goals`, a hand that begins to move at the distance d_i from goal i goes there with the probability q_i, which
-is proportional to d_i^(-2 beta) where no obstacle is in the way. With the number n_i of reaches that ended at the goal, and the
-sum e_i of its q_i over all reaches, the likelihoods of its candidates get the weight
+A hand that begins to move at the distance d_i from goal i is expected to go there with the probability q_i, which is proportional
+to d_i^(-2 beta). With the number n_i of reaches that ended at the goal, and the sum e_i of its q_i over all reaches, the
+likelihoods of its candidates get the weight
 
     w_i = (1 + c n_i) / (1 + c e_i),   c = `likelihood.past_goals`.
 

@@ -8,7 +8,6 @@ const SIZES = [0.004, 0.2];
 const REACH = 0.012;
 
 const round = (value) => Math.round(value * 1e5) / 1e5;
-const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 export class Arranging {
   // changed: called after every change of the scene.

@@ -10,8 +10,6 @@ const DEAD_ZONE = 0.15;
 const PULL_TIME = 0.1;
 const FORCE_MS = 300;
 
-const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-
 export class Hand {
   // moved: called with the time of an event [ms] that has moved the target.
   constructor(canvas, toScene, moved) {

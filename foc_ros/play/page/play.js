@@ -4,7 +4,6 @@
 import { Arranging } from './arranging.js';
 import { Hand } from './hand.js';
 
-const byId = (name) => document.getElementById(name);
 const RETRY_MS = 1000;
 // Time over which frames are counted [ms], and the number of delays of which the median is shown.
 const COUNTED_MS = 2000;
@@ -177,14 +176,13 @@ const handlers = {
   score({ columns, rows }) {
     byId('score').replaceChildren(rows.length ? makeTable(columns, rows) : 'No trial was finished.');
   },
-  job({ name, state, text, columns, rows, seconds }) {
+  job({ name, state, text, seconds }) {
     job = state === 'running' ? { name, text, begunMs: performance.now() - 1000 * seconds } : null;
     failure = state === 'failed' ? `${name} failed` : '';
     showJob();
     if (!job) byId('job').textContent = `${name}: ${text}${seconds ? ` (${seconds} s)` : ''}`;
     for (const each of ['cancel', 'progress']) byId(each).hidden = !job || job.name === 'report';
     if (name === 'report' && state === 'done') byId('download').hidden = false;
-    if (columns) handlers.result({ columns, rows });
   },
   result({ columns, rows }) {
     byId('result').replaceChildren(makeTable(columns, rows));

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from foc_ros.core.config import Config, flatten
-from foc_ros.core.errors import FocError, InputError
-from foc_ros.io.outputs import MARK, check_replaceable
+from foc_ros.core.errors import FocError
+from foc_ros.io.outputs import MARK, check_replaceable, make_folder
 from foc_ros.reporting.draw import open_figure
 
 try:
@@ -31,7 +31,6 @@ Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
 FOLDER = Path(__file__).parent
 POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """Content security policy of every page: a browser shows what the page holds and fetches nothing."""
-
 
 _TEMPLATES = Environment(autoescape=True, undefined=StrictUndefined, loader=FileSystemLoader(FOLDER), trim_blocks=True)
 _TEMPLATES.globals.update(policy=POLICY, mark=MARK, source=lambda name: (FOLDER / name).read_text(encoding='utf-8'))
@@ -76,11 +75,8 @@ def write_page(
         # of a file only its name
         changed = {name: Path(value).name if isinstance(value, str) else f'{value}' for name, value in changed.items()}
     page = render('study.html', title=title, sections=sections, warnings=warnings, made=made, changed=changed)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
+    with make_folder('--report', directory):
         (directory / name).write_text(page, encoding='utf-8', errors='replace')
-    except OSError as error:
-        raise InputError('--report', 'a folder that can be written', f'{directory}: {error.strerror}') from error
 
 
 def make_picture(figure: Any, caption: str) -> Picture:

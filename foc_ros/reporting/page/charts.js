@@ -10,7 +10,7 @@ class Chart {
 
   timeAt(x) {
     const { left, right, span: [from, to] } = this;
-    return from + ((Math.min(Math.max(x, left), right) - left) / (right - left)) * (to - from);
+    return from + ((clamp(x, left, right) - left) / (right - left)) * (to - from);
   }
 
   x(time) { return this.left + ((time - this.span[0]) / Math.max(this.span[1] - this.span[0], 1e-9)) * (this.right - this.left); }

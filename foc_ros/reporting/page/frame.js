@@ -4,7 +4,9 @@
 // Colours of the page by name, which are read again after a switch between dark and light.
 let inks = {};
 const ink = (name) => (inks[name] ??= getComputedStyle(document.documentElement).getPropertyValue(name).trim());
-const readData = (name) => JSON.parse(document.getElementById(name).textContent);
+const byId = (name) => document.getElementById(name);
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+const readData = (name) => JSON.parse(byId(name).textContent);
 // Functions that draw the charts again after a switch between dark and light.
 const redraws = [];
 const root = document.documentElement;
@@ -13,7 +15,7 @@ const redraw = () => {
   inks = {};
   redraws.forEach((each) => each());
 };
-document.getElementById('theme').addEventListener('click', () => {
+byId('theme').addEventListener('click', () => {
   const dark = root.dataset.theme ? root.dataset.theme === 'dark' : systemDark.matches;
   root.dataset.theme = dark ? 'light' : 'dark';
   redraw();

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: 2026 the foc_ros developers
 // SPDX-License-Identifier: Apache-2.0
-const byId = (name) => document.getElementById(name);
 const data = readData('report-data');
 const SPEED = data.unit.speed;
 const TIME = data.unit.time;
@@ -44,7 +43,7 @@ function viewOf(frame, each) {
   const text = `${track === null ? '' : `${letterOf(slotOf(track))} ${percent(share)} `}${words} (${data.labels[each.label]})${each.reason ? `: ${data.labels[each.reason]}` : ''}`;
   return {
     ...each, track, share, words, text, slot: track === null ? null : slotOf(track), likelihood: share, path: decodePath(each),
-    motor: decodeEllipses(each.motor || []), total: decodeEllipses(each.total || []), ghost: data.labels[each.ghost],
+    motor: decodeEllipses(each.motor), total: decodeEllipses(each.total), ghost: data.labels[each.ghost],
   };
 }
 
@@ -142,7 +141,7 @@ function fillTable(frame) {
 }
 
 function show(number) {
-  state.frame = Math.min(Math.max(number, state.from), state.to);
+  state.frame = clamp(number, state.from, state.to);
   const frame = data.frames[state.frame];
   const time = frameTimes[state.frame];
   byId('time').value = state.frame;

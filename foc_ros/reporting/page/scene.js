@@ -15,7 +15,7 @@ const NOTED = 0.01;
 const LENGTH = 1e-4;
 const sums = (steps, unit) => { let sum = 0; return steps.map((step) => unit * (sum += step)); };
 const decodePath = ({ x, y }) => { const ys = sums(y, LENGTH); return sums(x, LENGTH).map((value, row) => [value, ys[row]]); };
-const decodeEllipses = (list) => list.map(([x, y, a, b, angle]) => [LENGTH * x, LENGTH * y, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
+const decodeEllipses = (list = []) => list.map(([x, y, a, b, angle]) => [LENGTH * x, LENGTH * y, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
 
 class Scene {
   // Attributes: paths, what was drawn since `begin`: points [m], text, kind and width of each path, for texts under the pointer.
@@ -200,7 +200,7 @@ class Scene {
   // Returns the text of the path under a position [m], or ''.
   find([x, y]) {
     const far = ([u, v], [p, q]) => {
-      const share = Math.min(1, Math.max(0, ((x - u) * (p - u) + (y - v) * (q - v)) / Math.max((p - u) ** 2 + (q - v) ** 2, 1e-12)));
+      const share = clamp(((x - u) * (p - u) + (y - v) * (q - v)) / Math.max((p - u) ** 2 + (q - v) ** 2, 1e-12), 0, 1);
       return Math.hypot(x - u - share * (p - u), y - v - share * (q - v));
     };
     const found = this.paths.filter(({ points, width }) => points.some((point, row) => row && far(points[row - 1], point) < (4 + width / 2) * this.unit));

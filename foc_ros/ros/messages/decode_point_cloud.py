@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -25,10 +24,10 @@ COLUMNS = (*REQUIRED, 'radius_stddev', 'vx', 'vy', 'vz', 'size_x', 'size_y', 'ya
 IDENTITY = 'id'
 MAX_ROWS = 20_000
 """Largest number of obstacles in one message, or kept from markers."""
-
-_LOWEST = np.array([[0.0 if name.startswith(('radius', 'size')) else -MAX_COORDINATE] for name in COLUMNS])
 _DTYPES = {1: 'i1', 2: 'u1', 3: 'i2', 4: 'u2', 5: 'i4', 6: 'u4', 7: 'f4', 8: 'f8'}
 """numpy's name of each sensor_msgs/PointField datatype."""
+Columns = dict[str, Array]
+"""The numbers (n,) of all COLUMNS by name; 0 where the message has none."""
 
 
 @dataclass(frozen=True)
@@ -56,26 +55,27 @@ def decode_point_cloud(message: Any, plane: str, place: Place = stay) -> Decoded
     stamp_ns = decode_stamp(message.header)
     frame_id, transform = place(message.header)
     table = read_table(message)
-    if not len(table):
-        return DecodedCloud(make_obstacles(), stamp_ns, frame_id, {})
-    columns = _read_columns(table)
+    given = set(table.dtype.names or ())
+    with np.errstate(invalid='ignore'):  # numpy warns of a signalling NaN, whose row is dropped like that of any other NaN
+        columns = {name: np.array(table[name], float) if name in given else np.zeros(len(table)) for name in COLUMNS}
     if transform is not NO_TRANSFORM:
-        _transform(columns, table.dtype.names or (), transform, plane)
-    is_finite = np.logical_and.reduce(np.isfinite(columns))
-    is_box = not {'size_x', 'size_y', 'yaw'}.isdisjoint(table.dtype.names or ())
+        columns = _transform(columns, given, transform, plane)
+    is_finite = np.logical_and.reduce([np.isfinite(column) for column in columns.values()])
+    is_box = not given.isdisjoint(('size_x', 'size_y', 'yaw'))
     _check_numbers(columns, is_finite, is_box)
     rows = np.flatnonzero(is_finite)
-    identities = table[IDENTITY] if IDENTITY in (table.dtype.names or ()) else np.arange(len(table))
+    identities = table[IDENTITY] if IDENTITY in given else np.arange(len(table))
     latest = dict(zip(identities[rows].tolist(), rows.tolist(), strict=True))
-    kept = sorted(latest.items(), key=itemgetter(1))
+    kept = np.array(sorted(latest.values()), dtype=np.intp)
     dropped = {'not_finite': len(table) - len(rows), 'duplicate_id': len(rows) - len(kept)}
-    x_y_z, (radius, radius_stddev), v_xyz, box, (size_z,) = np.split(columns[:, [row for _, row in kept]], (3, 5, 8, 11))
-    ids = tuple(str(identity) for identity, _ in kept)
-    (centre, height), (velocity, climb) = project(x_y_z.T, plane), project(v_xyz.T, plane)
-    heights = make_heights(height, np.where(climb == 0.0, size_z, 0.0))
-    obstacles = make_obstacles(centre, radius, radius_stddev, ids, velocity, heights=heights)
+    used = {name: column[kept] for name, column in columns.items()}
+    centre, height = project(_stack(used, 'x', 'y', 'z'), plane)
+    velocity, climb = project(_stack(used, 'vx', 'vy', 'vz'), plane)
+    heights = make_heights(height, np.where(climb == 0.0, used['size_z'], 0.0))
+    ids = tuple(map(str, identities[kept].tolist()))
+    obstacles = make_obstacles(centre, used['radius'], used['radius_stddev'], ids, velocity, heights=heights)
     if is_box:
-        vertices, corners = tabulate_boxes(box[:2].T, box[2])
+        vertices, corners = tabulate_boxes(_stack(used, 'size_x', 'size_y'), used['yaw'])
         obstacles = replace(obstacles, vertices=vertices, corners=corners)
     return DecodedCloud(obstacles, stamp_ns, frame_id, {reason: count for reason, count in dropped.items() if count})
 
@@ -122,43 +122,38 @@ def _read_layout(message: Any, step: int) -> np.dtype[np.void]:
     return np.dtype({'names': list(members), 'formats': list(formats), 'offsets': list(offsets), 'itemsize': step})
 
 
-def _read_columns(table: NDArray[np.void]) -> Array:
-    """Return the numbers of the rows, (12, n), in the order of COLUMNS; columns that the message does not have are 0."""
-    columns = np.zeros((len(COLUMNS), len(table)))
-    with np.errstate(invalid='ignore'):  # numpy warns of a signalling NaN, whose row is dropped like that of any other NaN
-        for name in table.dtype.names or ():
-            if name != IDENTITY:
-                columns[COLUMNS.index(name)] = table[name]
-    return columns
+def _stack(columns: Columns, *names: str) -> Array:
+    return np.column_stack([columns[name] for name in names])
 
 
-def _transform(columns: Array, names: tuple[str, ...], transform: Transform, plane: str) -> None:
-    """Transform the columns of a message with some names in place: positions, velocities and the yaw of boxes."""
-    rotation, sizes = transform.rotation, [name for name in ('size_x', 'size_y', 'size_z') if name in names]
+def _transform(columns: Columns, given: set[str], transform: Transform, plane: str) -> Columns:
+    """Return positions, velocities and the yaw of boxes after a transform; given: names of the columns of the message."""
+    rotation, sizes = transform.rotation, [name for name in ('size_x', 'size_y', 'size_z') if name in given]
     if sizes:
-        tilt = float(np.abs(project((rotation @ lift(np.eye(2), 0.0, plane).T).T, plane)[1]).max())
+        tilt = float(np.abs(project(lift(np.eye(2), 0.0, plane) @ rotation.T, plane)[1]).max())
         if tilt > 1e-3:
             wanted = 'boxes that the transform leaves in the task plane'
             raise MessageError(f'fields[{sizes[0]}]', wanted, f'a tilt of {tilt:.3g}')
+    is_box = not given.isdisjoint(('size_x', 'size_y'))
+    if is_box and 'yaw' not in given:
+        raise MessageError('fields', 'a field yaw, because the transform turns the boxes', ', '.join(sorted(given)))
     with np.errstate(invalid='ignore', over='ignore'):  # rows that are not finite are dropped
-        if {'size_x', 'size_y'} & set(sizes):
-            if 'yaw' not in names:
-                raise MessageError('fields', 'a field yaw, because the transform turns the boxes', ', '.join(names))
-            yaw = columns[COLUMNS.index('yaw')]
-            axis = project(lift(np.column_stack([np.cos(yaw), np.sin(yaw)]), 0.0, plane) @ rotation.T, plane)[0]
-            yaw[:] = np.arctan2(axis[:, 1], axis[:, 0])
-        columns[:3] = transform.apply(columns[:3].T).T
-        columns[5:8] = rotation @ columns[5:8]
+        moved = dict(zip(('x', 'y', 'z'), transform.apply(_stack(columns, 'x', 'y', 'z')).T, strict=True))
+        moved |= zip(('vx', 'vy', 'vz'), rotation @ _stack(columns, 'vx', 'vy', 'vz').T, strict=True)
+        if is_box:
+            along = np.column_stack([np.cos(columns['yaw']), np.sin(columns['yaw'])])
+            axis = project(lift(along, 0.0, plane) @ rotation.T, plane)[0]
+            moved['yaw'] = np.arctan2(axis[:, 1], axis[:, 0])
+    return columns | moved
 
 
-def _check_numbers(columns: Array, is_finite: NDArray[np.bool_], is_box: bool) -> None:
+def _check_numbers(columns: Columns, is_finite: NDArray[np.bool_], is_box: bool) -> None:
     """Raise MessageError for a number out of its bounds, and where boxes are possible, for a row without any extent."""
-    is_wrong = ((columns < _LOWEST) | (columns > MAX_COORDINATE)) & is_finite
-    if is_wrong.any():
-        column, row = np.argwhere(is_wrong)[0]
-        name, value = COLUMNS[column], columns[column, row]
-        unit = 'm/s' if name.startswith('v') else 'rad' if name == 'yaw' else 'm'
-        raise MessageError(f'{name}[{row}]', f'a number in [{_LOWEST[column, 0]:g}, {MAX_COORDINATE:g}] {unit}', f'{value:g}')
-    is_empty = (columns[[COLUMNS.index(name) for name in ('radius', 'size_x', 'size_y')]] == 0.0).all(axis=0) & is_finite
+    for name, column in columns.items():
+        low = 0.0 if name.startswith(('radius', 'size')) else -MAX_COORDINATE
+        for row in np.flatnonzero(((column < low) | (column > MAX_COORDINATE)) & is_finite)[:1]:
+            unit = 'm/s' if name.startswith('v') else 'rad' if name == 'yaw' else 'm'
+            raise MessageError(f'{name}[{row}]', f'a number in [{low:g}, {MAX_COORDINATE:g}] {unit}', f'{column[row]:g}')
+    is_empty = ~_stack(columns, 'radius', 'size_x', 'size_y').any(axis=1) & is_finite
     for row in np.flatnonzero(is_empty & is_box)[:1]:
         raise MessageError(f'radius[{row}]', 'a number > 0 m where size_x and size_y are 0', 0)

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Decoding of hand poses and goals. Numbers are checked here, once; the code behind relies on these checks."""
+"""Decoding of hand poses and goals. Numbers are checked here, once."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,9 +17,7 @@ from .plane import NO_TRANSFORM, Transform, project
 
 MAX_COORDINATE = 1e4
 """Largest coordinate of a hand, a goal or an obstacle [m]; a larger one has a wrong unit."""
-
 MAX_GOALS = 256
-
 Place = Callable[[Any], tuple[str, Transform]]
 """Function from a std_msgs/Header to the frame in which its message is used, and the transform to there."""
 
@@ -55,9 +53,8 @@ def check_hand_pose(pose: Any) -> None:
             raise LostHandError(f'pose.position.{axis}', 'a finite number [m]', value)
     norm = math.hypot(turn.x, turn.y, turn.z, turn.w)
     if not any(place) and not abs(norm - 1.0) < 0.1:
-        raise LostHandError(
-            'pose', 'a position, or an orientation of norm 1', f'0 and norm {norm:g}: the tracker has lost the hand'
-        )
+        found = f'0 and norm {norm:g}: the tracker has lost the hand'
+        raise LostHandError('pose', 'a position, or an orientation of norm 1', found)
 
 
 class DecodedGoals(NamedTuple):
@@ -72,16 +69,18 @@ def decode_goals(message: Any, plane: str, place: Place = stay) -> DecodedGoals:
     """Decode a geometry_msgs/PoseArray; an array without poses gives no goals."""
     if len(message.poses) > MAX_GOALS:
         raise MessageError('poses', f'at most {MAX_GOALS} goals', len(message.poses))
-    frame_id, transform = place(message.header)
-    points = [_decode_point(pose.position, f'poses[{i}].position', transform) for i, pose in enumerate(message.poses)]
-    goals, heights = project(np.array(points, dtype=float).reshape(-1, 3), plane)
-    return DecodedGoals(goals, frame_id, heights)
+    return _decode_goals(message.header, {f'poses[{i}]': pose for i, pose in enumerate(message.poses)}, plane, place)
 
 
 def decode_goal(message: Any, plane: str, place: Place = stay) -> DecodedGoals:
     """Decode a geometry_msgs/PoseStamped as one goal; the stamp is not used."""
-    frame_id, transform = place(message.header)
-    goals, heights = project([_decode_point(message.pose.position, 'pose.position', transform)], plane)
+    return _decode_goals(message.header, {'pose': message.pose}, plane, place)
+
+
+def _decode_goals(header: Any, poses: Mapping[str, Any], plane: str, place: Place) -> DecodedGoals:
+    frame_id, transform = place(header)
+    points = [_decode_point(pose.position, f'{name}.position', transform) for name, pose in poses.items()]
+    goals, heights = project(np.array(points, dtype=float).reshape(-1, 3), plane)
     return DecodedGoals(goals, frame_id, heights)
 
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from foc_ros.core.guidance.guide import GuidanceOutput
 
-from .encode_inputs import encode_array, encode_hand_pose, encode_pose
+from .encode_inputs import NO_ROTATION, encode_array, encode_hand_pose
 from .plane import lift, project
-from .types import MessageTypes, make_header, make_marker
+from .types import MessageTypes, make_header
 
 ARROW, SPHERE = 0, 2
 COLOUR = (0.0, 0.62, 0.45, 0.9)
@@ -33,20 +33,17 @@ class Place:
 def encode_wrench(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/WrenchStamped without torque."""
     header = make_header(types, place.stamp_ns, place.frame_id)
-    return types.make('geometry_msgs/msg/WrenchStamped', header=header, wrench=encode_force(output, place, types))
+    return types.fill('geometry_msgs/msg/WrenchStamped', (header, encode_force(output, place, types)))
 
 
 def encode_force(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/Wrench without torque and without a stamp, as drivers of haptic devices take it."""
-    return types.make(
-        'geometry_msgs/msg/Wrench', force=types.fill('geometry_msgs/msg/Vector3', lift(output.force, 0.0, place.plane).tolist())
-    )
+    return types.make('geometry_msgs/msg/Wrench', force=lift(output.force, 0.0, place.plane))
 
 
 def encode_reference(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
     """Encode the reference as a geometry_msgs/PoseStamped, whose orientation means nothing."""
-    position = lift(output.reference, place.height, place.plane).tolist()
-    return encode_hand_pose(types, place.stamp_ns, place.frame_id, position)
+    return encode_hand_pose(types, place.stamp_ns, place.frame_id, lift(output.reference, place.height, place.plane))
 
 
 def encode_stiffness(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
@@ -59,23 +56,19 @@ def blend_twist(output: GuidanceOutput, command: Any, plane: str, types: Message
     """Return a geometry_msgs/TwistStamped command with the part in the plane blended; the rest of it is kept."""
     linear = command.twist.linear
     velocity, across = project([linear.x, linear.y, linear.z], plane)
-    blended = types.fill('geometry_msgs/msg/Vector3', lift(output.blend_command(velocity), across, plane).tolist())
-    twist = types.make('geometry_msgs/msg/Twist', linear=blended, angular=command.twist.angular)
-    return types.make('geometry_msgs/msg/TwistStamped', header=command.header, twist=twist)
+    blended = lift(output.blend_command(velocity), across, plane)
+    return types.fill('geometry_msgs/msg/TwistStamped', (command.header, (blended, command.twist.angular)))
 
 
 def encode_guidance_markers(output: GuidanceOutput, place: Place, types: MessageTypes) -> list[Any]:
     """Encode the force as an arrow from the hand, of 2 cm for each newton, and the reference as a sphere of 8 mm."""
     start = lift(output.position, place.height, place.plane)
-    end = start + 0.02 * lift(output.force, 0.0, place.plane)
+    points = np.stack([start, start + 0.02 * lift(output.force, 0.0, place.plane)])
     reference = encode_reference(output, place, types)
-    shared = {'header': reference.header, 'lifetime': types.make('builtin_interfaces/msg/Duration', sec=1)}
-    points = [types.fill('geometry_msgs/msg/Point', each.tolist()) for each in (start, end)]
-    arrow = {'pose': encode_pose(types, (0.0, 0.0, 0.0)), 'points': points}
-    return [
-        make_marker(types, 'guidance', 0, ARROW, COLOUR, (0.004, 0.008, 0.0), **arrow, **shared),
-        make_marker(types, 'guidance', 1, SPHERE, COLOUR, (0.008, 0.008, 0.008), pose=reference.pose, **shared),
-    ]
+    shared = {'ns': 'guidance', 'header': reference.header, 'lifetime': (1, 0), 'color': COLOUR}
+    arrow = {'type': ARROW, 'scale': (0.004, 0.008, 0.0), 'pose': ((0.0, 0.0, 0.0), NO_ROTATION), 'points': points}
+    sphere = {'id': 1, 'type': SPHERE, 'scale': (0.008, 0.008, 0.008), 'pose': reference.pose}
+    return [types.make('visualization_msgs/msg/Marker', **shared, **each) for each in (arrow, sphere)]
 
 
 TWIST, TWIST_TYPE = 'guidance/twist', 'geometry_msgs/msg/TwistStamped'

@@ -12,32 +12,28 @@ import numpy as np
 
 from foc_ros.core.types import Array
 
-from .types import MessageTypes, make_header, make_marker
+from .types import MessageTypes, make_header
 
-_NAMES = ('x', 'y', 'z', 'radius', 'radius_stddev', 'id')
-_BOX_NAMES = ('size_x', 'size_y', 'yaw')
 _DATATYPES = {'<i4': 5, '<u4': 6, '<f4': 7}
-CLOUD_ROW = np.dtype([(name, '<i4' if name == 'id' else '<f4') for name in _NAMES])
+CLOUD_ROW = np.dtype([*((name, '<f4') for name in ('x', 'y', 'z', 'radius', 'radius_stddev')), ('id', '<i4')])
 """One circle of the `obstacles` table [m], and its id."""
-BOX_ROW = np.dtype([*CLOUD_ROW.descr, *((name, '<f4') for name in _BOX_NAMES)])
+BOX_ROW = np.dtype([*CLOUD_ROW.descr, *((name, '<f4') for name in ('size_x', 'size_y', 'yaw'))])
 """One obstacle of a table with boxes: circles have the sizes 0."""
 
 
-def encode_pose(types: MessageTypes, position: Iterable[float]) -> Any:
-    """Encode a geometry_msgs/Pose without rotation."""
-    no_rotation = types.make('geometry_msgs/msg/Quaternion', w=1.0)
-    return types.fill('geometry_msgs/msg/Pose', (types.fill('geometry_msgs/msg/Point', position), no_rotation))
+NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
+"""Quaternion (x, y, z, w) of a pose without rotation."""
 
 
 def encode_hand_pose(types: MessageTypes, stamp_ns: int, frame_id: str, position: Iterable[float]) -> Any:
     """Encode a geometry_msgs/PoseStamped."""
-    head = make_header(types, stamp_ns, frame_id)
-    return types.fill('geometry_msgs/msg/PoseStamped', (head, encode_pose(types, position)))
+    header = make_header(types, stamp_ns, frame_id)
+    return types.fill('geometry_msgs/msg/PoseStamped', (header, (tuple(position), NO_ROTATION)))
 
 
 def encode_goals(types: MessageTypes, stamp_ns: int, frame_id: str, positions: Array) -> Any:
     """Encode goals (g, 3) as a geometry_msgs/PoseArray."""
-    poses = [encode_pose(types, position) for position in positions]
+    poses = [(position, NO_ROTATION) for position in positions]
     return types.fill('geometry_msgs/msg/PoseArray', (make_header(types, stamp_ns, frame_id), poses))
 
 
@@ -47,28 +43,23 @@ def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Se
     Rows without the last three are circles. The message has their fields only if a row has a size. No row can tell the corners of
     a hull that is no box.
     """
-    is_box = any(any(row[len(_NAMES) : -1]) for row in rows)
-    table = (
-        [(*row, 0.0, 0.0, 0.0)[: len(_NAMES + _BOX_NAMES)] for row in rows] if is_box else [row[: len(_NAMES)] for row in rows]
-    )
-    return encode_table(types, make_header(types, stamp_ns, frame_id), np.array(table, dtype=BOX_ROW if is_box else CLOUD_ROW))
+    columns, count = (BOX_ROW, 9) if any(any(row[6:8]) for row in rows) else (CLOUD_ROW, 6)
+    table = np.array([(*row, 0.0, 0.0, 0.0)[:count] for row in rows], dtype=columns)
+    return encode_table(types, make_header(types, stamp_ns, frame_id), table)
 
 
 def encode_boxes(types: MessageTypes, stamp_ns: int, frame_id: str, boxes: Mapping[str, Sequence[float]]) -> Any:
     """Encode boxes by name, x, y, z of the centre and full lengths along these axes [m], as a MarkerArray of cubes."""
-    header, cube, grey = make_header(types, stamp_ns, frame_id), 1, (0.45, 0.45, 0.5, 0.9)
+    shared = {'type': 1, 'header': make_header(types, stamp_ns, frame_id), 'color': (0.45, 0.45, 0.5, 0.9)}
     markers = [
-        make_marker(types, name, 0, cube, grey, box[3:], header=header, pose=encode_pose(types, box[:3]))
-        for name, box in boxes.items()
+        {'ns': name, 'pose': (tuple(box[:3]), NO_ROTATION), 'scale': tuple(box[3:]), **shared} for name, box in boxes.items()
     ]
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
 
 
-def encode_array(types: MessageTypes, array: Array, dimensions: Iterable[tuple[str, int, int]]) -> Any:
+def encode_array(types: MessageTypes, array: Array, dimensions: Sequence[tuple[str, int, int]]) -> Any:
     """Encode an array as a std_msgs/Float64MultiArray; dimensions: label, size and stride of each."""
-    made = [types.fill('std_msgs/msg/MultiArrayDimension', each) for each in dimensions]
-    layout = types.fill('std_msgs/msg/MultiArrayLayout', (made, 0))
-    return types.fill('std_msgs/msg/Float64MultiArray', (layout, array.ravel()))
+    return types.fill('std_msgs/msg/Float64MultiArray', ((dimensions, 0), array.ravel()))
 
 
 def encode_table(types: MessageTypes, cloud_header: Any, table: np.ndarray[Any, np.dtype[np.void]]) -> Any:

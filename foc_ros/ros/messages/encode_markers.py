@@ -14,22 +14,19 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets, trace_obstacle
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 
 from .plane import lift
 from .ranking import describe_candidate, find_drawn_curve, order_candidates
-from .types import MessageTypes, make_header, make_marker
+from .types import MessageTypes, make_header
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
 """Types of markers."""
@@ -58,6 +55,13 @@ OBSTACLE: Colour = (0.45, 0.45, 0.5, 0.9)
 DEVIATION: Colour = (0.85, 0.35, 0.2, 0.25)
 UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.78, 0.32, 0.04])
 """Colours of paths. Foxglove writes in each mixture of them, and in GREY, on white; RViz shows them on a dark background."""
+ORIGIN = np.zeros(3)
+PLANE_ROTATION = {
+    'xy': (0.0, 0.0, 0.0, 1.0),
+    'xz': (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)),
+    'yz': (0.5, 0.5, 0.5, 0.5),
+}
+"""Quaternion (x, y, z, w) that rotates the x and y axes onto the axes of each plane."""
 
 
 def encode_markers(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
@@ -68,7 +72,6 @@ def encode_markers(prediction: Prediction, plane: str, types: MessageTypes) -> A
     for index, outcome in enumerate([*order_candidates(prediction), *unsolved]):
         markers.extend(encoder.encode_candidate(index, outcome))
     markers.extend(encoder.encode_names())
-    markers.extend(encoder.encode_legend())
     markers.extend(encoder.encode_obstacles())
     return types.make('visualization_msgs/msg/MarkerArray', markers=markers)
 
@@ -77,27 +80,16 @@ def _is_labelled(outcome: PredictedCandidate) -> bool:
     return not outcome.has_likelihood or outcome.likelihood >= LABELLED
 
 
-def _write_label(share: str, words: str, notes: str) -> str:
-    """Return a label in short lines, which do not part the side of an obstacle in the words of a class from its name."""
-    kept = words.replace(' of ', '\0of\0')
-    lines = textwrap.wrap(f'{share}, {kept}{notes}', LINE_LETTERS, break_long_words=False, break_on_hyphens=False)
-    return '\n'.join(lines).replace('\0', ' ')
-
-
-@dataclass(frozen=True)
 class _MarkerEncoder:
     """Encodes markers in the plane of one prediction; the fields that all of them share are made once."""
 
-    prediction: Prediction
-    plane: str
-    types: MessageTypes
-
-    @cached_property
-    def _shared_fields(self) -> dict[str, Any]:
-        return {
-            'header': make_header(self.types, self.prediction.stamp_ns, self.prediction.frame_id),
-            'lifetime': self.types.make('builtin_interfaces/msg/Duration', sec=int(LIFETIME_S)),
-        }
+    def __init__(self, prediction: Prediction, plane: str, types: MessageTypes) -> None:
+        self._prediction, self._plane, self._types = prediction, plane, types
+        lifetime = types.make('builtin_interfaces/msg/Duration', sec=int(LIFETIME_S))
+        self._shared = {'header': make_header(types, prediction.stamp_ns, prediction.frame_id), 'lifetime': lifetime}
+        # down in the plane, and towards a viewer who sees its first axis to the right
+        self._down = lift([0.0, -1.0], 0.0, plane)
+        self._towards = lift([0.0, 0.0], -1.0 if plane == 'xz' else 1.0, plane)
 
     def encode_candidate(self, index: int, outcome: PredictedCandidate) -> Iterator[Any]:
         likelihood = outcome.likelihood
@@ -113,79 +105,78 @@ class _MarkerEncoder:
             colour, share, notes = GREY, '- %', f', {outcome.reason}'
         points = self._lift_curve(find_drawn_curve(outcome), outcome)
         width = 0.002 + 0.004 * likelihood
-        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=self._encode_points(points))
+        yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=points)
         if _is_labelled(outcome):
-            words = describe_candidate(outcome, len(self.prediction.goal_positions))
+            words = describe_candidate(outcome, len(self._prediction.goal_positions))
             words = outcome.label if len(words) > MOST_LETTERS else words
+            text = f'{share}, {words}{notes}'.replace(' of ', '\0of\0')  # no line parts a side from its obstacle
+            lines = textwrap.wrap(text, LINE_LETTERS, break_long_words=False, break_on_hyphens=False)
             place = points[round((0.45 + 0.12 * (index % 3)) * (len(points) - 1))]  # labels of neighbours stand apart
-            yield self._encode_text('label', index, _write_label(share, words, notes), place, colour, 1.0)
+            yield self._encode_text('label', index, '\n'.join(lines).replace('\0', ' '), place, colour, 1.0)
 
     def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
         """Yield ellipses of one standard deviation about the mean, spread over the path."""
-        path = outcome.solution.path
+        path, height, is_motor = outcome.solution.path, outcome.height, name == MOTOR
         steps = np.unique(np.linspace(0, len(path) - 1, ELLIPSES + 1).round().astype(np.intp)[1:])
-        covariance = outcome.motor_covariance if name == MOTOR else outcome.covariance
+        covariance = outcome.motor_covariance if is_motor else outcome.covariance
         variances, axes = np.linalg.eigh(covariance[steps, :2, :2])
         diameters = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
         angles = np.arctan2(axes[:, 1, 0], axes[:, 0, 0]).tolist()
         opacity, thickness = ELLIPSE_STYLES[name]
         thick = np.full(len(steps), thickness)
-        if outcome.height is not None:
-            variance = (outcome.height.motor_covariance if name == MOTOR else outcome.height.covariance)[steps, 0, 0]
+        if height is not None:
+            variance = (height.motor_covariance if is_motor else height.covariance)[steps, 0, 0]
             thick = np.maximum(thick, 2.0 * np.sqrt(np.maximum(variance, 0.0)))
         faint = (*colour[:3], opacity * colour[3])
-        for i, centre in enumerate(self._lift_curve(path, outcome, steps)):
+        for i, centre in enumerate(self._lift_curve(path, outcome)[steps]):
             yield self.encode(name, 1000 * index + i, CYLINDER, faint, (*diameters[i], float(thick[i])), centre, angles[i])
 
     def encode_names(self) -> Iterator[Any]:
-        """Yield the names of several goals, and those of the obstacles that the labels of paths name."""
-        goals, near = self.prediction.goals, self.prediction.obstacles
-        for row, place in enumerate(self._lift(self.prediction.goal_positions)):
-            if len(goals) > 1:
-                yield self._encode_text('goal', row, goals[row].name, place, GREY, 2.0)
-        named = {name for each in self.prediction.candidates if _is_labelled(each) for name, _ in each.candidate.sides}
+        """Yield the names of several goals and of the obstacles that the labels of paths name, and the legend below the hand.
+
+        The legend explains the ellipses, if any are drawn, and has the shares that no candidate has.
+        """
+        given, near = self._prediction, self._prediction.obstacles
+        if len(given.goals) > 1:
+            for row, place in enumerate(self._lift(given.goal_positions)):
+                yield self._encode_text('goal', row, given.goals[row].name, place, GREY, 2.0)
+        named = {name for each in given.candidates if _is_labelled(each) for name, _ in each.candidate.sides}
         for row, place in enumerate(self._lift(near.centre)):
             if near.ids[row] in named:
                 yield self._encode_text('obstacle_name', row, near.ids[row], place, BLACK)
-
-    def encode_legend(self) -> Iterator[Any]:
-        """Yield the legend of the ellipses, below the hand, if any are drawn, and the shares that no candidate has."""
-        for outcome in self.prediction.candidates_with_likelihood[:1]:
-            (place,) = self._lift(outcome.solution.path[:1])
-            shares = (self.prediction.unknown, 'unknown'), (self.prediction.other, 'another goal')
+        for outcome in given.candidates_with_likelihood[:1]:
+            shares = (given.unknown, 'unknown'), (given.other, 'another goal')
             text = '\n'.join([LEGEND, *(f'{100 * share:.0f} % {name}' for share, name in shares if share > 0.0)])
-            yield self._encode_text('legend', 0, text, place, GREY, 3.0)
+            yield self._encode_text('legend', 0, text, self._lift(outcome.solution.path[0]), GREY, 3.0)
 
     def encode_obstacles(self) -> Iterator[Any]:
-        near = self.prediction.obstacles
-        if len(near) > MAX_DRAWN and self.prediction.candidates:
-            distances = measure_offsets(self.prediction.candidates[0].candidate.guess[0], near)[1][0] - near.radius
+        """Yield the obstacles with their mean sizes and larger by a standard deviation: cylinders, or triangles of an outline."""
+        near = self._prediction.obstacles
+        if len(near) > MAX_DRAWN and self._prediction.candidates:
+            distances = measure_offsets(self._prediction.candidates[0].candidate.guess[0], near)[1][0] - near.radius
             near = near.take(np.argsort(distances, kind='stable'))
         near = near.take(list(range(min(len(near), MAX_DRAWN))))
+        centres = self._lift(near.centre)
         for name, growths, colour, above in (
             ('obstacle', np.zeros(len(near)), OBSTACLE, 0.0),
             ('obstacle_deviation', near.radius_stddev, DEVIATION, -THICKNESS),  # at equal heights, viewers draw either above
         ):
+            shift = above * self._towards
             for row, growth in enumerate(growths.tolist()):
-                yield self._encode_obstacle(name, near, row, growth, colour, above)
+                if near.corners[row] == 1:
+                    diameter = 2 * (float(near.radius[row]) + growth)
+                    yield self.encode(name, row, CYLINDER, colour, (diameter, diameter, TALL), centres[row] + shift)
+                    continue
+                outline = self._lift(trace_obstacle(near, row, growth, 32))
+                middle, *edge = self._types.fill_each('geometry_msgs/msg/Point', np.vstack([centres[row], outline]))
+                corners = [corner for before, after in pairwise(edge) for corner in (middle, before, after)]
+                yield self.encode(name, row, TRIANGLES, colour, centre=shift, points=corners)
 
-    def _encode_obstacle(self, name: str, obstacles: Obstacles, row: int, growth: float, colour: Colour, above: float) -> Any:
-        """Return an obstacle, larger by a growth [m]: a cylinder, or triangles between its centre and its outline."""
-        (centre,) = self._lift(obstacles.centre[row : row + 1])
-        if obstacles.corners[row] == 1:
-            diameter = 2 * (float(obstacles.radius[row]) + growth)
-            return self.encode(name, row, CYLINDER, colour, (diameter, diameter, TALL), self._move(centre, above))
-        middle, *outline = self._encode_points([centre, *self._lift(trace_obstacle(obstacles, row, growth, 32))])
-        corners = [corner for before, after in pairwise(outline) for corner in (middle, before, after)]
-        return self.encode(name, row, TRIANGLES, colour, centre=self._move((0.0, 0.0, 0.0), above), points=corners)
-
-    def _encode_text(
-        self, name: str, identity: int, text: str, point: Sequence[float], colour: Colour, below: float = 0.0
-    ) -> Any:
-        """Return a text at a point, in front of the obstacles; below: by how many lines its first one is below the point."""
+    def _encode_text(self, name: str, identity: int, text: str, place: Array, colour: Colour, below: float = 0.0) -> Any:
+        """Return a text at a place, in front of the obstacles; below: by how many lines its first one is below the place."""
         down = TEXT_HEIGHT * (below + text.count('\n') / 2) if below else 0.0  # viewers centre a text at its place
-        place = self._move(point, TALL, down)
-        return self.encode(name, identity, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), place, text=text)
+        centre = place + TALL * self._towards + down * self._down
+        return self.encode(name, identity, TEXT, (*colour[:3], 1.0), (0, 0, TEXT_HEIGHT), centre, text=text)
 
     def encode(
         self,
@@ -194,47 +185,24 @@ class _MarkerEncoder:
         kind: int,
         colour: Colour = GREY,
         scale: tuple[float, float, float] = (1, 1, 1),
-        centre: Sequence[float] = (0.0, 0.0, 0.0),
+        centre: Array = ORIGIN,
         angle: float = 0.0,
         **rest: Any,
     ) -> Any:
-        x, y, z, w = _PLANE_ROTATION[self.plane if kind == CYLINDER else 'xy']  # a cylinder stands on the plane
+        x, y, z, w = PLANE_ROTATION[self._plane if kind == CYLINDER else 'xy']  # a cylinder stands on the plane
         sine, cosine = math.sin(angle / 2), math.cos(angle / 2)
         turn = x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine, w * cosine - z * sine
-        orientation = self.types.fill('geometry_msgs/msg/Quaternion', turn)
-        pose = self.types.make('geometry_msgs/msg/Pose', position=self._encode_points([centre])[0], orientation=orientation)
-        return make_marker(self.types, name, identity, kind, colour, scale, pose=pose, **self._shared_fields, **rest)
+        own = {'ns': name, 'id': identity, 'type': kind, 'color': colour, 'scale': scale, 'pose': (centre.tolist(), turn)}
+        return self._types.make('visualization_msgs/msg/Marker', **own, **self._shared, **rest)
 
-    def _lift(self, positions: Array) -> list[list[float]]:
-        """Return positions in the plane (m, 2) as points in space, at the height of the hand."""
-        return cast('list[list[float]]', lift(positions, self.prediction.height, self.plane).tolist())
+    def _lift(self, positions: Array) -> Array:
+        """Return positions in the plane (..., 2) as points in space, at the height of the hand."""
+        return lift(positions, self._prediction.height, self._plane)
 
-    @cached_property
-    def _directions(self) -> list[tuple[float, float]]:
-        """Components of two directions in space: down in the plane, and towards a viewer who sees its first axis to the right."""
-        (down,) = lift(np.array([[0.0, -1.0]]), 0.0, self.plane).tolist()
-        (towards,) = lift(np.zeros((1, 2)), -1.0 if self.plane == 'xz' else 1.0, self.plane).tolist()
-        return list(zip(down, towards, strict=True))
-
-    def _move(self, point: Sequence[float], towards: float, down: float = 0.0) -> list[float]:
-        """Return a point in space moved towards a viewer and down [m]."""
-        return [at + towards * b + down * a for at, (a, b) in zip(point, self._directions, strict=True)]
-
-    def _lift_curve(self, curve: Array, outcome: PredictedCandidate, rows: Any = slice(None)) -> list[list[float]]:
-        """Return rows of a curve (m, 2) along the whole way of a candidate as points in space, at its predicted heights."""
+    def _lift_curve(self, curve: Array, outcome: PredictedCandidate) -> Array:
+        """Return a curve (m, 2) along the whole way of a candidate as points in space, at its predicted heights."""
         if outcome.height is None:
-            return self._lift(curve[rows])
+            return self._lift(curve)
         heights = outcome.height.mean[:, 0]
         between = np.interp(np.linspace(0.0, 1.0, len(curve)), np.linspace(0.0, 1.0, len(heights)), heights)
-        return cast('list[list[float]]', lift(curve[rows], between[rows], self.plane).tolist())
-
-    def _encode_points(self, points: Sequence[Sequence[float]]) -> list[Any]:
-        return self.types.fill_each('geometry_msgs/msg/Point', np.array(points))
-
-
-_PLANE_ROTATION = {
-    'xy': (0.0, 0.0, 0.0, 1.0),
-    'xz': (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)),
-    'yz': (0.5, 0.5, 0.5, 0.5),
-}
-"""Quaternion (x, y, z, w) that rotates the x and y axes onto the axes of the plane."""
+        return lift(curve, between, self._plane)

@@ -9,13 +9,13 @@ its rank, so the most likely one has index 0. All messages carry the stamp and t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.prediction import Prediction
+from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import NANOSECONDS
 
@@ -53,22 +53,21 @@ LIKELIHOOD_COLUMNS = ('likelihood', 'effort', 'cost_ratio', 'eta')
 
 def encode_prediction_cloud(prediction: Prediction, plane: str, types: MessageTypes) -> Any:
     """Encode all candidates with a likelihood as a PointCloud2 of N + 1 rows each; no rows if there are none."""
-    return encode_table(types, make_header(types, prediction.stamp_ns, prediction.frame_id), _build_table(prediction, plane))
-
-
-def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
-    """Return the rows of all candidates with a likelihood, one candidate after the other, filled column by column."""
     outcomes = order_candidates(prediction)
+    rows = _tabulate(outcomes, prediction.height, plane) if outcomes else np.zeros(0, dtype=CLOUD_ROW)
+    return encode_table(types, make_header(types, prediction.stamp_ns, prediction.frame_id), rows)
+
+
+def _tabulate(outcomes: Sequence[PredictedCandidate], height: float, plane: str) -> NDArray[np.void]:
+    """Return the rows of candidates, one after the other, filled column by column; height: where none is predicted [m]."""
     solutions = [outcome.solution for outcome in outcomes]
     lengths = [len(solution.mean) for solution in solutions]
     rows = np.zeros(sum(lengths), dtype=CLOUD_ROW)
-    if not len(rows):
-        return rows
     mean = np.concatenate([solution.mean for solution in solutions])
     for place, axis in enumerate(plane):
         rows[axis], rows['v' + axis] = mean[:, place], mean[:, 2 + place]
     normal = next(axis for axis in 'xyz' if axis not in plane)  # its covariances with the axes of the plane are zero
-    rows[normal] = prediction.height
+    rows[normal] = height
     heights = [outcome.height for outcome in outcomes if outcome.height is not None]
     if heights:
         rows[normal], rows['v' + normal] = np.concatenate([each.mean[:, :2] for each in heights]).T
@@ -79,14 +78,12 @@ def _build_table(prediction: Prediction, plane: str) -> NDArray[np.void]:
         rows[prefix + 2 * plane[0]], rows[prefix + 2 * plane[1]] = covariance[:, 0, 0], covariance[:, 1, 1]
         rows[prefix + plane] = covariance[:, 0, 1]
     rows['t'] = np.concatenate([solution.times for solution in solutions])
-    facts = [
-        (rank, each.likelihood, each.candidate.goal, each.way, not each.is_solved, STATUSES.index(each.solution.status))
-        for rank, each in enumerate(outcomes)
-    ]
-    for name, values in zip(
-        ('candidate', 'likelihood', 'goal', 'way', 'compromised', 'status'), zip(*facts, strict=True), strict=True
-    ):
-        rows[name] = np.repeat(values, lengths)
+    rows['candidate'] = np.repeat(range(len(outcomes)), lengths)
+    rows['likelihood'] = np.repeat([each.likelihood for each in outcomes], lengths)
+    rows['goal'] = np.repeat([each.candidate.goal for each in outcomes], lengths)
+    rows['way'] = np.repeat([each.way for each in outcomes], lengths)
+    rows['compromised'] = np.repeat([not each.is_solved for each in outcomes], lengths)
+    rows['status'] = np.repeat([STATUSES.index(solution.status) for solution in solutions], lengths)
     return rows
 
 
@@ -97,17 +94,13 @@ def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     effort: the remaining one [m^2/s^6]. Shares that no candidate has come last, without the other numbers: rows `UNKNOWN` and
     `OTHER`, each only if its share is above 0.
     """
-    outcomes = order_candidates(prediction)
+    outcomes, shares = order_candidates(prediction), _list_shares(prediction)
     ratios = compute_cost_ratios(outcomes)
-    rows = [(o.likelihood, o.solution.effort, ratio, o.solution.eta) for o, ratio in zip(outcomes, ratios, strict=True)]
-    shares, width = _list_shares(prediction), len(LIKELIHOOD_COLUMNS)
+    rows = [(each.likelihood, each.effort, ratio, each.eta) for each, ratio in zip(outcomes, ratios, strict=True)]
     rows += [(share, math.nan, math.nan, math.nan) for share in shares.values()]
-    labels = ';'.join([*(outcome.candidate.label for outcome in outcomes), *shares])
-    dimensions = (
-        (labels, len(rows), width * len(rows)),
-        (','.join(LIKELIHOOD_COLUMNS), width, width),
-        (f'{STAMP}{prediction.stamp_ns}', 1, 1),
-    )
+    labels, width = ';'.join([*(outcome.label for outcome in outcomes), *shares]), len(LIKELIHOOD_COLUMNS)
+    stamp = f'{STAMP}{prediction.stamp_ns}', 1, 1
+    dimensions = (labels, len(rows), width * len(rows)), (','.join(LIKELIHOOD_COLUMNS), width, width), stamp
     return encode_array(types, np.array(rows, dtype=float), dimensions)
 
 
@@ -128,8 +121,7 @@ def encode_likelihoods_by_name(prediction: Prediction, types: MessageTypes) -> A
     statuses = []
     for name, rows in (('goals', goals), ('classes', classes)):
         items = (rows | _list_shares(prediction)).items()
-        values = [types.fill('diagnostic_msgs/msg/KeyValue', (key, f'{share:.6g}')) for key, share in items]
-        statuses.append(types.make('diagnostic_msgs/msg/DiagnosticStatus', name=name, values=values))
+        statuses.append({'name': name, 'values': [(key, f'{share:.6g}') for key, share in items]})
     header = make_header(types, prediction.stamp_ns, prediction.frame_id)
     return types.fill('diagnostic_msgs/msg/DiagnosticArray', (header, statuses))
 
@@ -137,8 +129,8 @@ def encode_likelihoods_by_name(prediction: Prediction, types: MessageTypes) -> A
 def encode_goal_likelihoods(prediction: Prediction, types: MessageTypes) -> dict[int, Any]:
     """Encode the likelihood of each goal of which something is known as a std_msgs/Float64, by its row."""
     order_candidates(prediction)  # raises FocError for a number that is not finite
-    likelihoods = {row: goal.likelihood for row, goal in enumerate(prediction.goals) if goal.likelihood is not None}
-    return {row: types.make(GOAL_LIKELIHOOD_TYPE, data=likelihood) for row, likelihood in likelihoods.items()}
+    goals = enumerate(prediction.goals)
+    return {row: types.make(GOAL_LIKELIHOOD_TYPE, data=goal.likelihood) for row, goal in goals if goal.likelihood is not None}
 
 
 def encode_path(prediction: Prediction, plane: str, types: MessageTypes) -> Any:

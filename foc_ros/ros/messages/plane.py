@@ -8,13 +8,12 @@ right and the second axis up. For 'xy' and 'yz' that is the view against the thi
 
 from __future__ import annotations
 
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from foc_ros.core.obstacles.polygons import FLAT, make_hull_polygon
+from foc_ros.core.obstacles.polygons import FLAT
 from foc_ros.core.types import Array
 
 _AXES = {'xy': (slice(0, 2), 2), 'xz': (slice(0, 3, 2), 1), 'yz': (slice(1, 3), 0)}
@@ -61,18 +60,6 @@ def compute_rotation(quaternion: Any) -> Array:
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     rotation: Array = np.eye(3) + 2.0 * (w * cross + cross @ cross) / (x * x + y * y + z * z + w * w or 1.0)
     return rotation
-
-
-def project_box(centre: ArrayLike, size: ArrayLike, rotation: Array, plane: str) -> tuple[Array, Array, Array]:
-    """Return the outline of a box in space and its heights (2,): lowest and highest point along the normal [m].
-
-    The outline, the convex hull of the projections of the eight corners, is given by its middle (2,) and its vertices (v, 2) from
-    there, anticlockwise [m]. centre (3,), size (3,) of full lengths [m]; rotation (3, 3): of the box.
-    """
-    signs = np.array([*product((-1.0, 1.0), repeat=3)])
-    corners = np.asarray(centre, dtype=float) + signs * np.asarray(size, dtype=float) / 2.0 @ rotation.T
-    places, heights = project(corners, plane)
-    return *make_hull_polygon(places), make_heights((heights.min() + heights.max()) / 2.0, np.ptp(heights))
 
 
 def make_heights(middle: ArrayLike, size: ArrayLike) -> Array:
