@@ -18,12 +18,8 @@ GOALS = np.array([[0.3, -0.1], [0.3, 0.0], [0.3, 0.1]])
 
 def reach(goal: np.ndarray, bow: float, duration_s: float, hz: float, rng: np.random.Generator, noise: float) -> np.ndarray:
     """Return a minimum-jerk reach from the origin, bowed to the left, with rests of 0.1 s: rows of time and noisy position."""
-    times = np.arange(-0.1, duration_s + 0.1, 1.0 / hz)
-    share = np.clip(times / duration_s, 0.0, 1.0)
-    done = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-    left = np.array([-goal[1], goal[0]]) / np.hypot(*goal)
-    path = done[:, None] * goal + bow * np.sin(np.pi * done)[:, None] * left
-    return np.column_stack([times + 0.1, path + rng.normal(0.0, noise, path.shape)])
+    times, path = evaluation_samples.reach(bow, tuple(goal), duration_s, rest=0.1, rate=hz)
+    return np.column_stack([times, path + rng.normal(0.0, noise, path.shape)])
 
 
 def write_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float = 50.0, noise: float = 5e-4) -> Path:

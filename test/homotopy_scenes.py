@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes for the tests of the homotopy classes, and a brute-force search for these that shares nothing with the package."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from foc_ros.core.classes import Search, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.shapes import make_box_polygon
 
 CLEARANCE = 0.005
 GOAL = np.array([0.35, 0.0])
@@ -40,26 +40,10 @@ def find(
 
 
 def measure_clear(path: np.ndarray, obstacles: Obstacles, clearance: float = CLEARANCE) -> float:
-    """Least distance of a path's points from the obstacles with the clearance [m]."""
     return float((measure_offsets(path, obstacles)[1] - obstacles.radius - clearance).min())
 
 
-def avoiding() -> tuple[Obstacles, np.ndarray]:
-    """The six cylinders and four goals of the Avoiding task."""
-    with (AVOIDING / 'obstacles.csv').open() as file:
-        rows = list(csv.DictReader(file))
-    with (AVOIDING / 'goals.csv').open() as file:
-        goals = [[float(row['x_m']), float(row['y_m'])] for row in csv.DictReader(file)]
-    centre, radius = [[float(row['x_m']), float(row['y_m'])] for row in rows], [float(row['radius_m']) for row in rows]
-    return make_obstacles(centre, radius, ids=tuple(row['obstacle'] for row in rows)), np.array(goals)
-
-
 HAND = np.zeros(2)
-
-
-def make_box(width: float, depth: float, yaw: float) -> np.ndarray:
-    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [width / 2, depth / 2]
-    return turn(corners, yaw)
 
 
 def turn(points: np.ndarray, angle: float) -> np.ndarray:
@@ -74,7 +58,7 @@ def make_polygon(rng: np.random.Generator) -> tuple[np.ndarray, float]:
     if kind == 1:
         return turn(np.array([[1.0, 0.0], [-1.0, 0.0]]) * rng.uniform(0.01, 0.06), yaw), rng.uniform(0.004, 0.015)
     if kind < 4:
-        return make_box(*rng.uniform(0.02, 0.09, 2), yaw if kind == 2 else 0.0), rng.choice([0.0, 0.006])
+        return make_box_polygon(rng.uniform(0.02, 0.09, 2), yaw if kind == 2 else 0.0), rng.choice([0.0, 0.006])
     angle = np.sort(np.arange(5) * 2 * np.pi / 5 + rng.uniform(-0.5, 0.5, 5))
     points = rng.uniform(0.02, 0.05) * np.column_stack([np.cos(angle), np.sin(angle)])
     return points - points.mean(axis=0), rng.choice([0.0, 0.005])

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foc_ros.core.config import FocConfig
+import foc_ros
+from foc_ros.core.config import Config, FocConfig
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp.problem import Problem, rest_to_goal
@@ -26,14 +27,13 @@ KINDS = {'': Circle, 'box': Box, 'capsule': Capsule, 'circle': Circle, 'hull': H
 
 def reference_cases() -> list:
     """Return the reference cases as pytest parameters: ours, and those of an optional folder, skipped where it is absent."""
-    cases = [pytest.param(case, id=f'case{i}') for i, case in enumerate(json.loads(REFERENCE.read_text('utf-8')))]
-    if not MORE_REFERENCE.is_file():
-        reason = 'optional data: ../shared/reference/cases.json is absent'
-        return [*cases, pytest.param({}, id='shared', marks=pytest.mark.skip(reason=reason))]
-    return [
-        *cases,
-        *(pytest.param(case, id=f'shared{i}') for i, case in enumerate(json.loads(MORE_REFERENCE.read_text('utf-8')))),
-    ]
+    files = {name: file for name, file in (('case', REFERENCE), ('shared', MORE_REFERENCE)) if file.is_file()}
+    found = {name: json.loads(file.read_text('utf-8')) for name, file in files.items()}
+    cases = [pytest.param(case, id=f'{name}{row}') for name, given in found.items() for row, case in enumerate(given)]
+    if 'shared' not in found:
+        absent = pytest.mark.skip(reason='optional data: ../shared/reference/cases.json is absent')
+        cases.append(pytest.param({}, id='shared', marks=absent))
+    return cases
 
 
 def bowed(start, goal, steps: int, amplitude: float) -> np.ndarray:
@@ -65,6 +65,14 @@ def make_shape(kind: str = '', **fields) -> Shape:
 
 def case_guess(case: dict) -> np.ndarray:
     return bowed(case['start'], case['goal'], case['steps'], case['guess']['amplitude'])
+
+
+def make_predictor(config: Config, goals, obstacles=None) -> foc_ros.Predictor:
+    predictor = foc_ros.Predictor(config)
+    predictor.set_goals(goals)
+    if obstacles is not None:
+        predictor.set_obstacles(obstacles)
+    return predictor
 
 
 def reach(

@@ -12,6 +12,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from prediction_samples import outcome, prediction
+from reach_helpers import make_predictor
 
 import foc_ros
 import foc_ros.api
@@ -54,10 +55,7 @@ def test_the_import_is_lazy_and_fast():
 
 
 def predictor_of_one_cup():
-    predictor = foc_ros.Predictor(FAST)
-    predictor.set_goals([(0.3, 0.0)])
-    predictor.set_obstacles([CUP])
-    return predictor
+    return make_predictor(FAST, [(0.3, 0.0)], [CUP])
 
 
 def test_a_predictor_follows_a_movement_and_forgets_it():
@@ -98,9 +96,8 @@ def test_a_sample_that_cannot_be_used_is_refused_and_changes_nothing(t, position
 
 
 def test_an_outlier_is_refused_and_the_movement_goes_on():
-    predictor, plain = foc_ros.Predictor(FAST), foc_ros.Predictor(FAST)
+    predictor, plain = (make_predictor(FAST, [(0.3, 0.0)]) for _ in range(2))
     for each in (predictor, plain):
-        each.set_goals([(0.3, 0.0)])
         each.update(0.0, (0.0, 0.0))
     with pytest.raises(foc_ros.InputError, match=r'^position: expected a position within 0\.11 m .*, got one that is 0\.115 m'):
         predictor.update(0.02, (0.069, 0.092))
@@ -163,23 +160,13 @@ def test_predictions_and_solutions_are_drawn():
     plt.close('all')
 
 
-def test_a_replay_yields_predictions_that_can_be_drawn():
-    prediction = next(foc_ros.replay('foc_ros/recordings/reaching.mcap', FAST))
-    assert isinstance(prediction, foc_ros.Prediction)
-    assert len(prediction.goals)
-
-
-ROUND_CUP = Circle((0.15, 0.01), radius=0.03, name='cup')
 TWO = [Goal((0.3, -0.1), name='bowl'), (0.3, 0.1)]
 
 
 @pytest.fixture(scope='module')
 def predicted():
     """Predict towards two goals, of which one has a name, past one obstacle that is given without a list."""
-    predictor = foc_ros.Predictor(FAST)
-    predictor.set_goals(TWO)
-    predictor.set_obstacles(ROUND_CUP)
-    return predictor.update(0.0, (0.0, 0.0))
+    return make_predictor(FAST, TWO, CUP).update(0.0, (0.0, 0.0))
 
 
 def test_goals_have_names_and_likelihoods(predicted):
@@ -230,7 +217,7 @@ def test_positions_between_the_steps_are_on_the_mean_path(predicted):
 
 def test_covariances_between_the_steps_are_those_of_the_motor_noise():
     """The noises of the controls add up: with the response R of the position, its variance is the sum of R^2 c^2 U^2."""
-    solution = foc_ros.solve((0, 0), (0.3, 0), ROUND_CUP, config=FAST)
+    solution = foc_ros.solve((0, 0), (0.3, 0), CUP, config=FAST)
     times = np.linspace(0.0, 20.0, 333)
     since = times[:, None] - np.arange(20)
     # the position after a jerk of 1 m/s^3 that lasts for one step of dt, which began `since` steps ago
@@ -276,6 +263,8 @@ def solve_with(**changed):
 
 NO_GOALS = [], [(0.3, 0.0, 0.1, 0.0)], [(0.3, float('inf'))], [(0.3, 0.0, float('nan'))], 0.3
 NO_SCENES = [
+    ({'obstacles': [(0.1, 0.0, 0.02)]}, r'obstacles\[0\]'),
+    ({'obstacles': [CUP, CUP]}, 'obstacles'),
     ({'start': [0.0, 0.0, 0.0, 0.0]}, 'start'),
     ({'start': (0.0, float('nan'))}, 'start'),
     ({'start': (0.15, 0.0)}, 'start'),
@@ -293,10 +282,6 @@ NO_SCENES = [
     [
         (lambda: foc_ros.Predictor(FAST).update(0.0, (0.0, 0.0)), 'goals'),
         *((lambda goals=goals: foc_ros.Predictor().set_goals(goals), 'goals') for goals in NO_GOALS),
-        *(
-            (lambda obstacles=obstacles: solve_with(obstacles=obstacles), 'obstacles')
-            for obstacles in ([(0.1, 0.0, 0.02)], [CUP, CUP])
-        ),
         *((lambda changed=changed: solve_with(**changed), f'^{field}: expected .*, got') for changed, field in NO_SCENES),
         (lambda: solve_with(guess=np.linspace((0.3, 0), (0, 0), 31)), r'31 points, the first within 0\.03 m of the start'),
         (lambda: solve_with(guess=np.linspace((0, 0), (0, 0.3), 31)), r'31 points, the last within 0\.03 m of the goal'),
@@ -331,9 +316,7 @@ def test_what_cannot_be_meant_is_refused_in_one_sentence(create, text):
 
 @pytest.mark.parametrize('goals', [(0.3, 0.0), np.array([0.3, 0.0]), Goal((0.3, 0.0)), [(0.3, 0.0)], iter([(0.3, 0.0)])])
 def test_one_goal_needs_no_list(goals):
-    predictor = foc_ros.Predictor(FAST)
-    predictor.set_goals(goals)
-    assert [each.name for each in predictor.update(0.0, (0.0, 0.0)).goals] == ['goal0']
+    assert [each.name for each in make_predictor(FAST, goals).update(0.0, (0.0, 0.0)).goals] == ['goal0']
 
 
 def test_both_spellings_of_the_centre_are_taken():

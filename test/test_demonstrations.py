@@ -57,8 +57,8 @@ def test_a_demonstrated_class_longer_than_the_candidates_is_solved_too():
     config = replace_values(Config(), {'homotopy.max_candidates': 2})
     without, _ = predict(config, hand(), OBSTACLES, GOAL, NO_TRACKS)
     prediction, memory = predict(config, hand(), OBSTACLES, GOAL, NO_TRACKS, Knowledge(make_library([DEMONSTRATION])))
-    labels = {one.candidate.label for one in prediction.solved_candidates}
-    assert 'goal0:+0+1+2' in labels - {one.candidate.label for one in without.candidates}
+    labels = {one.label for one in prediction.solved_candidates}
+    assert 'goal0:+0+1+2' in labels - {one.label for one in without.candidates}
     assert prediction.notes['recalled'] == 1
     assert 'goal0:+0+1+2' in {one.label for one in memory.candidates}
 
@@ -102,10 +102,7 @@ def test_a_library_file_is_read_as_it_was_written(tmp_path):
         (lambda way: way.pop('path'), r'ways\[0\]: expected exactly frame_id, passed, path and'),
         (lambda way: way['path'].pop(), r'ways\[0\].path: expected finite numbers of shape \(65, 2\), got .* of shape \(64, 2\)'),
         (lambda way: way['path'].__setitem__(3, [0, float('nan')]), r'ways\[0\].path: expected numbers in \[-10000, 10000\]'),
-        (
-            lambda way: way['path'].__setitem__(3, [0, 10**400]),
-            r'path: expected finite numbers of shape \(65, 2\), got a whole number beyond all floats',
-        ),
+        (lambda way: way['path'].__setitem__(3, [0, 10**400]), r'path: expected .*, got a whole number beyond all floats'),
         (lambda way: way['passed'][1].update(side='up'), r'passed\[1\].side: expected left or right, got .up'),
         (lambda way: way['passed'][1].update(id=7), r'passed\[1\]: expected id'),
         (lambda way: way['passed'].append(way['passed'][0]), r'passed: expected each obstacle once'),
@@ -116,10 +113,9 @@ def test_errors_in_a_library_file_name_the_field(tmp_path, break_it, words):
     save_library(tmp_path / 'good.json', [DEMONSTRATION])
     document = json.loads((tmp_path / 'good.json').read_text())
     break_it(document['ways'][0])
-    file = tmp_path / 'bad.json'
-    file.write_text(json.dumps(document))
+    (tmp_path / 'bad.json').write_text(json.dumps(document))
     with pytest.raises(FocError, match=words):
-        load_library(str(file))
+        load_library(str(tmp_path / 'bad.json'))
 
 
 CONFIG = Config().with_values({'foc.steps': 20, 'homotopy.max_detour': 100.0, 'likelihood.other_goal': 0.0})
@@ -133,8 +129,8 @@ def move(path, rest_s=0.5, moving_s=2.0):
     return np.column_stack([positions, np.gradient(positions, STEP_S, axis=0)])
 
 
-def record(path):
-    return record_demonstration('world', path, OBSTACLES, move(path))
+def record(path, obstacles=OBSTACLES):
+    return record_demonstration('world', path, obstacles, move(path))
 
 
 ABOVE = record(bow(0.03))
@@ -168,7 +164,7 @@ def test_recordings_tell_goals_apart_by_where_they_led_and_not_by_how_many_there
     """A hand moves like all recordings to one of two goals, and like none to the other."""
     goals, none = np.array([[0.3, 0.1], [0.3, -0.1]]), make_obstacles()
     share = np.linspace(0.0, 1.0, 65)[:, None]
-    there, elsewhere = (record_demonstration('world', share * goal, none, move(share * goal)) for goal in goals)
+    there, elsewhere = (record(share * goal, none) for goal in goals)
     moving = replace(HAND, mean=np.array([*there.states[20], 0.0, 0.0]), onset_ns=0)
 
     def find_odds(recordings, hand):
@@ -190,7 +186,6 @@ MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)
 
 
 def find_taken(prediction):
-    """Return the candidate on the sides of the recording."""
     return next(each for each in prediction.candidates if dict(each.candidate.sides).items() <= sides_of(ABOVE).items())
 
 
@@ -286,8 +281,7 @@ def test_a_reach_is_learned_once(bag, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)['summary']['learned'] == 1
     (demonstration,) = load_library(str(file))
     held = file.read_text()
-    path = demonstration.path
-    assert demonstration.ids and np.hypot(*(path[-1] - path[0])) > 0.1
+    assert demonstration.ids and np.hypot(*(demonstration.path[-1] - demonstration.path[0])) > 0.1
     assert run(bag, '--learn', str(file), '--json') == 0
     assert json.loads(capsys.readouterr().out)['summary']['learned'] == 0
     assert file.read_text() == held
@@ -297,12 +291,6 @@ def test_a_reach_is_learned_once(bag, tmp_path, capsys):
 def test_another_library_in_the_parameters_is_refused(bag, tmp_path, capsys):
     assert run(bag, '--learn', str(tmp_path / 'ways.json'), library=str(tmp_path / 'other.json')) == 2
     assert '--learn: expected no other class library in homotopy.library' in capsys.readouterr().err
-
-
-def test_a_reach_that_ends_before_its_goal_is_not_learned(tmp_path):
-    bag, file = write_bag(tmp_path / 'short', messages(seconds=0.4)), tmp_path / 'ways.json'
-    assert run(bag, '--learn', str(file)) == 0
-    assert load_library(str(file)) == ()
 
 
 @pytest.mark.parametrize('text', ['{"ways": [{}]}', '{', 'x' * 6_000_000])
@@ -320,10 +308,8 @@ def test_a_library_that_cannot_be_used_is_exit_2_in_one_line(bag, tmp_path, caps
 
 def test_a_full_library_stays_as_it_was(bag, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(class_library, 'MOST_WAYS', 3)
-    file = tmp_path / 'ways.json'
-    far = make_obstacles([[0.1, 1.0]], 0.01)
-    demonstrations = [record_demonstration('other', np.array([[0.0, 0.1 * k], [0.3, 0.1 * k]]), far) for k in range(3)]
-    save_library(file, demonstrations)
+    file, far = tmp_path / 'ways.json', make_obstacles([[0.1, 1.0]], 0.01)
+    save_library(file, [record_demonstration('other', np.array([[0.0, y], [0.3, y]]), far) for y in (0.0, 0.1, 0.2)])
     held = file.read_bytes()
     assert run(bag, '--learn', str(file)) == 2
     assert 'ways: expected at most 3, got 4 with the new ones' in capsys.readouterr().err

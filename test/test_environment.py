@@ -75,9 +75,8 @@ LIMIT_S = 60.0
 
 def test_an_import_is_left_at_once(tmp_path):
     (tmp_path / 'endless.py').write_text('import signal\nsignal.raise_signal(signal.SIGINT)\nwhile True: pass\n')
-    program = 'from foc_ros.cli.main import handle_interrupts\nwith handle_interrupts(): import endless'
+    command = [sys.executable, '-c', 'from foc_ros.cli.main import handle_interrupts\nwith handle_interrupts(): import endless']
     environment = os.environ | {'PYTHONPATH': f'{tmp_path}{os.pathsep}{ROOT}'}
-    command = [sys.executable, '-c', program]
     ended = subprocess.run(command, env=environment, capture_output=True, timeout=LIMIT_S, check=False)
     assert (ended.returncode, ended.stderr) == (130, b'')
 

@@ -45,9 +45,9 @@ def test_the_filter_equals_a_plain_one_with_six_states():
     times = np.cumsum(rng.uniform(0.002, 0.1, 60))
     positions = 0.003 * rng.standard_normal((60, 2))
     observe = np.hstack([np.eye(2), np.zeros((2, 4))])
-    first = run(times[:1], positions[:1])[0]
+    first, *others = run(times, positions)
     mean, covariance = first.mean, first.covariance
-    for state, dt, position in zip(run(times, positions)[1:], np.diff(np.round(times, 9)), positions[1:], strict=True):
+    for state, dt, position in zip(others, np.diff(np.round(times, 9)), positions[1:], strict=True):
         a, q = np.kron(compute_transition(dt), np.eye(2)), 25.0 * np.kron(compute_gramian(dt), np.eye(2))
         mean, covariance = a @ mean, a @ covariance @ a.T + q
         gain = covariance @ observe.T @ np.linalg.inv(observe @ covariance @ observe.T + 1e-6 * np.eye(2))
@@ -104,19 +104,17 @@ def test_noise_at_rest_begins_no_movement(rate):
 
 FITTS = DurationConfig(model='fitts', fitts_a_s=0.2, fitts_b_s=0.25, target_width=0.02)
 FIXED = replace(FITTS, model='fixed', fixed_s=1.5)
-DURATION_GOAL = np.array([0.3, 0.0])
 
 
 def hand(x, onset=None, since_s=0.0, speed=100.0):
     mean = np.array([x, 0.0, 0.6 * speed, -0.8 * speed, 0.0, 0.0])
     stamp = 5 * NANOSECONDS
-    if onset is None:
-        return HandState(stamp, mean, np.eye(6))
-    return HandState(stamp, mean, np.eye(6), onset_ns=stamp - round(since_s * 1e9), onset_position=np.array([onset, 0.0]))
+    begun = {} if onset is None else {'onset_ns': stamp - round(since_s * 1e9), 'onset_position': np.array([onset, 0.0])}
+    return HandState(stamp, mean, np.eye(6), **begun)
 
 
-def time_to_go(state, goal, config):
-    return estimate_times_to_go(state, goal[None], config)[0]
+def time_to_go(state, config):
+    return estimate_times_to_go(state, np.array([[0.3, 0.0]]), config)[0]
 
 
 def test_fitts_law_at_whole_bits():
@@ -143,7 +141,7 @@ def test_fitts_law_at_whole_bits():
     ],
 )
 def test_the_time_to_go(state, config, expected):
-    assert time_to_go(state, DURATION_GOAL, config) == pytest.approx(expected)
+    assert time_to_go(state, config) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize('share', np.linspace(0.0, 0.99, 10))
@@ -151,15 +149,15 @@ def test_a_minimum_jerk_movement_of_the_expected_duration_is_not_delayed(share):
     x = 0.3 * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
     speed = 0.3 / 1.5 * (30.0 * share**2 - 60.0 * share**3 + 30.0 * share**4)
     state = hand(x, onset=0.0, since_s=1.5 * share, speed=speed)
-    assert time_to_go(state, DURATION_GOAL, FIXED) == pytest.approx(max(1.5 * (1.0 - share), 0.3), abs=1e-8)
+    assert time_to_go(state, FIXED) == pytest.approx(max(1.5 * (1.0 - share), 0.3), abs=1e-8)
 
 
 @given(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.0, 1e4), st.floats(0.0, 1e3), st.sampled_from([FITTS, FIXED]))
 def test_the_time_to_go_stays_in_bounds_and_is_continuous_at_onset(x, onset, since_s, speed, config):
-    assert 0.3 <= time_to_go(hand(x, onset, since_s, speed), DURATION_GOAL, config) <= 10.0
-    assert time_to_go(hand(x, x, 0.0, speed), DURATION_GOAL, config) == time_to_go(hand(x, speed=speed), DURATION_GOAL, config)
-    slower = time_to_go(hand(x, onset, since_s, speed / 2.0), DURATION_GOAL, config)
-    assert slower >= time_to_go(hand(x, onset, since_s, speed), DURATION_GOAL, config)
+    expected = time_to_go(hand(x, onset, since_s, speed), config)
+    assert 0.3 <= expected <= 10.0
+    assert time_to_go(hand(x, x, 0.0, speed), config) == time_to_go(hand(x, speed=speed), config)
+    assert time_to_go(hand(x, onset, since_s, speed / 2.0), config) >= expected
 
 
 def test_the_goal_that_the_speed_fits_best_gives_the_factor_for_all_goals():
@@ -200,8 +198,8 @@ def compute_least_effort(length, speed, acceleration):
 
 def test_the_effort_is_the_least_that_leads_to_the_goal_without_acceleration():
     start = np.array([0.0, 0.0, 0.2, -0.1, 0.5, 1.0])
-    values = {'duration.arrival': 'passing', 'duration.model': 'fixed', 'duration.fixed_s': 1.0, 'foc.steps': 150}
-    config = replace_values(Config(), values | {'estimator.acceleration_time_s': 0.0})
+    values = {'duration.arrival': 'passing', 'duration.model': 'fixed', 'duration.fixed_s': 1.0}
+    config = replace_values(Config(), values | {'foc.steps': 150, 'estimator.acceleration_time_s': 0.0})
     state = HandState(0, start, 1e-8 * np.eye(6), onset_ns=0, onset_position=start[:2])
     (found,) = predict(config, state, make_obstacles(), np.array([[0.3, 0.1]]), NO_TRACKS)[0].solved_candidates
     along = [compute_least_effort(way, *start[2 + axis :: 2]) for axis, way in enumerate((0.3, 0.1))]
@@ -257,9 +255,7 @@ def test_the_onset_delay_covariance_agrees_with_samples():
     found = compute_onset_delay_covariance(plan, wait_s)
     for step in (5, 20, 40, STEPS):
         began = np.maximum(plan.times[step] - delays, 0.0)
-        away = np.stack(
-            [np.interp(began, plan.times, plan.mean[:, state]) - plan.mean[step, state] for state in range(6)], axis=1
-        )
+        away = np.column_stack([np.interp(began, plan.times, state) for state in plan.mean.T]) - plan.mean[step]
         drawn = away.T @ away / len(delays)
         scale = np.sqrt(np.outer(np.diag(drawn), np.diag(drawn)))
         assert np.abs(found[step] - drawn).max() > 0.0

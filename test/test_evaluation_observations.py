@@ -7,16 +7,9 @@ import pytest
 from bag_helpers import TYPES
 from evaluation_samples import reach, write_tables
 
+from foc_ros.analysis.evaluation import observations
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
-from foc_ros.analysis.evaluation.observations import (
-    GAP,
-    GOAL,
-    PATH_CLASS,
-    ask,
-    find_relevant_obstacles,
-    observe,
-    observe_in_order,
-)
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles, observe
 from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth
 from foc_ros.analysis.recordings import EPOCH_NS, find_recordings
 from foc_ros.core import tracks
@@ -33,6 +26,7 @@ PLAIN = replace_values(Config(), FAST | {'likelihood.planning_horizon_s': 1000.0
 AHEAD = replace_values(PLAIN, {'likelihood.beta': 3.0, 'likelihood.planning_horizon_s': 0.0, 'likelihood.lookahead_s': 0.4})
 OBSTACLES = [(0.12, 0.0, 0.02), (0.22, 0.03, 0.02)]
 GOALS = [(0.32, 0.05), (0.32, -0.05)]
+DIRECTION = np.array([1.0, 0.0])
 
 
 @pytest.fixture(autouse=True)
@@ -91,17 +85,15 @@ def test_no_goal_is_true_for_predictions_with_other_goals(data):
 @pytest.mark.parametrize('duration_s', [0.4, 1.0])
 def test_in_order_a_recording_has_its_own_hand_and_obstacles_only(tmp_path, duration_s):
     """Markers stay until they are deleted; those of another recording are not in the scene of this one."""
-    rows, scenes, times_s = [], [], np.arange(0.0, duration_s, 0.02)
-    for name in ('one_1', 'one_2'):
-        for t in times_s:
-            rows.append(f'{name},{t:.2f},0.0,{0.4 * min(t / 0.8, 1.0):.4f},0.7')
-        scenes += [f'{name},Target,0,0.45,0.7,0.05,0.05,0.1', f'{name},Near,0.05,0.2,0.7,0.05,0.05,0.1']
-    scenes.insert(2, 'one_1,Far,-0.1,0.2,0.7,0.05,0.05,0.1')
+    names, times_s = ('one_1', 'one_2'), np.arange(0.0, duration_s, 0.02)
+    rows = [f'{name},{t:.2f},0.0,{0.4 * min(t / 0.8, 1.0):.4f},0.7' for name in names for t in times_s]
+    boxes = 'one_1,Target,0,0.45', 'one_1,Near,0.05,0.2', 'one_1,Far,-0.1,0.2', 'one_2,Target,0,0.45', 'one_2,Near,0.05,0.2'
+    scenes = [f'{box},0.7,0.05,0.05,0.1' for box in boxes]
     (tmp_path / 'recordings.csv').write_text('\n'.join(['recording,t_s,x_m,y_m,z_m', *rows]))
     (tmp_path / 'scenes.csv').write_text('\n'.join(['recording,object,x_m,y_m,z_m,width_m,depth_m,height_m', *scenes]))
     found = find_recordings(tmp_path)
     config = Config().with_values({'rate_hz': 2.0, 'foc.steps': 20})
-    observed, failed = observe_in_order([found['one_1'], found['one_2']], config)
+    observed, failed = observations.observe_in_order([found['one_1'], found['one_2']], config)
     assert not failed and [len(each.path.positions) for each in observed] == [len(times_s)] * 2
     before, after = ({name.partition('/')[0] for name in each.observations[0].ids} for each in observed)
     assert before == {'Near', 'Far'} and after == {'Near'}
@@ -112,9 +104,6 @@ def test_obstacles_that_overlap_along_the_direction_stand_in_one_row():
     ends = np.zeros(2), np.array([[4.0, 0.0]])
     assert find_rows(make_obstacles(centre, 0.1), DIRECTION, *ends).tolist() == [2, 0, 0, 1]
     assert find_rows(make_obstacles(), DIRECTION, *ends).shape == (0,)
-
-
-DIRECTION = np.array([1.0, 0.0])
 
 
 TRUE_GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])

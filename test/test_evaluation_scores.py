@@ -37,6 +37,7 @@ from foc_ros.core.config import LikelihoodConfig
 from foc_ros.core.solution import LEFT, RIGHT
 
 L, R = LEFT, RIGHT
+NO_OBSTACLES = {'centre': (), 'row': (), 'true_sides': ()}
 TWO_ROWS = {'centre': [(1.0, 0.2), (1.0, -0.2), (2.0, 0.0)], 'row': (0, 0, 1)}
 
 
@@ -50,24 +51,24 @@ def test_rows_of_two_and_one_have_six_classes_and_the_next_row_three_gaps():
 
 def test_the_goal_is_in_question_where_there_are_several_and_one_was_reached():
     goals = [(2.0, 0.0), (2.0, 1.0), (2.0, 2.0)]
-    observed = observation(make_candidates(np.zeros((2, 0)), goal=[2, 0]), centre=(), row=(), true_sides=(), goals=goals, goal=2)
+    observed = observation(make_candidates(np.zeros((2, 0)), goal=[2, 0]), **NO_OBSTACLES, goals=goals, goal=2)
     found = ask(GOAL, observed, frozenset())
     assert (found.possible, found.truth, found.given.tolist()) == (3, 2, [2, 0])
     assert ask(GOAL, observation(TWO_CLASSES, goals=goals, goal=None), frozenset()) is None
 
 
-def ask_class(observed):
-    return ask(PATH_CLASS, observed, frozenset('012'))
+def ask_of(observed, name=PATH_CLASS):
+    return ask(name, observed, frozenset('012'))
 
 
 def test_every_possible_answer_keeps_some_probability_and_all_sum_to_one():
     observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]))
-    forecast = Forecast.from_shares(observed.candidates.likelihood, ask_class(observed))
+    forecast = Forecast.from_shares(observed.candidates.likelihood, ask_of(observed))
     np.testing.assert_allclose(forecast.probability, (1.0 - UNCERTAINTY) * np.array([0.8, 0.2]) + UNCERTAINTY / 2.0)
-    np.testing.assert_allclose(forecast_uniform(observed, ask_class(observed), None).probability, [0.5, 0.5])
-    np.testing.assert_allclose(Forecast.from_answer((R,), 0.6, ask_class(observed)).probability, [0.2, 0.8])
+    np.testing.assert_allclose(forecast_uniform(observed, ask_of(observed), None).probability, [0.5, 0.5])
+    np.testing.assert_allclose(Forecast.from_answer((R,), 0.6, ask_of(observed)).probability, [0.2, 0.8])
     observed = observation(make_candidates([[L, R, L], [R, L, L]], likelihood=[0.3, 0.7]), **TWO_ROWS, true_sides=(R, R, R))
-    question = ask_class(observed)
+    question = ask_of(observed)
     by_shares = Forecast.from_shares(observed.candidates.likelihood, question)
     # no candidate gives the true answer
     assert by_shares.true_probability(question) == pytest.approx(UNCERTAINTY / 6.0)
@@ -84,7 +85,7 @@ def make_scores(confidence, right, recording=None, progress=None, left_s=None):
 
 def test_a_forecast_is_scored_by_likelihood_confidence_brier_and_correctness():
     observed = observation(make_candidates([[L], [R]], likelihood=[0.8, 0.2]), progress=0.5, approach=0.6)
-    question, p = ask_class(observed), (1.0 - UNCERTAINTY) * 0.8 + UNCERTAINTY / 2.0
+    question, p = ask_of(observed), (1.0 - UNCERTAINTY) * 0.8 + UNCERTAINTY / 2.0
     forecasts = Forecast.from_shares(observed.candidates.likelihood, question), forecast_uniform(observed, question, None)
     found = score_forecasts((0, observed, question, each) for each in forecasts)
     np.testing.assert_allclose(found.log_likelihood, np.log([p, 0.5]))
@@ -190,14 +191,10 @@ def test_the_region_holds_its_share_of_samples(apart):
     likelihood = np.array([0.6, 0.3, 0.1])
     mean = apart * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     covariance = np.array([np.diag([1.0, 1.0]), [[2.0, 0.9], [0.9, 0.5]], np.diag([0.1, 0.1])])
-    component = draws.choice(3, count, p=likelihood)
-    positions = mean[component] + np.einsum(
-        'nij,nj->ni', np.linalg.cholesky(covariance)[component], draws.standard_normal((count, 2))
-    )
-    many = count, 1, 1
-    found = find_denser_share(
-        likelihood, np.tile(mean[:, None], (1, count, 1)), np.tile(covariance[:, None], (1, *many)), positions
-    )
+    component, noise = draws.choice(3, count, p=likelihood), draws.standard_normal((count, 2))
+    positions = mean[component] + np.einsum('nij,nj->ni', np.linalg.cholesky(covariance)[component], noise)
+    means, covariances = (np.repeat(each[:, None], count, axis=1) for each in (mean, covariance))
+    found = find_denser_share(likelihood, means, covariances, positions)
     for level in (0.5, 0.9):
         assert np.mean(found < level) == pytest.approx(level, abs=0.03)
 
@@ -214,10 +211,6 @@ def test_a_position_in_a_less_likely_class_is_in_the_region_and_not_in_the_ellip
     assert scores['inside_all']['0.5'] == {'0.25': 0.0, '0.5': 0.0, '1': None}
 
 
-def ask_of(observed, name=PATH_CLASS):
-    return ask(name, observed, frozenset('012'))
-
-
 @pytest.mark.parametrize(
     ('velocity', 'side'), [((1.0, 0.6), L), ((1.0, -0.6), R), ((1.0, 0.1), R), ((0.0, 0.2), L), ((-0.5, 0.2), L)]
 )
@@ -226,13 +219,9 @@ def test_constant_velocity_passes_the_obstacle_on_its_line_or_on_the_side_to_whi
     assert guess_constant_velocity(observed, ask_of(observed)) == (side,)
 
 
-GOALS = [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
-
-
 def test_towards_goals_constant_velocity_takes_the_direction_and_the_nearest_is_the_nearest():
-    candidates = make_candidates(np.zeros((3, 0)), goal=[0, 1, 2])
-    none = {'centre': (), 'row': (), 'true_sides': ()}
-    observed = observation(candidates, **none, goals=GOALS, hand=(0.0, 0.0, 0.9, 1.0, 0.0, 0.0))
+    candidates, goals = make_candidates(np.zeros((3, 0)), goal=[0, 1, 2]), [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+    observed = observation(candidates, **NO_OBSTACLES, goals=goals, hand=(0.0, 0.0, 0.9, 1.0, 0.0, 0.0))
     assert guess_constant_velocity(observed, ask_of(observed, GOAL)) == (2,)
     assert guess_nearest_gap(replace(observed, hand=np.array([0.1, 0.4, 1.0, 0.0, 0.0, 0.0])), ask_of(observed, GOAL)) == (1,)
     assert guess_shortest_path(observed, ask_of(observed, GOAL)) == (0,)
@@ -244,10 +233,10 @@ def test_boltzmann_weighs_differences_and_the_power_rule_ratios_of_effort():
     np.testing.assert_allclose(power_rule_shares(observed, LikelihoodConfig(beta=2.0)), [0.9, 0.1])
 
 
-def reaching(hand=(0.0,) * 6, time_s=2.0, **more):
-    candidates = replace(make_candidates(np.zeros((2, 0)), goal=[0, 1]), time_s=np.array([time_s, time_s]))
-    none = {'centre': (), 'row': (), 'true_sides': ()}
-    return observation(candidates, **none, goals=[(1.0, 0.0), (0.0, 2.0)], hand=hand, **more)
+def reaching(hand=(0.0,) * 6):
+    """Return an observation of a hand that needs 2 s to each of two goals."""
+    candidates = replace(make_candidates(np.zeros((2, 0)), goal=[0, 1]), time_s=np.array([2.0, 2.0]))
+    return observation(candidates, **NO_OBSTACLES, goals=[(1.0, 0.0), (0.0, 2.0)], hand=hand)
 
 
 def test_straight_minimum_jerk_from_rest_has_the_known_effort_and_path():

@@ -44,6 +44,8 @@ def parts(registries):
     foc_ros.register_strategy('margin', strategy)
     foc_ros.register_likelihood_rule('linear', lambda costs, config: -config.beta * costs)
     foc_ros.register_qp_backend('outside', lambda qp: QP_BACKENDS.get('quadprog')(qp))
+    yield
+    make_plant_model.cache_clear()
 
 
 def test_a_strategy_is_solved_by_its_name():
@@ -113,16 +115,6 @@ MOVING = HandState(0, np.array([0.0, 0.0, 0.1, -0.05, 1.0, 0.0]), 1e-6 * np.eye(
 GOAL = np.array([[0.3, 0.0]])
 
 
-@pytest.fixture
-def register():
-    def add(name, factory):
-        foc_ros.register_plant(name, factory)
-        return Config().with_values({'foc.plant': name})
-
-    yield add
-    make_plant_model.cache_clear()
-
-
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal'])
 def test_a_damped_mass_avoids_obstacles_as_surely_as_wanted(strategy):
     candidates = foc_ros.solve_classes((0, 0), (0.3, 0), [CUP], strategy=strategy, config=MASS_CONFIG)
@@ -131,29 +123,28 @@ def test_a_damped_mass_avoids_obstacles_as_surely_as_wanted(strategy):
         assert each.status is foc_ros.Status.SOLVED
         assert each.eta >= 0.9 - 1e-5
         assert foc_ros.monte_carlo(each.solution, 2000).step[2] >= 0.9
-        offset = each.mean[1:, :2] - np.array([0.15, 0.01])
+        offset = each.mean[1:, :2] - CUP.centre
         distance = np.hypot(*offset.T)
-        normal = offset / distance[:, None]
-        variance = np.einsum('ti,tij,tj->t', normal, each.covariance[1:, :2, :2], normal)
+        variance = np.einsum('ti,tij,tj->t', offset, each.covariance[1:, :2, :2], offset) / distance**2
         expected = 0.03**2 + 0.003**2 - distance**2
         total = 4 * 0.03**2 * 0.003**2 + 2 * 0.003**4 + 4 * distance**2 * variance
         assert (expected + k_of_eta(0.9) * np.sqrt(total)).max() <= 1e-6
 
 
-def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(register):
-    config = register('outside', lambda settings: PlantModel(discretise_triple_integrator))
+def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does():
+    foc_ros.register_plant('outside', lambda settings: PlantModel(discretise_triple_integrator))
+    config = Config().with_values({'foc.plant': 'outside'})
     values = {'foc.steps': STEPS, 'foc.endpoint_stddev': 0.005, 'duration.spread': 0.2, 'duration.wait_s': 0.1}
     scene = make_obstacles([[0.15, 0.01]], 0.03), GOAL
     ours, theirs = (predict(each.with_values(values), MOVING, *scene, NO_TRACKS)[0] for each in (Config(), config))
     assert [each.label for each in ours.candidates] == [each.label for each in theirs.candidates]
     for one, other in zip(ours.candidates, theirs.candidates, strict=True):
         assert_allclose(other.mean, one.mean, atol=1e-6 * np.abs(one.mean).max())
-        assert_allclose(
-            other.covariance[:, :2, :2], one.covariance[:, :2, :2], atol=0.03 * np.abs(one.covariance[:, :2, :2]).max()
-        )
+        exact = one.covariance[:, :2, :2]
+        assert_allclose(other.covariance[:, :2, :2], exact, atol=0.03 * np.abs(exact).max())
         assert other.likelihood == pytest.approx(one.likelihood, rel=1e-6)
-    noise = make_plant_model(config.foc).compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
-    exact = TRIPLE_INTEGRATOR.compute_process_covariance(0.02, STEPS, False)[:, 0, 0]
+    models = make_plant_model(config.foc), TRIPLE_INTEGRATOR
+    noise, exact = (model.compute_process_covariance(0.02, STEPS, False)[:, 0, 0] for model in models)
     assert_allclose(noise, exact, atol=0.02 * exact.max())
 
 
@@ -166,13 +157,16 @@ def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does(re
         (np.eye(4), np.ones((4, 2)), 0.0),
     ],
 )
-def test_what_is_no_plant_or_plant_model_is_refused(register, A, B, dt):
+def test_what_is_no_plant_is_refused(A, B, dt):
     with pytest.raises(InputError, match='plant'):
         Plant(A, B, dt)
-    config = register('wrong', lambda settings: discretise_triple_integrator(0.02))
-    with pytest.raises(foc_ros.InputError, match='plant wrong: expected a factory that returns a PlantModel'):
-        build_problem(config, MOVING, make_obstacles(), GOAL[0], 1.0)
-    with pytest.raises(foc_ros.InputError, match='4 to 6 states'):
+
+
+def test_what_is_no_plant_model_is_refused():
+    foc_ros.register_plant('wrong', lambda settings: discretise_triple_integrator(0.02))
+    with pytest.raises(InputError, match='plant wrong: expected a factory that returns a PlantModel'):
+        build_problem(Config().with_values({'foc.plant': 'wrong'}), MOVING, make_obstacles(), GOAL[0], 1.0)
+    with pytest.raises(InputError, match='4 to 6 states'):
         PlantModel(lambda dt: Plant(np.eye(8), np.ones((8, 2)), dt))
     with pytest.raises(foc_ros.ParameterError, match=r'foc\.plant: expected one of triple_integrator, damped_mass'):
         Config().with_values({'foc.plant': 'unicycle'})
@@ -184,20 +178,13 @@ def zero_order_hold(a, b, dt):
     return block[:n, :n], block[:n, n:]
 
 
-def test_triple_integrator_is_the_exact_discretisation():
-    chain = np.kron(np.diag([1.0, 1.0], k=1), np.eye(2))
-    A, B = zero_order_hold(chain, np.kron([[0.0], [0.0], [1.0]], np.eye(2)), 0.02)
-    plant = discretise_triple_integrator(0.02)
-    np.testing.assert_allclose(plant.A, A, atol=1e-15)
-    np.testing.assert_allclose(plant.B, B, atol=1e-15)
-
-
-@pytest.mark.parametrize('damping', [0.0, 1e-6, 0.3, 5.0, 80.0])
-def test_damped_mass_is_the_exact_discretisation(damping):
-    mass, dt = 1.7, 0.03
-    A, B = zero_order_hold(
-        np.kron([[0.0, 1.0], [0.0, -damping / mass]], np.eye(2)), np.kron([[0.0], [1.0 / mass]], np.eye(2)), dt
-    )
-    plant = discretise_damped_mass(dt, mass, damping)
-    np.testing.assert_allclose(plant.A, A, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(plant.B, B, rtol=1e-9, atol=1e-12)
+@pytest.mark.parametrize('damping', [None, 0.0, 1e-6, 0.3, 5.0, 80.0])
+def test_plants_are_exact_discretisations(damping):
+    if damping is None:
+        plant, motion, effect = discretise_triple_integrator(0.03), np.diag([1.0, 1.0], k=1), [[0.0], [0.0], [1.0]]
+    else:
+        plant = discretise_damped_mass(0.03, 1.7, damping)
+        motion, effect = np.array([[0.0, 1.0], [0.0, -damping / 1.7]]), [[0.0], [1.0 / 1.7]]
+    A, B = zero_order_hold(np.kron(motion, np.eye(2)), np.kron(effect, np.eye(2)), 0.03)
+    assert_allclose(plant.A, A, rtol=1e-9, atol=1e-12)
+    assert_allclose(plant.B, B, rtol=1e-9, atol=1e-12)

@@ -20,7 +20,6 @@ from foc_ros.core.obstacles.geometry import (
     trace_obstacle,
 )
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles, make_box_polygon, make_hull_polygon
-from foc_ros.ros.messages.plane import lift, project
 
 SEEDS = st.integers(0, 10_000)
 MANY = settings(max_examples=100, deadline=None, derandomize=True)
@@ -164,13 +163,3 @@ def test_the_limits_are_those_of_the_outline(points, radius):
     outline = trace_obstacle(obstacles, 0, 0.01, points=2000)
     np.testing.assert_allclose([low[0], high[0]], [outline.min(axis=0), outline.max(axis=0)], atol=1e-6)
     np.testing.assert_array_equal([low[1], high[1]], [[1.0, 1.0], [3.0, 3.0]])
-
-
-@pytest.mark.parametrize(
-    ('plane', 'position', 'height'), [('xy', (1.0, 2.0), 3.0), ('xz', (1.0, 3.0), 2.0), ('yz', (2.0, 3.0), 1.0)]
-)
-def test_axes_of_each_plane(plane, position, height):
-    projected, above = project((1.0, 2.0, 3.0), plane)
-    assert tuple(projected) == position
-    assert above == height
-    assert tuple(lift(projected, above, plane)) == (1.0, 2.0, 3.0)

@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from reach_helpers import make_predictor
 
 import foc_ros
 from foc_ros.core.config import Config
@@ -17,12 +18,6 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import NANOSECONDS, HandSample, HandState
-from foc_ros.io.bags import TYPESTORE
-from foc_ros.io.json_output import encode_prediction
-from foc_ros.reporting.views import read_snapshot
-from foc_ros.ros.messages.encode_markers import encode_markers
-from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
-from foc_ros.ros.messages.types import RosbagsTypes
 
 BOX = np.array([[-0.03, -0.03], [0.03, -0.03], [0.03, 0.03], [-0.03, 0.03]])
 PLACES = np.array([[0.2, 0.0], [0.4, 0.01]])
@@ -34,8 +29,9 @@ def predict_in(obstacles, goals, **values):
     return predict(Config().with_values(values), HAND, obstacles, goals, NO_TRACKS)[0]
 
 
-def measure(candidate, obstacle):
-    return measure_clearance(candidate.solution.path, obstacle, candidate.solution.dt)
+def shares_of_goals(prediction):
+    goals, shares = zip(*((each.candidate.goal, each.likelihood) for each in prediction.candidates), strict=True)
+    return np.bincount(goals, shares)
 
 
 @pytest.mark.parametrize('hand_radius', [0.0, 0.01])
@@ -43,10 +39,10 @@ def test_the_object_of_a_goal_blocks_all_goals_but_its_own(hand_radius):
     prediction = predict_in(CUPS, PLACES, **{'scene.hand_radius': hand_radius})
     assert {each.candidate.goal for each in prediction.solved_candidates} == {0, 1}
     for each in prediction.solved_candidates:
-        np.testing.assert_allclose(each.solution.path[-1], PLACES[each.candidate.goal], atol=1e-6)
-        others = CUPS.take([1 - each.candidate.goal])
-        assert measure(each, others) > hand_radius
-        assert measure(each, CUPS.take([each.candidate.goal])) < 0.0
+        goal, solution = each.candidate.goal, each.solution
+        np.testing.assert_allclose(solution.path[-1], PLACES[goal], atol=1e-6)
+        own, other = (measure_clearance(solution.path, CUPS.take([row]), solution.dt) for row in (goal, 1 - goal))
+        assert own < 0.0 and other > hand_radius
     to_back = [each for each in prediction.solved_candidates if each.candidate.goal == 1]
     assert {each.candidate.sides[0][0] for each in to_back} == {'front'}
 
@@ -92,10 +88,7 @@ def test_paths_to_a_goal_behind_obstacles_are_solved_beside_a_free_goal():
     obstacles = [foc_ros.Box((0.01, 0.15), (0.3, 0.02), name='wall'), foc_ros.Circle((-0.05, 0.22), 0.03, 0.003, name='cup')]
 
     def solve_paths_to_last(goals):
-        predictor = foc_ros.Predictor(Config(budget_s=0.0))
-        predictor.set_goals(goals)
-        predictor.set_obstacles(obstacles)
-        prediction = predictor.update(0.0, (0.0, 0.0))
+        prediction = make_predictor(Config(budget_s=0.0), goals, obstacles).update(0.0, (0.0, 0.0))
         found = [each for each in prediction.solved_candidates if each.candidate.goal == len(goals) - 1]
         return {each.candidate.sides: pytest.approx(each.effort, rel=1e-5) for each in found}, prediction.goals[-1].likelihood
 
@@ -105,11 +98,9 @@ def test_paths_to_a_goal_behind_obstacles_are_solved_beside_a_free_goal():
 
 
 def test_the_predictor_takes_the_object_of_a_goal():
-    predictor = foc_ros.Predictor(Config().with_values({'budget_s': 0.0}))
-    predictor.set_obstacles([foc_ros.Circle((0.2, 0.0), 0.03, name='cup')])
     for given, label in ((None, 'goal0:+cup'), ('cup', 'goal0:')):
-        predictor.set_goals([foc_ros.Goal((0.25, 0.001), object=given)])
-        assert label in [each.label for each in predictor.update(0.0 if given is None else 10.0, (0.0, 0.0)).candidates]
+        goal, cup = foc_ros.Goal((0.25, 0.001), object=given), foc_ros.Circle((0.2, 0.0), 0.03, name='cup')
+        assert label in [each.label for each in make_predictor(Config(budget_s=0.0), goal, cup).update(0.0, (0.0, 0.0))]
 
 
 def test_likelihoods_do_not_depend_on_the_side_on_which_a_path_ends_in_its_goal():
@@ -119,11 +110,10 @@ def test_likelihoods_do_not_depend_on_the_side_on_which_a_path_ends_in_its_goal(
     for y in (-1e-5, -1e-6, 0.0, 1e-6, 1e-5):
         hand = HandState(0, np.array([0.0, y, 0.0, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6))
         prediction = predict(Config(), hand, cups, goals, NO_TRACKS)[0]
-        found.append(sum(each.likelihood for each in prediction.candidates if each.candidate.goal == 1))
+        found.append(shares_of_goals(prediction)[1])
     np.testing.assert_allclose(found, found[0], atol=1e-3)
 
 
-TYPES = RosbagsTypes(TYPESTORE)
 LEFT_GOAL, RIGHT_GOAL, MIDDLE = (0.3, 0.25), (0.3, -0.25), (0.32, 0.0)
 
 
@@ -193,22 +183,6 @@ def test_guidance_yields_to_another_goal():
     assert sizes[0] > 2.0 * sizes[1] > 0.0 and sizes[2] == 0.0
 
 
-def test_the_share_is_published_and_read_back():
-    prediction = reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL])[-1]
-    table, cloud = encode_likelihoods(prediction, TYPES), encode_prediction_cloud(prediction, 'xy', TYPES)
-    assert table.layout.dim[0].label.endswith(';other')
-    assert np.asarray(table.data).reshape(-1, 4)[:, 0].sum() == pytest.approx(1.0)
-    read = read_snapshot(cloud, table, 'xy', prediction.obstacles, prediction.goal_positions)
-    assert read.other == prediction.other == encode_prediction(prediction)['other']
-    texts = [each.text for each in encode_markers(prediction, 'xy', TYPES).markers]
-    assert any(text.endswith(f'{100 * prediction.other:.0f} % another goal') for text in texts)
-
-
-def shares_of_goals(prediction):
-    goals, shares = zip(*((each.candidate.goal, each.likelihood) for each in prediction.candidates), strict=True)
-    return np.bincount(goals, shares)
-
-
 def test_a_fast_hand_that_slows_down_goes_to_the_near_goal():
     """A farther goal has more time, so that by the efforts alone it would be the likelier one."""
     near, far = (0.2, 0.02), (0.6, 0.06)
@@ -253,22 +227,26 @@ class Session:
         start = self.place
         for s in np.clip(np.linspace(0.0, 1.6, 96), 0.0, 1.0):
             self.place = start + (np.array(target) - start) * (10 * s**3 - 15 * s**4 + 6 * s**5)
-            self.pipeline.add_hand_sample(HandSample(round(self.tick * NANOSECONDS / 100), self.place, 0.0, 'world'))
-            self.tick += 1
+            self.sample()
 
-    def return_home(self):
-        """Let the hand appear at home again, as with a clutch: the way back is no reach."""
-        self.pipeline.set_engaged(False)
-        self.place, self.tick = np.array(HOME), self.tick + 2000
-        self.pipeline.set_engaged(True)
-        self.move(HOME)
-
-    def share(self, goal):
+    def sample(self):
         self.pipeline.add_hand_sample(HandSample(round(self.tick * NANOSECONDS / 100), self.place, 0.0, 'world'))
         self.tick += 1
+
+    def reach(self, target, times=1):
+        """Move to a target and appear at home again, as with a clutch: the way back is no reach."""
+        for _ in range(times):
+            self.move(target)
+            self.pipeline.set_engaged(False)
+            self.place, self.tick = np.array(HOME), self.tick + 2000
+            self.pipeline.set_engaged(True)
+            self.move(HOME)
+
+    def share(self, goal):
+        self.sample()
         prediction = self.pipeline.predict()
         assert prediction is not None
-        return sum(each.likelihood for each in prediction.candidates if each.candidate.goal == goal)
+        return shares_of_goals(prediction)[goal]
 
 
 def odds(share):
@@ -279,9 +257,7 @@ def odds(share):
 def test_a_goal_that_was_reached_more_often_than_expected_gets_likelier(past_goals):
     session = Session([NEAR, FAR], **{'likelihood.past_goals': past_goals})
     before = session.share(1)
-    for _ in range(3):
-        session.move(FAR)
-        session.return_home()
+    session.reach(FAR, times=3)
     weights = [(1 + past_goals * reached) / (1 + past_goals * 3 * share) for reached, share in ((0, 1 - EXPECTED), (3, EXPECTED))]
     # the movement has an onset, a little later than it begins
     assert odds(session.share(1)) / odds(before) == pytest.approx(weights[1] / weights[0], rel=0.1)
@@ -290,9 +266,7 @@ def test_a_goal_that_was_reached_more_often_than_expected_gets_likelier(past_goa
 def test_habits_follow_the_object_and_not_its_place():
     session = Session([NEAR, FAR], ('cup', 'jug'))
     before = session.share(0), session.share(1)
-    for _ in range(3):
-        session.move(FAR)
-        session.return_home()
+    session.reach(FAR, times=3)
     session.announce([FAR, NEAR], ('cup', 'jug'))
     assert session.share(1) > before[0] > before[1]  # the jug, which is now where the cup was
     session.announce([FAR, NEAR])
@@ -302,8 +276,7 @@ def test_habits_follow_the_object_and_not_its_place():
 def test_a_goal_elsewhere_is_another_one():
     session = Session([NEAR, FAR])
     before = session.share(1)
-    session.move(FAR)
-    session.return_home()
+    session.reach(FAR)
     assert session.share(1) > 1.2 * before
     session.announce([NEAR, (FAR[0] + 0.01, FAR[1])])
     known = session.share(1)
@@ -315,23 +288,19 @@ def test_a_goal_elsewhere_is_another_one():
 def test_a_movement_that_ends_far_from_all_goals_says_nothing_and_a_reset_forgets():
     session = Session([NEAR, FAR])
     before = session.share(1)
-    session.move((0.1, -0.06))
-    session.return_home()
+    session.reach((0.1, -0.06))
     assert session.share(1) == pytest.approx(before)
-    session.move(FAR)
-    session.return_home()
+    session.reach(FAR)
     assert session.share(1) > 1.2 * before
     session.pipeline.reset()
-    session.return_home()
+    session.reach(HOME)
     assert session.share(1) == pytest.approx(before)
 
 
 def test_reaches_are_expected_to_end_where_the_earlier_ones_did():
     goals = [NEAR, (NEAR[0], NEAR[1] - 0.05)]
     session = Session(goals, **{'likelihood.past_goals': 1e-6})
-    for _ in range(6):
-        session.move((NEAR[0], NEAR[1] - 0.02))
-        session.return_home()
+    session.reach((NEAR[0], NEAR[1] - 0.02), times=6)
     habits = session.pipeline.learnt.habits
     np.testing.assert_allclose(habits.find_ends(np.zeros((1, 2))), [[0.0, -0.02 * 6 / 9]], atol=1e-3)
     ends = np.hypot(*habits.find_ends(np.array(goals)).T)

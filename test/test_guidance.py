@@ -17,30 +17,29 @@ from foc_ros.core.obstacle_table import make_obstacles
 
 ROUND = make_obstacles([(0.1, 0.0)], [0.03])
 SETTINGS = GuidanceConfig(k_max=100.0, clearance=0.0)
-PERIOD = 0.005
-"""Of the updates [s]."""
 SURE = (1.0 - DOUBT) / (1.0 + DOUBT)
 """Share of the force of a certain candidate at rest."""
 
 
 def prediction(*outcomes, **changes):
     """Return a prediction of these outcomes, without obstacles if none are given."""
-    return prediction_samples.prediction(*outcomes, **({'obstacles': make_obstacles()} | changes))
+    return prediction_samples.prediction(*outcomes, **({'obstacles': make_obstacles(), 'stamp_ns': 0} | changes))
 
 
-def straight(label='goal0:', likelihood=1.0, start=(0.0, 0.0), end=(0.3, 0.0), **rest):
-    """Return a candidate along a straight line."""
+def straight(label='goal0:', likelihood=1.0, end=(0.3, 0.0), aside=0.0):
+    """Return a candidate along a straight line from the origin, or one that bends aside from it."""
     base = outcome(label, likelihood)
     mean = base.mean.copy()
-    mean[:, :2] = np.linspace(start, end, len(mean))
-    return replace(base, solution=replace(base.solution, mean=mean, covariance=np.zeros((len(mean), 6, 6)), **rest))
+    mean[:, :2] = np.linspace((0.0, 0.0), end, len(mean))
+    mean[:, 1] += aside * np.array([0.0, 0.0, 0.3, 0.6, 1.0])
+    return replace(base, solution=replace(base.solution, mean=mean, covariance=np.zeros((len(mean), 6, 6))))
 
 
-def guide_hand(config, newest, position, velocity, seconds=0.15):
-    """Return the output after a time in which the hand does not move, whatever velocity it reports."""
-    state = GuidanceState()
-    for tick in range(round(seconds / PERIOD)):
-        given_now = GuidanceInput(tick * PERIOD, np.array(position), np.array(velocity), newest)
+def guide_hand(newest, position, velocity, settings=SETTINGS):
+    """Return the output after 0.15 s in which the hand does not move, whatever velocity it reports."""
+    config, state = Config(guidance=settings), GuidanceState()
+    for tick in range(30):
+        given_now = GuidanceInput(0.005 * tick, np.array(position), np.array(velocity), newest)
         output, state = guide(config, state, given_now)
     return output
 
@@ -52,20 +51,22 @@ def test_the_stiffness_is_linear_in_the_precision_between_its_bounds(stddev, sha
     assert stiffness[0] == pytest.approx(share * 100.0 * np.eye(2), abs=1e-3)
 
 
-def test_a_force_is_the_mean_of_those_that_help_times_its_expected_benefit():
-    none = np.zeros(2, dtype=bool)
-    force, agreement = combine(np.array([0.6, 0.4]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
-    assert (force[0], agreement) == (pytest.approx(1.4), pytest.approx(1.0))
-    force, agreement = combine(np.array([0.6, 0.2]), np.array([[1.0, 0.0], [2.0, 0.0]]), none)
-    assert (force[0], agreement) == (pytest.approx(0.6 * 1.25), pytest.approx(0.6)), 'nobody knows for 0.2'
-    for opposing in (0.5, 0.4):
-        force, _ = combine(np.array([0.5, opposing]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
-        assert force.tolist() == [0.0, 0.0], 'it helps with a probability of one half at most'
-    force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]), none)
-    assert (force[1], agreement) == (pytest.approx(0.5 / 0.75 * 0.5), pytest.approx(0.5))
-    force, agreement = combine(np.array([0.75, 0.25]), np.array([[0.0, 1.0], [0.0, -1.0]]), np.array([False, True]))
-    assert (force[1], agreement) == (pytest.approx(0.5), pytest.approx(0.5))
-    assert combine(np.array([0.75, 0.25]), np.zeros((2, 2)), none)[1] == 1.0, 'none pulls'
+@pytest.mark.parametrize(
+    ('weights', 'forces', 'is_crossing', 'force', 'expected'),
+    [
+        pytest.param([0.6, 0.4], [1.0, 2.0], False, 1.4, 1.0, id='both help'),
+        pytest.param([0.6, 0.2], [1.0, 2.0], False, 0.6 * 1.25, 0.6, id='nobody knows for 0.2'),
+        pytest.param([0.5, 0.5], [1.0, -1.0], False, 0.0, None, id='it helps with one half'),
+        pytest.param([0.5, 0.4], [1.0, -1.0], False, 0.0, None, id='it helps with one half at most'),
+        pytest.param([0.75, 0.25], [1.0, -1.0], False, 0.5 / 0.75 * 0.5, 0.5, id='one is against it'),
+        pytest.param([0.75, 0.25], [1.0, -1.0], True, 0.5, 0.5, id='the other leads across an obstacle'),
+        pytest.param([0.75, 0.25], [0.0, 0.0], False, 0.0, 1.0, id='none pulls'),
+    ],
+)
+def test_a_force_is_the_mean_of_those_that_help_times_its_expected_benefit(weights, forces, is_crossing, force, expected):
+    found, agreement = combine(np.array(weights), np.array([[0.0, each] for each in forces]), np.array([False, is_crossing]))
+    assert found == pytest.approx([0.0, force])
+    assert expected is None or agreement == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(('across', 'odds'), [(0.0, 3.0), (EVIDENCE, 3.0 * np.e**2), (-EVIDENCE, 3.0 / np.e**2)])
@@ -88,50 +89,44 @@ def test_a_force_yields_to_a_hand_that_accelerates_against_it():
 
 
 def test_a_hand_beside_its_only_path_is_drawn_to_it():
-    output = guide_hand(Config(guidance=SETTINGS), prediction(straight(), stamp_ns=0), (0.1, 0.01), (0.0, 0.0))
+    output = guide_hand(prediction(straight()), (0.1, 0.01), (0.0, 0.0))
     assert output.force == pytest.approx([0.0, -SURE], abs=1e-6)
     assert output.reference == pytest.approx([0.1, 0.0], abs=1e-6)
     assert output.agreement == pytest.approx(SURE)
 
 
 def test_the_mode_trajectory_keeps_the_force_along_the_path():
-    newest = prediction(straight(), stamp_ns=0)
-    config = {mode: Config(guidance=replace(SETTINGS, mode=mode, lookahead_s=0.1)) for mode in ('path', 'trajectory')}
-    forces = {mode: guide_hand(each, newest, (-0.01, 0.01), (0.001, 0.0)).force for mode, each in config.items()}
-    assert forces['path'] == pytest.approx([0.0, -SURE], abs=1e-6)
-    assert forces['trajectory'][0] > 0.9 * SURE
+    newest = prediction(straight())
+    path, trajectory = (
+        guide_hand(newest, (-0.01, 0.01), (0.001, 0.0), replace(SETTINGS, mode=mode, lookahead_s=0.1)).force
+        for mode in ('path', 'trajectory')
+    )
+    assert path == pytest.approx([0.0, -SURE], abs=1e-6)
+    assert trajectory[0] > 0.9 * SURE
 
 
 def test_in_mode_path_the_force_neither_drives_nor_brakes_a_moving_hand():
     velocity = np.array([0.3, 0.2])
-    output = guide_hand(Config(guidance=SETTINGS), prediction(straight(), stamp_ns=0), (0.1, 0.01), velocity)
+    output = guide_hand(prediction(straight()), (0.1, 0.01), velocity)
     assert np.hypot(*output.force) > 1.0
     assert abs(output.force @ velocity) < 0.05 * np.hypot(*output.force) * np.hypot(*velocity)
 
 
-def bent(label, likelihood, aside):
-    """Return a candidate that begins along the first axis and bends aside."""
-    base = straight(label, likelihood)
-    mean = base.mean.copy()
-    mean[:, 1] = aside * np.array([0.0, 0.0, 0.3, 0.6, 1.0])
-    return replace(base, solution=replace(base.solution, mean=mean))
-
-
 def test_a_hand_at_a_fork_is_left_alone():
-    fork = prediction(bent('goal0:+1', 0.5, 0.1), bent('goal0:-1', 0.5, -0.1), stamp_ns=0)
-    output = guide_hand(Config(guidance=SETTINGS), fork, (0.0, 0.0), (0.6, 0.0))
+    fork = prediction(straight('goal0:+1', 0.5, aside=0.1), straight('goal0:-1', 0.5, aside=-0.1))
+    output = guide_hand(fork, (0.0, 0.0), (0.6, 0.0))
     assert output.force == pytest.approx([0.0, 0.0], abs=1e-6)
     assert output.agreement == pytest.approx(0.0, abs=1e-6)
-    decided = prediction(bent('goal0:+1', 0.9, 0.1), bent('goal0:-1', 0.1, -0.1), stamp_ns=0)
-    assert guide_hand(Config(guidance=SETTINGS), decided, (0.0, 0.0), (0.6, 0.0)).force[1] > 0.5
+    decided = prediction(straight('goal0:+1', 0.9, aside=0.1), straight('goal0:-1', 0.1, aside=-0.1))
+    assert guide_hand(decided, (0.0, 0.0), (0.6, 0.0)).force[1] > 0.5
 
 
 def test_the_look_ahead_damps_movement_across_the_path():
-    newest, velocity = prediction(straight(), stamp_ns=0), (0.0, 0.05)
+    newest, velocity = prediction(straight()), (0.0, 0.05)
     settings = replace(SETTINGS, mode='trajectory', lookahead_s=0.1)
-    output = guide_hand(Config(guidance=settings), newest, (0.0, 0.0), velocity)
+    output = guide_hand(newest, (0.0, 0.0), velocity, settings)
     assert output.force[1] == pytest.approx(-0.1 * SURE * 100.0 * 0.05, abs=1e-6)
-    none = guide_hand(Config(guidance=replace(settings, lookahead_s=0.0)), newest, (0.0, 0.0), velocity)
+    none = guide_hand(newest, (0.0, 0.0), velocity, replace(settings, lookahead_s=0.0))
     assert none.force == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
@@ -140,23 +135,23 @@ def test_no_force_leads_across_an_obstacle_to_the_other_side():
     assert find_crossing(need, np.array([[0.0, 0.01], [0.0, -0.01], [0.01, 0.0]])).tolist() == [False, True, False]
     settings = replace(SETTINGS, clearance=0.02)
     position, velocity = (0.01, 0.01), (0.5, 0.0)
-    same = prediction(bent('goal0:+0', 1.0, 0.2), stamp_ns=0, obstacles=ROUND)
-    other = prediction(bent('goal0:-0', 1.0, -0.2), stamp_ns=0, obstacles=ROUND)
-    assert guide_hand(Config(guidance=settings), same, position, velocity).force[1] > 0.5
-    assert guide_hand(Config(guidance=settings), other, position, velocity).force.tolist() == [0.0, 0.0]
+    same = prediction(straight('goal0:+0', 1.0, aside=0.2), obstacles=ROUND)
+    other = prediction(straight('goal0:-0', 1.0, aside=-0.2), obstacles=ROUND)
+    assert guide_hand(same, position, velocity, settings).force[1] > 0.5
+    assert guide_hand(other, position, velocity, settings).force.tolist() == [0.0, 0.0]
 
 
 def test_a_hand_far_from_obstacles_is_left_alone_and_one_that_comes_too_near_is_turned_away():
-    newest = prediction(bent('goal0:+0', 1.0, 0.2), stamp_ns=0, obstacles=ROUND)
+    newest = prediction(straight('goal0:+0', 1.0, aside=0.2), obstacles=ROUND)
     settings = replace(SETTINGS, clearance=0.02)
-    far = guide_hand(Config(guidance=settings), newest, (0.0, 0.06), (0.3, 0.0))
-    near = guide_hand(Config(guidance=settings), newest, (0.01, 0.03), (0.5, 0.0))
+    far = guide_hand(newest, (0.0, 0.06), (0.3, 0.0), settings)
+    near = guide_hand(newest, (0.01, 0.03), (0.5, 0.0), settings)
     assert far.force.tolist() == [0.0, 0.0]
     assert near.force[1] > 0.5
 
 
 def test_a_blended_command_is_never_faster_and_equals_the_command_without_authority():
-    output = guide_hand(Config(), prediction(straight(), stamp_ns=0), (0.0, 0.0), (0.0, 0.0))
+    output = guide_hand(prediction(straight()), (0.0, 0.0), (0.0, 0.0), GuidanceConfig())
     command = np.array([0.0, 0.1])
     blended = output.blend_command(command)
     assert output.authority == pytest.approx(0.5)
@@ -175,19 +170,18 @@ def test_mirrored_input_gives_mirrored_guidance():
     for sign in (1.0, -1.0):
         end = np.array([0.3, sign * 0.1])
         newest = prediction(
-            straight('goal0:', 0.8, (0.0, 0.0), end),
-            straight('goal1:', 0.2, (0.0, 0.0), (0.3, 0.0)),
-            stamp_ns=0,
+            straight('goal0:', 0.8, end),
+            straight('goal1:', 0.2),
             obstacles=make_obstacles([(0.05, -sign * 0.03)], [0.02]),
         )
-        forces.append(guide_hand(Config(), newest, (0.02, -sign * 0.005), (0.2, -sign * 0.05)).force)
+        forces.append(guide_hand(newest, (0.02, -sign * 0.005), (0.2, -sign * 0.05), GuidanceConfig()).force)
     assert forces[0] == pytest.approx(forces[1] * mirror, abs=1e-9)
     assert np.hypot(*forces[0]) > 0.01
 
 
 def test_the_public_class_checks_its_input_and_keeps_its_state():
     config = foc_ros.Config(guidance=SETTINGS)
-    guidance, newest = foc_ros.Guidance(config), prediction(straight(), stamp_ns=0)
+    guidance, newest = foc_ros.Guidance(config), prediction(straight())
     guidance.update(0.0, (0.1, 0.03), (0.0, 0.0), newest)
     output = guidance.update(0.005, (0.1, 0.03), (0.0, 0.0), newest)
     assert output.status is foc_ros.GuidanceStatus.GUIDING and output.force[1] < 0.0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from bag_helpers import TYPES
 from prediction_samples import outcome as make_outcome
+from reach_helpers import make_predictor
 
 import foc_ros
 from foc_ros.core import candidates
@@ -18,23 +19,27 @@ from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 from foc_ros.io.json_output import encode_prediction
-from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_markers
+from foc_ros.reporting.views import read_snapshot
+from foc_ros.ros.messages.encode_markers import encode_markers
+from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 
-GOAL = np.array([[0.3, 0.0]])
+GOALS = np.array([[0.3, 0.0]])
 CONFIG = replace_values(Config(), {'foc.steps': 30})
 
 
-def predicted(obstacles, goals=GOAL, config=CONFIG):
+def total(prediction):
+    return sum(each.likelihood for each in prediction.candidates) + prediction.unknown + prediction.other
+
+
+def predicted(obstacles):
     hand = HandState(1, np.zeros(6), np.diag([1e-6, 1e-6, 1e-4, 1e-4, 1e-2, 1e-2]))
-    prediction, memory = predict(config, hand, obstacles, goals, NO_TRACKS)
+    prediction, memory = predict(CONFIG, hand, obstacles, GOALS, NO_TRACKS)
     for outcome in prediction.candidates:
-        solution = outcome.solution
-        for array in (solution.mean, solution.covariance, solution.control):
+        for array in (outcome.solution.mean, outcome.solution.covariance, outcome.solution.control):
             assert np.isfinite(array).all()
         assert outcome.has_likelihood or outcome.likelihood == 0.0
-    shares = [outcome.likelihood for outcome in prediction.candidates_with_likelihood]
-    assert sum(shares) + prediction.unknown + prediction.other == pytest.approx(1.0)
-    assert (prediction.most_likely is None) == (not shares)
+    assert total(prediction) == pytest.approx(1.0)
+    assert (prediction.most_likely is None) == (not prediction.candidates_with_likelihood)
     numbers = {each.way: each.label for each in prediction.candidates}
     assert numbers.get(memory.most_likely) == prediction.most_likely
     return prediction
@@ -51,10 +56,9 @@ def test_a_hand_inside_an_obstacle_leaves_it_or_says_why_not():
 
 
 def test_a_class_whose_search_goes_astray_for_a_moment_is_not_unlikely():
-    predictor = foc_ros.Predictor(Config().with_values({'budget_s': 0.0, 'scene.hand_radius': 0.005}))
-    predictor.set_obstacles([foc_ros.Circle((0.0214, 0.0277), 0.03), foc_ros.Box((0.15, -0.0185), (0.04, 0.06))])
-    predictor.set_goals([(0.35, 0.0)])
-    first = {each.label: each for each in predictor.update(0.0, (0.0, 0.0)).candidates}
+    config = Config().with_values({'budget_s': 0.0, 'scene.hand_radius': 0.005})
+    obstacles = foc_ros.Circle((0.0214, 0.0277), 0.03), foc_ros.Box((0.15, -0.0185), (0.04, 0.06))
+    first = {each.label: each for each in make_predictor(config, (0.35, 0.0), obstacles).update(0.0, (0.0, 0.0))}
     assert first['goal0:+0+1'].status is Status.SOLVED
     assert first['goal0:+0+1'].likelihood > 0.05
 
@@ -99,7 +103,6 @@ def test_the_hand_has_to_fit_at_the_start_and_a_goal_that_it_cannot_reach_beside
 SHARE_CONFIG = replace_values(Config(), {'foc.steps': 20, 'likelihood.other_goal': 0.0, 'homotopy.max_detour': 100.0})
 HAND = HandState(0, np.zeros(6), np.zeros((6, 6)), frame_id='world')
 ROW = make_obstacles([[0.15, 0.04], [0.15, -0.045]], 0.025, 0.001)
-GOALS = np.array([[0.3, 0.0]])
 
 
 def ask(config=SHARE_CONFIG, goals=GOALS, obstacles=ROW):
@@ -113,10 +116,6 @@ def let_fail(monkeypatch, number, status):
         return [replace(each, status=status) if row == number else each for row, each in enumerate(solve(*given))]
 
     monkeypatch.setattr(candidates, 'solve_problems', fail)
-
-
-def total(prediction):
-    return sum(each.likelihood for each in prediction.candidates) + prediction.unknown + prediction.other
 
 
 @pytest.mark.parametrize(('number', 'status'), [(0, Status.LEFT_CLASS), (1, Status.ITERATION_LIMIT), (2, Status.INFEASIBLE)])
@@ -136,7 +135,6 @@ def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(monk
 
 @pytest.mark.parametrize('horizon_s', [1000.0, 0.0])
 def test_what_is_seen_and_not_followed_is_unknown(horizon_s):
-    """The share of the classes that are not followed is about what they have where they are, by the same rule."""
     config = replace_values(SHARE_CONFIG, {'likelihood.planning_horizon_s': horizon_s})
     whole, one = ask(config), ask(replace_values(config, {'homotopy.max_candidates': 1}))
     assert whole.unknown == 0.0 and len(whole.candidates) == 4 and len(one.candidates) == 1
@@ -162,16 +160,21 @@ def test_the_cost_of_a_class_that_is_not_followed_is_the_largest_that_candidates
         assert known_cost < found.cost < 3.0 * known_cost and found.status is Status.ESTIMATED
 
 
-def test_the_unknown_share_is_published():
-    whole, one = ask(), ask(replace_values(SHARE_CONFIG, {'homotopy.max_candidates': 1}))
-    table = encode_likelihoods(one, TYPES)
-    assert table.layout.dim[0].label == f'{one.candidates[0].label};unknown'
+def test_the_shares_of_unknown_classes_and_of_another_goal_are_published_and_read_back():
+    config = replace_values(SHARE_CONFIG, {'homotopy.max_candidates': 1, 'likelihood.other_goal': 0.2})
+    whole, one = ask(), ask(config)
+    assert min(one.unknown, one.other) > 0.05
+    table, cloud = encode_likelihoods(one, TYPES), encode_prediction_cloud(one, 'xy', TYPES)
+    assert table.layout.dim[0].label == f'{one.candidates[0].label};unknown;other'
     rows = np.asarray(table.data).reshape(-1, 4)
-    assert rows[:, 0].sum() == pytest.approx(1.0) and np.isnan(rows[1, 1:]).all() and rows[1, 0] == one.unknown
-    assert 'unknown' not in encode_likelihoods(whole, TYPES).layout.dim[0].label
+    assert rows[:, 0].sum() == pytest.approx(1.0) and np.isnan(rows[1:, 1:]).all()
+    assert rows[1:, 0].tolist() == [one.unknown, one.other]
+    assert encode_likelihoods(whole, TYPES).layout.dim[0].label.split(';') == [each.label for each in whole.candidates]
+    read, encoded = read_snapshot(cloud, table, 'xy', one.obstacles, one.goal_positions), encode_prediction(one)
+    assert (read.unknown, read.other) == (encoded['unknown'], encoded['other']) == (one.unknown, one.other)
     texts = [each.text for each in encode_markers(one, 'xy', TYPES).markers]
-    assert any(text.endswith(f'{100 * one.unknown:.0f} % unknown') for text in texts)
-    assert encode_prediction(one)['unknown'] == one.unknown
+    shares = f'{100 * one.unknown:.0f} % unknown', f'{100 * one.other:.0f} % another goal'
+    assert any(all(share in text for share in shares) for text in texts)
 
 
 def test_a_class_that_the_search_misses_keeps_its_answer_for_a_moment():

@@ -13,6 +13,8 @@ from object_messages import collision_object, detection, detections
 from prediction_samples import DT as MESSAGE_DT
 from prediction_samples import STEPS as MESSAGE_STEPS
 from prediction_samples import outcome, prediction
+from reach_helpers import make_predictor
+from scipy.spatial.transform import Rotation
 
 import foc_ros
 from foc_ros.analysis.replay_output import Summary, facts
@@ -33,7 +35,7 @@ from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import ObjectTable, decode_detections
 from foc_ros.ros.messages.decode_point_cloud import decode_point_cloud
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, encode_outputs
-from foc_ros.ros.messages.plane import Transform, compute_rotation, lift
+from foc_ros.ros.messages.plane import Transform, lift
 
 CONFIG = replace_values(Config(), {'foc.steps': 50, 'budget_s': 0.0, 'foc.noise_x': 0.1, 'foc.noise_y': 0.1})
 STEPS, DT = CONFIG.foc.steps, 0.02
@@ -56,7 +58,6 @@ def boxes(*heights, x=0.2, velocity=0.0):
 
 
 def predict_over(obstacles, height, goal_height, **changes):
-    """Return the prediction of a hand at a height that goes to a goal at another one."""
     config = replace_values(CONFIG, PRECISE | {name.replace('__', '.'): value for name, value in changes.items()})
     return predict(config, hand_at(height), obstacles, GOAL, NO_TRACKS, goal_heights=np.array([goal_height]))[0]
 
@@ -151,10 +152,8 @@ def test_an_obstacle_is_cleared_on_the_way_to_every_goal_or_blocks():
 
 
 def test_a_predictor_with_heights_predicts_and_clears():
-    predictor = foc_ros.Predictor(CONFIG)
-    predictor.set_goals((0.4, 0.0, 0.25))
     low, post = foc_ros.Circle((0.2, 0.0), 0.03, heights=(0.0, 0.1), name='low'), foc_ros.Circle((0.2, 0.1), 0.03, name='post')
-    predictor.set_obstacles([low, post])
+    predictor = make_predictor(CONFIG, (0.4, 0.0, 0.25), [low, post])
     for tick in range(20):
         t = 0.01 * tick
         prediction = predictor.update(t, (t**2, 0.0, 0.3 - 0.1 * t**2))
@@ -170,6 +169,7 @@ def test_a_predictor_with_heights_predicts_and_clears():
 
 TYPES = message_types('rosbags')
 CUBE, SPHERE, CYLINDER = 1, 2, 3
+UPRIGHT = (CYLINDER, 0.3), (SPHERE, 0.3), (CYLINDER, 0.0)
 PLANES = {'xy': [0, 1, 2], 'xz': [0, 2, 1], 'yz': [2, 0, 1]}
 """For each plane, the place of x, y and z among the two axes of the plane and the height."""
 UNKNOWN = [-np.inf, np.inf]
@@ -207,13 +207,10 @@ def test_a_wrong_size_is_refused_and_one_that_is_not_finite_is_dropped():
 def test_markers_say_their_heights(plane):
     place = in_space((0.1, 0.0, 0.5), plane)
     turned = {'x': np.sin(np.pi / 8), 'w': np.cos(np.pi / 8)} if plane == 'xy' else {'w': 1.0}
-    kinds = [(CUBE, (0.2, 0.2, 0.2), turned), (CYLINDER, (0.1, 0.1, 0.3), {'w': 1.0}), (SPHERE, (0.1, 0.1, 0.3), {'w': 1.0})]
+    kinds = (CUBE, (0.2, 0.2, 0.2), turned), *((kind, (0.1, 0.1, size), {'w': 1.0}) for kind, size in UPRIGHT)
     markers = (marker(TYPES, place, size, type=kind, id=i, turned=by) for i, (kind, size, by) in enumerate(kinds))
-    message = marker_array(TYPES, *markers)
-    flat = marker(TYPES, place, (0.1, 0.1, 0.0), type=CYLINDER, id=3)
-    message.markers.append(flat)
     half = 0.1 * np.sqrt(2.0) if plane == 'xy' else 0.1
-    obstacles = ObjectTable().with_markers(message, SECOND, plane).obstacles(SECOND, 0.0)
+    obstacles = ObjectTable().with_markers(marker_array(TYPES, *markers), SECOND, plane).obstacles(SECOND, 0.0)
     assert_allclose(obstacles.heights, [[0.5 - half, 0.5 + half], [0.35, 0.65], UNKNOWN, UNKNOWN], rtol=1e-12)
     assert ObjectTable().obstacles(SECOND, 0.0).heights.shape == (0, 2)
 
@@ -231,20 +228,18 @@ def test_objects_and_detections_say_their_heights():
     assert decode_detections(detections(), 'xy', 0.0).obstacles.heights.shape == (0, 2)
 
 
-def make_transform(angle, z):
-    """Return a rotation about the x axis, and a shift along z."""
-    quaternion = pose_stamped(TYPES, (0, 0, 0)).pose.orientation
-    quaternion.x, quaternion.w = float(np.sin(angle / 2)), float(np.cos(angle / 2))
-    return Transform(compute_rotation(quaternion), np.array([0.0, 0.0, z]))
-
-
 def test_a_transform_moves_heights_and_must_not_tilt_them():
     message = cloud(TYPES, table((0.1, 0.0, 0.5, 0.02, 0.2)), frame_id='camera')
+
+    def decode_turned(angle, z):
+        """Decode it in a frame that is turned about the x axis, and shifted along z."""
+        turn = Rotation.from_rotvec([angle, 0.0, 0.0]).as_matrix()
+        return decode_point_cloud(message, 'xy', lambda _: ('world', Transform(turn, np.array([0.0, 0.0, z])))).obstacles
+
     for angle, middle in ((0.0, 1.5), (np.pi, 0.5)):
-        moved = decode_point_cloud(message, 'xy', lambda _, angle=angle: ('world', make_transform(angle, 1.0)))
-        assert_allclose(moved.obstacles.heights, [[middle - 0.1, middle + 0.1]], rtol=1e-6)
+        assert_allclose(decode_turned(angle, 1.0).heights, [[middle - 0.1, middle + 0.1]], rtol=1e-6)
     with pytest.raises(MessageError, match=r'fields\[size_z\]: expected boxes that the transform leaves in the task plane'):
-        decode_point_cloud(message, 'xy', lambda _: ('world', make_transform(0.1, 0.0)))
+        decode_turned(0.1, 0.0)
 
 
 @cache
@@ -269,18 +264,16 @@ def test_every_plane_has_the_same_heights(plane):
     assert made.cleared == expected.cleared == (True, True, False)
     for one, other in zip(made.candidates, expected.candidates, strict=True):
         assert one.height is not None and other.height is not None
+        assert_allclose(one.mean, other.mean, atol=1e-9)
         assert_allclose(one.height.mean, other.height.mean, atol=1e-12)
         assert_allclose(one.height.covariance, other.height.covariance, atol=1e-12)
     rows = np.frombuffer(encode_outputs(made, plane, TYPES, ['prediction'])['prediction'].data, CLOUD_ROW)
     normal = next(axis for axis in 'xyz' if axis not in plane)
     first = made.candidates[0].height
     assert first is not None
-    for name, column in (
-        (normal, first.mean[:, 0]),
-        (f'v{normal}', first.mean[:, 1]),
-        (2 * normal, first.covariance[:, 0, 0]),
-        (f'motor_{2 * normal}', first.motor_covariance[:, 0, 0]),
-    ):
+    names = normal, f'v{normal}', 2 * normal, f'motor_{2 * normal}'
+    columns = *first.mean[:, :2].T, first.covariance[:, 0, 0], first.motor_covariance[:, 0, 0]
+    for name, column in zip(names, columns, strict=True):
         assert_allclose(rows[name][rows['candidate'] == 0], column, rtol=1e-6, atol=1e-9)
     for axis in plane:
         assert_array_equal(rows[''.join(sorted(axis + normal))], 0.0)
@@ -288,9 +281,9 @@ def test_every_plane_has_the_same_heights(plane):
 
 def sample():
     """Return a prediction by hand, with a height that rises."""
-    covariance = np.zeros((MESSAGE_STEPS + 1, 3, 3))
-    covariance[:, 0, 0] = np.linspace(0.0, 0.03, MESSAGE_STEPS + 1) ** 2
-    mean = np.column_stack((np.linspace(0.2, 0.4, MESSAGE_STEPS + 1), np.ones(MESSAGE_STEPS + 1), np.zeros(MESSAGE_STEPS + 1)))
+    share, covariance = np.linspace(0.0, 1.0, MESSAGE_STEPS + 1), np.zeros((MESSAGE_STEPS + 1, 3, 3))
+    covariance[:, 0, 0] = (0.03 * share) ** 2
+    mean = np.column_stack((0.2 + 0.2 * share, np.ones_like(share), np.zeros_like(share)))
     return prediction(replace(outcome(), height=HeightTrajectory(mean, covariance, covariance / 9.0)))
 
 

@@ -20,22 +20,15 @@ from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT, Status
 from foc_ros.core.types import HandState
 
-ANY_COSTS = st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12)
-BETA = st.floats(0.0, 100.0)
-
-
-def with_beta(beta):
-    return LikelihoodConfig(beta=beta)
-
 
 def test_ratio_of_likelihoods_is_the_power_of_the_ratio_of_costs():
-    p = compute_likelihoods(np.array([1.0, 4.0, 9.0]), with_beta(0.5))
+    p = compute_likelihoods(np.array([1.0, 4.0, 9.0]), LikelihoodConfig(beta=0.5))
     np.testing.assert_allclose(p, np.array([6.0, 3.0, 2.0]) / 11.0, rtol=1e-14)
 
 
-@given(ANY_COSTS, BETA)
+@given(st.lists(st.floats(0.0, 1.7e308), min_size=1, max_size=12), st.floats(0.0, 100.0))
 def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs, beta):
-    p = compute_likelihoods(np.array(costs), with_beta(beta))
+    p = compute_likelihoods(np.array(costs), LikelihoodConfig(beta=beta))
     assert np.all((p >= 0.0) & (p <= 1.0))
     assert p.sum() == pytest.approx(1.0)
     assert np.all(np.diff(p[np.argsort(costs, kind='stable')]) <= 0.0)
@@ -44,8 +37,7 @@ def test_any_costs_give_a_distribution_in_the_order_of_the_costs(costs, beta):
 THREE_COSTS = np.array([1.0, 2.0, 5.0])
 
 
-def make_config(lookahead_s):
-    return LikelihoodConfig(beta=2.0, planning_horizon_s=0.0, lookahead_s=lookahead_s)
+LOOKING_AHEAD = LikelihoodConfig(beta=2.0, planning_horizon_s=0.0, lookahead_s=0.7)
 
 
 def make_branch_times(after_s):
@@ -55,15 +47,15 @@ def make_branch_times(after_s):
 @pytest.mark.parametrize('after_s', [0.0, 0.3, 2.0])
 def test_the_exponent_of_a_choice_fades_with_the_time_until_the_choice(after_s):
     fading = LikelihoodConfig(beta=2.0 * np.exp(-after_s / 0.7))
-    found = compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(after_s))
+    found = compute_likelihoods(THREE_COSTS, LOOKING_AHEAD, make_branch_times(after_s))
     np.testing.assert_allclose(found, compute_likelihoods(THREE_COSTS, fading), rtol=1e-12)
 
 
 @pytest.mark.parametrize(('horizon_s', 'share'), [(1000.0, 0.0), (4.0, norm.cdf(-math.log(2.0) / 0.5)), (2.0, 0.5), (0.0, 1.0)])
 def test_who_needs_longer_than_the_planning_horizon_looks_ahead(horizon_s, share):
-    planned = compute_likelihoods(THREE_COSTS, make_config(0.7))
-    ahead = compute_likelihoods(THREE_COSTS, make_config(0.7), make_branch_times(1.0))
-    config = replace(make_config(0.7), planning_horizon_s=horizon_s)
+    planned = compute_likelihoods(THREE_COSTS, LOOKING_AHEAD)
+    ahead = compute_likelihoods(THREE_COSTS, LOOKING_AHEAD, make_branch_times(1.0))
+    config = replace(LOOKING_AHEAD, planning_horizon_s=horizon_s)
     found = compute_likelihoods(THREE_COSTS, config, make_branch_times(1.0), time_s=2.0, planning_spread=0.5)
     np.testing.assert_allclose(found, (1.0 - share) * planned + share * ahead, rtol=1e-12)
     at_goal = compute_likelihoods(THREE_COSTS, config, make_branch_times(1.0), time_s=0.0)
@@ -110,22 +102,15 @@ def test_goals_of_one_way_are_compared_in_full_and_share_its_weight_however_many
 
 def test_weaving_costs_a_factor():
     straight = Decisions(np.arange(5), np.arange(5), np.zeros(5, dtype=np.intp))
-    p, woven = (
-        compute_likelihoods(FIVE_COSTS, CONFIG, decisions=each) for each in (straight, straight._replace(woven=np.eye(5)[3]))
-    )
+    both = straight, straight._replace(woven=np.eye(5)[3])
+    p, woven = (compute_likelihoods(FIVE_COSTS, CONFIG, decisions=each) for each in both)
     assert woven[3] / woven[0] == pytest.approx(p[3] / p[0] * np.exp(-1.5))
 
 
-CUP = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
-
-
-def classes(**values):
-    given = {'foc.noise_x': 0.3, 'foc.noise_y': 0.3} | {name.replace('__', '.'): value for name, value in values.items()}
-    return foc_ros.solve_classes((0, 0), [(0.3, 0)], [CUP], config=foc_ros.Config().with_values(given))
-
-
 def test_a_class_that_misses_eta_takes_part_with_less_weight():
-    found = classes(foc__eta=0.99, likelihood__lookahead_s=0.0)
+    cup = foc_ros.Circle((0.15, 0.01), radius=0.03, radius_stddev=0.003)
+    values = {'foc.noise_x': 0.3, 'foc.noise_y': 0.3, 'foc.eta': 0.99, 'likelihood.lookahead_s': 0.0}
+    found = foc_ros.solve_classes((0, 0), [(0.3, 0)], [cup], config=foc_ros.Config().with_values(values))
     assert {each.status for each in found} == {Status.COMPROMISED}
     assert all(each.has_likelihood and not each.is_solved and 0 < each.eta < 0.99 for each in found)
     assert sum(each.likelihood for each in found) == pytest.approx(1.0)

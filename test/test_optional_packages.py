@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node needs what `package.xml` names and nothing else; whatever needs more says in one sentence what is missing."""
 
-import ast
 import json
 import os
 import re
+import runpy
 import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
 
 import ros_helpers
 
@@ -40,23 +43,12 @@ find, importlib.util.find_spec = importlib.util.find_spec, lambda name: None if 
 
 def read_requirements():
     """Return the names of what setup.py requires: `''` for all, otherwise by extra, in small letters."""
-    setup = ast.parse((ROOT / 'setup.py').read_text('utf-8'))
-    constants = {node.targets[0].id: node.value for node in setup.body if isinstance(node, ast.Assign)}
-    call = next(node.value for node in setup.body if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call))
-    given = {keyword.arg: keyword.value for keyword in call.keywords}
-    lists = {'': given['install_requires']}
-    lists |= {key.value: value for key, value in zip(given['extras_require'].keys, given['extras_require'].values, strict=True)}
-
-    def read(node):
-        if isinstance(node, ast.Name):
-            return read(constants[node.id])
-        if isinstance(node, ast.Starred):
-            return read(node.value)
-        if isinstance(node, ast.List):
-            return set().union(*map(read, node.elts))
-        return {re.match(r'[A-Za-z0-9-]+', node.value).group().lower()}
-
-    return {extra: read(value) for extra, value in lists.items()}
+    given: dict[str, Any] = {}
+    setuptools = SimpleNamespace(setup=given.update, find_packages=lambda **_: [])
+    with mock.patch.dict(sys.modules, setuptools=setuptools):
+        runpy.run_path(str(ROOT / 'setup.py'))
+    lists = {'': given['install_requires'], **given['extras_require']}
+    return {extra: {re.split('[^A-Za-z0-9-]', each)[0].lower() for each in needed} for extra, needed in lists.items()}
 
 
 def list_keys():
@@ -74,7 +66,6 @@ def test_package_xml_and_the_optional_packages_are_all_requirements():
 
 
 def run(program, names=OPTIONAL):
-    """Run a program in a Python in which packages cannot be imported."""
     command = [sys.executable, '-c', BLOCK.format(names=names) + program]
     return subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
 

@@ -88,19 +88,18 @@ def test_without_a_movement_nothing_changes_and_it_can_be_switched_off():
     assert off.learnt.pace.movements == 0
 
 
-def test_equal_samples_give_equal_factors_and_a_reset_and_new_durations_forget_them():
-    one, other = Pipeline(CONFIG), Pipeline(CONFIG)
-    for pipeline in (one, other):
-        follow(pipeline, reach(4.0), reach(3.5), reach(4.2))
-    np.testing.assert_array_equal(one.learnt.pace.losses, other.learnt.pace.losses)
-    assert one.learnt.pace.movements > 0
-    one.reset()
-    assert one.learnt.pace.movements == 0 and one.adapted_config is CONFIG
-    np.testing.assert_array_equal(one.learnt.pace.losses, Pace().losses)
-    other.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
-    assert other.learnt.pace.movements > 0
-    other.reconfigure(other.adapted_config)
-    assert other.learnt.pace.movements == 0 and other.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
+def test_a_reset_and_new_durations_forget_the_pace_and_other_parameters_do_not():
+    pipeline = Pipeline(CONFIG)
+    follow(pipeline, reach(4.0), reach(3.5), reach(4.2))
+    pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
+    assert pipeline.learnt.pace.movements > 0
+    pipeline.reconfigure(pipeline.adapted_config)
+    assert pipeline.learnt.pace.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
+    follow(pipeline, reach(4.0), reach(3.5), reach(4.2))
+    assert pipeline.learnt.pace.movements > 0
+    pipeline.reset()
+    assert pipeline.learnt.pace.movements == 0 and pipeline.adapted_config is pipeline.config
+    np.testing.assert_array_equal(pipeline.learnt.pace.losses, Pace().losses)
 
 
 STDDEV = 0.02
@@ -108,28 +107,24 @@ FIXED = {'duration.adaptation': 'none'}
 DISPERSION_CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4} | FIXED)
 
 
-def make_candidate(likelihood=1.0, duration_s=2.0, place=(0.0, 0.0)):
-    """Return a candidate that stays at a place with a standard deviation of `STDDEV` along each axis."""
-    mean, covariance = np.zeros((9, 6)), np.tile(STDDEV**2 * np.eye(6), (9, 1, 1))
-    mean[:, :2] = place
-    solution = Solution(Status.SOLVED, '', duration_s / 8.0, mean, covariance, np.zeros((8, 2)), 1.0, {}, 0.0, 0.0, 1.0)
-    return PredictedCandidate(Candidate('goal0', 0, (), mean[:, :2], 0.0), solution, {}, 1.0, likelihood)
-
-
-def place_hand(stamp_ns, position):
-    """Return a moving hand at a position."""
+def place_hand(stamp_ns, position=(0.0, 0.0)):
     mean = np.array([*position, 0.0, 0.0, 0.0, 0.0])
     return HandState(stamp_ns, mean, np.eye(6), onset_ns=0, onset_position=np.zeros(2))
 
 
-def judge(ahead_s, factor, duration_s, count=60):
-    """Return what is learnt if the hand is beside the candidate by `factor` standard deviations in 2D some time later."""
-    generator, dispersion, candidates = np.random.default_rng(3), Dispersion(), [make_candidate(duration_s=duration_s)]
-    for position in factor * STDDEV * generator.standard_normal((count, 2)):
-        dispersion = dispersion.interrupt().follow(place_hand(0, (0.0, 0.0))).add(0, candidates, CovarianceConfig())
-        due = [replace(each, count=1.0) for each in dispersion.forecasts if each.due_ns == round(ahead_s * NANOSECONDS)]
-        dispersion = replace(dispersion, forecasts=tuple(due))
-        dispersion = dispersion.follow(place_hand(round(ahead_s * NANOSECONDS), position))
+def judge(ahead_s, factor, duration_s):
+    """Return what is learnt if the hand is beside a candidate by `factor` standard deviations in 2D some time later.
+
+    The candidate stays at the origin, with a standard deviation of `STDDEV` along each axis.
+    """
+    mean, covariance = np.zeros((9, 6)), np.tile(STDDEV**2 * np.eye(6), (9, 1, 1))
+    solution = Solution(Status.SOLVED, '', duration_s / 8.0, mean, covariance, np.zeros((8, 2)), 1.0, {}, 0.0, 0.0, 1.0)
+    candidate = PredictedCandidate(Candidate('goal0', 0, (), mean[:, :2], 0.0), solution, {}, 1.0, 1.0)
+    due_ns, dispersion = round(ahead_s * NANOSECONDS), Dispersion()
+    for position in factor * STDDEV * np.random.default_rng(3).standard_normal((60, 2)):
+        dispersion = dispersion.interrupt().follow(place_hand(0)).add(0, [candidate], CovarianceConfig())
+        due = tuple(replace(each, count=1.0) for each in dispersion.forecasts if each.due_ns == due_ns)
+        dispersion = replace(dispersion, forecasts=due).follow(place_hand(due_ns, position))
     return dispersion
 
 
@@ -148,7 +143,6 @@ AROUND = move_along(np.column_stack([x := np.linspace(0.0, 0.3, 101), 0.06 * np.
 
 
 def reach_around(pipeline):
-    """Pass a reach around an obstacle through a pipeline that predicts; return the predictions."""
     return follow(pipeline, AROUND, goals=GOAL, obstacles=make_obstacles([[0.15, 0.0]], 0.03, 0.001), is_predicting=True)
 
 

@@ -67,8 +67,7 @@ foc: {ros__parameters: {rate_hz: 25}}
 """
     with pytest.warns(FocWarning, match='params.yaml: /other_node does not apply to the node /foc$'):
         config = load(tmp_path, text)
-    assert config.rate_hz == 25.0
-    assert isinstance(config.rate_hz, float)
+    assert config.rate_hz == 25.0 and isinstance(config.rate_hz, float)
 
 
 @pytest.mark.parametrize(
@@ -124,11 +123,8 @@ def test_a_wrong_file_is_refused_with_its_reason(tmp_path, text, words):
         load_parameter_file(tmp_path / 'params.yaml')
 
 
-def node_with(ros, **overrides):
-    from rclpy.parameter import Parameter
-
-    given_values = [Parameter(name.replace('__', '.'), value=value) for name, value in overrides.items()]
-    return ros.node('foc', parameter_overrides=given_values, automatically_declare_parameters_from_overrides=True)
+def make_node(ros):
+    return ros.node('foc', automatically_declare_parameters_from_overrides=True)
 
 
 SECTIONS = ['/**', '/*', 'foc', '/foc', '/**/foc', '/*/foc', '/**/**', '/arm/foc', '/arm/*', '/arm/**', 'arm/foc', '/arm/left/*']
@@ -140,10 +136,8 @@ def test_sections_apply_as_ros_applies_them(tmp_path, namespace):
     from ros_helpers import graph
 
     file = tmp_path / 'params.yaml'
-    node, arguments = (
-        f'{namespace}/foc'.replace('//', '/'),
-        ['--ros-args', '--params-file', str(file), '-r', f'__ns:={namespace}'],
-    )
+    node = f'{namespace}/foc'.replace('//', '/')
+    arguments = ['--ros-args', '--params-file', str(file), '-r', f'__ns:={namespace}']
     for first, second in itertools.permutations(SECTIONS, 2):
         rates = {first: 5.0, second: 6.0}
         file.write_text('\n'.join(f'{name}: {{ros__parameters: {{rate_hz: {rate}}}}}' for name, rate in rates.items()))
@@ -155,7 +149,7 @@ def test_sections_apply_as_ros_applies_them(tmp_path, namespace):
                 assert load_parameter_file(file).rate_hz == applied[-1]
         if first == '/**':  # which applies always: it shows whether the second one does; a node takes a while
             with graph(arguments) as ros:
-                overrides = node_with(ros).get_parameters_by_prefix('')
+                overrides = make_node(ros).get_parameters_by_prefix('')
                 assert [each.value for name, each in overrides.items() if name == 'rate_hz'] == applied[-1:]
 
 
@@ -194,13 +188,10 @@ def test_node_and_commands_refuse_the_same_files(tmp_path, text, words):
 
 
 def test_numbers_with_an_exponent_need_no_point_and_those_with_a_sign_no_zero(tmp_path):
-    file = tmp_path / 'foc.yaml'
-    file.write_text('foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1, rate_hz: .5e2, foc.eta: +.5}}')
-    config = load_parameter_file(file)
+    config = load(tmp_path, 'foc: {ros__parameters: {budget_s: 1e-3, scene.timeout_s: 2E1, rate_hz: .5e2, foc.eta: +.5}}')
     assert (config.budget_s, config.scene.timeout_s, config.rate_hz, config.foc.eta) == (0.001, 20.0, 50.0, 0.5)
-    file.write_text('foc: {ros__parameters: {rate_hz: 1_0}}')  # a text for ROS
-    with pytest.raises(ParameterError, match=r"rate_hz: expected a finite number in .*, got '1_0'"):
-        load_parameter_file(file)
+    with pytest.raises(ParameterError, match=r"rate_hz: expected a finite number in .*, got '1_0'"):  # a text for ROS
+        load(tmp_path, 'foc: {ros__parameters: {rate_hz: 1_0}}')
 
 
 def test_a_node_reads_the_file_that_replay_reads(tmp_path):
@@ -212,4 +203,4 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path):
     file = tmp_path / 'params.yaml'
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
-        assert declare_parameters(node_with(ros)) == config == load_parameter_file(file)
+        assert declare_parameters(make_node(ros)) == config == load_parameter_file(file)

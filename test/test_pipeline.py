@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_stamped
+from message_helpers import cloud, marker, marker_array, message_types, obstacle_table, pose_stamped
 from object_messages import collision_object
+from reach_helpers import make_predictor
 
 import foc_ros
 from foc_ros.core import pipeline as module
@@ -28,13 +29,13 @@ MS = NANOSECONDS // 1000
 CONFIG = replace_values(Config(), {'rate_hz': 50.0, 'scene.timeout_s': 2.0, 'foc.steps': 20})
 
 
-def hand(ms, x=0.0, frame='world'):
-    return HandSample(START + round(ms * MS), np.array([x, 0.0]), 0.3, frame)
+def hand(ms):
+    return HandSample(START + round(ms * MS), np.zeros(2), 0.3, 'world')
 
 
-def ready(config=CONFIG):
+def ready():
     """Return a pipeline with a scene and a goal, but without a hand sample."""
-    pipeline = Pipeline(config)
+    pipeline = Pipeline(CONFIG)
     pipeline.set_obstacles('cloud', make_obstacles([[0.15, 0.0]], 0.03), START, 'world')
     pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
     return pipeline
@@ -80,8 +81,8 @@ def intake():
     return Intake(Pipeline(replace_values(Config(), {'scene.marker_radius_stddev': 0.004})))
 
 
-def move(intake, seconds, frame_id='world'):
-    return intake.take('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.2), round(seconds * SECOND), frame_id))
+def move(intake, seconds):
+    intake.take('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.2), round(seconds * NANOSECONDS)))
 
 
 def show(intake, *markers):
@@ -105,10 +106,10 @@ def test_a_marker_expires_by_the_stamp_of_the_hand(intake):
 def test_markers_of_publishers_with_different_delays_are_all_used(intake):
     move(intake, 1.0)
     for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
-        assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * SECOND))) is SampleStatus.ACCEPTED
+        assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * NANOSECONDS))) is SampleStatus.ACCEPTED
     assert seen(intake) == ('a/0', 'b/0', 'c/0')
-    assert intake.pipeline.scene.obstacles(SECOND).radius_stddev.tolist() == [0.004] * 3
-    assert intake.pipeline.scene.sources['markers'].stamp_ns == SECOND
+    assert intake.pipeline.scene.obstacles(NANOSECONDS).radius_stddev.tolist() == [0.004] * 3
+    assert intake.pipeline.scene.sources['markers'].stamp_ns == NANOSECONDS
 
 
 def test_a_table_that_never_held_a_marker_is_no_source(intake):
@@ -144,12 +145,11 @@ def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):
         intake.remove_source('collision_objects')
 
 
-POSE_MS = SECOND // 1000
 A, S, R = SampleStatus.ACCEPTED, SampleStatus.SKIPPED, SampleStatus.RESTARTED_BACKWARD
 
 
 def pose(ms, x=0.0, frame_id='world'):
-    return pose_stamped(TYPES, (x, 0.0, 0.1), 10 * SECOND + round(ms * POSE_MS), frame_id)
+    return pose_stamped(TYPES, (x, 0.0, 0.1), 10 * NANOSECONDS + round(ms * MS), frame_id)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_only_the_stamp_of_a_skipped_pose_is_looked_at():
     assert intake.take('hand_pose', pose(4, 0.0, 'camera')) is SampleStatus.WRONG_FRAME
     assert intake.take('hand_pose', pose(4.5)) is A, 'a refused pose keeps no good one away'
     wrong = pose(5)
-    wrong.header.stamp.nanosec = SECOND
+    wrong.header.stamp.nanosec = NANOSECONDS
     assert intake.take('hand_pose', wrong) is None
 
 
@@ -192,10 +192,8 @@ def test_the_union_of_the_sources_holds_the_latest_row_of_an_id():
     scene = Scene().with_source('cloud', ObstacleSource(cloud, START, 'w'))
     scene = scene.with_source('markers', ObstacleSource(markers, START, 'w'))
     merged = scene.obstacles(START)
-    assert merged.ids == ('a', 'b', 'c')
-    np.testing.assert_array_equal(merged.centre[:, 0], [0.0, 5.0, 2.0])
-    np.testing.assert_array_equal(merged.radius, [0.1, 0.2, 0.2])
-    np.testing.assert_array_equal(merged.radius_stddev, [0.01, 0.02, 0.02])
+    assert (merged.ids, merged.centre[:, 0].tolist()) == (('a', 'b', 'c'), [0.0, 5.0, 2.0])
+    assert (merged.radius.tolist(), merged.radius_stddev.tolist()) == ([0.1, 0.2, 0.2], [0.01, 0.02, 0.02])
     again = scene.with_source('cloud', ObstacleSource(cloud, START, 'w')).obstacles(START)
     assert dict(zip(again.ids, again.centre[:, 0], strict=True)) == {'a': 0.0, 'b': 1.0, 'c': 2.0}
 
@@ -249,10 +247,8 @@ def test_poses_stamped_by_ros_time_are_judged_by_it(poses):
     assert freshness.find_not_ready_reason(0.0) is None
 
 
-def predictor_of_one_goal():
-    predictor = foc_ros.Predictor(replace_values(CONFIG, {'budget_s': 0.0}))
-    predictor.set_goals([(0.3, 0.0)])
-    return predictor
+def predictor_of_one_goal(*obstacles):
+    return make_predictor(replace_values(CONFIG, {'budget_s': 0.0}), (0.3, 0.0), obstacles or None)
 
 
 @pytest.mark.parametrize('t', [5.0, 0.0, -5.0])
@@ -265,8 +261,7 @@ def test_moving_obstacles_move_on_from_the_update_that_first_sees_them(t):
 
 
 def test_after_a_reset_obstacles_go_on_from_where_they_are_at_any_time():
-    predictor = predictor_of_one_goal()
-    predictor.set_obstacles([foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5))])
+    predictor = predictor_of_one_goal(foc_ros.Circle((0.15, 0.1), 0.02, velocity=(0.0, -0.5)))
     for t in (5.0, 5.1):
         predictor.update(t, (0.0, 0.0))
     predictor.reset()
@@ -279,12 +274,7 @@ def test_after_a_reset_obstacles_go_on_from_where_they_are_at_any_time():
 
 def test_a_class_that_a_moving_obstacle_closes_is_not_estimated_from_its_guess():
     """The search knows where obstacles are now: by then this one has come to the other side of the guess."""
-    obstacles = [
-        foc_ros.Circle((0.15, 0.04), 0.03, velocity=(0.0, -0.15), name='a'),
-        foc_ros.Circle((0.2, -0.06), 0.02, name='b'),
-    ]
-    predictor = predictor_of_one_goal()
-    predictor.set_obstacles(obstacles)
-    prediction = predictor.update(0.0, (0.0, 0.0))
+    closing = foc_ros.Circle((0.15, 0.04), 0.03, velocity=(0.0, -0.15), name='a')
+    prediction = predictor_of_one_goal(closing, foc_ros.Circle((0.2, -0.06), 0.02, name='b')).update(0.0, (0.0, 0.0))
     assert prediction.most_likely == 'goal0:+a+b'
     assert all(each.label != 'goal0:-a+b' for each in prediction.candidates_with_likelihood)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from homotopy_scenes import GOAL, HAND, random_shapes
+from homotopy_scenes import GOAL, random_shapes
 from reach_helpers import REFERENCE_SHAPES, case_guess, case_problem, reach, reference_cases, solved
 
 from foc_ros.core.classes import find_path_sides, search
@@ -39,8 +39,7 @@ IN_TURN = [
 
 
 def find_sides(problem, solution):
-    realised = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
-    return [realised[identity] for identity in problem.obstacles.ids]
+    return find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
 
 
 @pytest.mark.parametrize('case', CIRCLES)
@@ -49,7 +48,7 @@ def test_fixed_reproduces_the_converged_qp(case):
     solution = solved(problem, case_guess(case), 'fixed', tau=reference['tau'], lam=reference['lam'])
     assert solution.status is Status.SOLVED
     assert solution.effort == pytest.approx(reference['effort'], rel=1e-4)
-    assert find_sides(problem, solution) == reference['sides']
+    assert list(find_sides(problem, solution).values()) == reference['sides']
     np.testing.assert_allclose(solution.path[case['steps'] // 2], reference['mid'], atol=1e-4)
     stddev = np.sqrt(solution.covariance[:, [0, 1], [0, 1]]).max(axis=0)
     np.testing.assert_allclose(stddev, reference['stddev_max'], rtol=1e-2, atol=1e-5)
@@ -61,7 +60,7 @@ def test_fixed_costs_no_more_than_what_ipopt_finds(case):
     reference, problem = case['fixed'], case_problem(case)
     solution = solved(problem, case_guess(case), 'fixed', tau=reference['tau'], lam=reference['lam'])
     assert solution.status is Status.SOLVED
-    assert find_sides(problem, solution) == reference['sides']
+    assert list(find_sides(problem, solution).values()) == reference['sides']
     assert solution.violation < 1e-6
     assert solution.effort <= 1.01 * reference['effort']
     assert solution.costs['effort'] + solution.costs['lambda_variance'] <= 1.02 * reference['cost']
@@ -80,7 +79,7 @@ def test_optimal_meets_eta_at_no_more_than_the_reference_effort(case, eta_below,
     solution = solved(problem, case_guess(case), 'optimal')
     assert solution.status is Status.SOLVED, solution.message
     assert solution.eta >= reference['eta'] - eta_below
-    assert find_sides(problem, solution) == reference['sides']
+    assert list(find_sides(problem, solution).values()) == reference['sides']
     assert solution.effort <= above * reference['ipopt_effort']
     if 'socp_ccp_effort' in reference:
         assert solution.effort <= 1.01 * reference['socp_ccp_effort']
@@ -91,7 +90,7 @@ def test_continuous_strategies_meet_eta_and_cost_no_less_than_optimal(case, stra
     reference, problem = case['min_effort_at_eta'], case_problem(case)
     solution, optimal = (solved(problem, case_guess(case), name) for name in (strategy, 'optimal'))
     assert solution.status is Status.SOLVED, solution.message
-    assert find_sides(problem, solution) == reference['sides']
+    assert list(find_sides(problem, solution).values()) == reference['sides']
     assert solution.eta >= problem.eta - 1e-6
     assert solution.lam == 1.0 or solution.eta == pytest.approx(problem.eta, abs=1e-3)
     assert solution.effort >= 0.999 * optimal.effort
@@ -106,10 +105,9 @@ SCENES = {
 
 
 def find_classes(problem):
-    config, duration_s = HomotopyConfig(max_candidates=16, clearance=0.0), problem.horizon.dt * problem.horizon.steps
-    return search(
-        problem.initial_mean, problem.goal[None, :2], problem.obstacles, config, [duration_s], problem.horizon.steps
-    ).candidates
+    config, steps = HomotopyConfig(max_candidates=16, clearance=0.0), problem.horizon.steps
+    goals, durations = problem.goal[None, :2], [problem.horizon.dt * steps]
+    return search(problem.initial_mean, goals, problem.obstacles, config, durations, steps).candidates
 
 
 def solve_together(problem, candidates, strategy):
@@ -138,12 +136,10 @@ def find_loss(solution):
 
 
 def read_table(scene):
-    vertices = [np.array(each['vertices']) for each in scene['obstacles']]
-    centres = [each.mean(axis=0) for each in vertices]
-    radii, deviations, names, velocities = (
-        [each[key] for each in scene['obstacles']] for key in ('radius', 'radius_stddev', 'name', 'velocity')
-    )
-    polygons = [each - centre for each, centre in zip(vertices, centres, strict=True)]
+    keys = 'vertices', 'radius', 'radius_stddev', 'name', 'velocity'
+    vertices, radii, deviations, names, velocities = ([each[key] for each in scene['obstacles']] for key in keys)
+    centres = [np.mean(each, axis=0) for each in vertices]
+    polygons = [np.array(each) - centre for each, centre in zip(vertices, centres, strict=True)]
     return make_obstacles(centres, radii, deviations, ids=tuple(names), velocity=velocities, polygons=polygons)
 
 
@@ -152,17 +148,15 @@ def test_classes_are_as_good_as_those_of_an_independent_solver():
     """At most one of all classes has a loss more than 0.05 above its reference; every path passes on the sides of its class."""
     worse, compared = {}, 0
     for scene in json.loads(REFERENCE.read_text('utf-8')):
-        given = {name: scene[name] for name in ('goal', 'steps', 'eta')}
-        given |= {'duration': scene['duration_s'], 'noise': scene['noise_per_step'], 'preference': PREFERENCE}
-        problem = reach(read_table(scene), **given)
+        given = {'duration': scene['duration_s'], 'noise': scene['noise_per_step'], 'preference': PREFERENCE}
+        problem = reach(read_table(scene), goal=scene['goal'], steps=scene['steps'], eta=scene['eta'], **given)
         problem = replace(problem, initial_mean=np.array(scene['start']))
         references = {each['label']: each['reference'] for each in scene['classes']}
         candidates = [each for each in find_classes(problem) if each.label in references]
         assert len(candidates) == len(references)
         for candidate, solution in zip(candidates, solve_together(problem, candidates, 'optimal'), strict=True):
             compared += 1
-            sides = find_path_sides(solution.path, problem.obstacles, problem.centre_trajectories)
-            reference = references[candidate.label]
+            sides, reference = find_sides(problem, solution), references[candidate.label]
             assert all(sides.get(name, side) == side for name, side in candidate.sides)
             losses = [
                 PREFERENCE.compute_loss(effort, min(k + 1e-5, problem.wanted_k), problem.wanted_k)
@@ -174,36 +168,18 @@ def test_classes_are_as_good_as_those_of_an_independent_solver():
     assert len(worse) <= 1, worse
 
 
-CLASS_SCENES = 3
-DURATION_S = 0.9
-
-
-def make_scene(seed):
-    rng = np.random.default_rng(seed)
-    obstacles = random_shapes(rng, int(rng.integers(2, 6)))
-    config = Config().with_values({'duration.fixed_s': DURATION_S, 'budget_s': 0.0})
-    hand = HandState(0, np.concatenate((HAND, np.zeros(4))), np.zeros((6, 6)))
-    return ReachingScene(hand, np.array([GOAL]), obstacles, None, None, config)
-
-
-def sweep(path, point):
-    angles = np.unwrap(np.arctan2(*(path - point).T[::-1]))
-    return angles[-1] - angles[0]
-
-
 def test_every_solved_candidate_is_in_the_class_of_its_label():
-    counts = dict.fromkeys(Status, 0)
-    for seed in range(CLASS_SCENES):
-        scene = make_scene(seed)
+    config, hand = Config().with_values({'duration.fixed_s': 0.9, 'budget_s': 0.0}), HandState(0, np.zeros(6), np.zeros((6, 6)))
+    found = []
+    for seed in range(3):
+        generator = np.random.default_rng(seed)
+        obstacles = random_shapes(generator, int(generator.integers(2, 6)))
+        scene = ReachingScene(hand, np.array([GOAL]), obstacles, None, None, config)
         for one in solve_scene(scene, build_scene_problems(scene)):
-            counts[one.status] += 1
-            if not one.has_likelihood:
-                continue
-            for name, _ in one.candidate.sides:
-                centre = scene.obstacles.centre[scene.obstacles.ids.index(name)]
-                difference = sweep(one.solution.path, centre) - sweep(one.candidate.guess, centre)
-                assert abs(difference) < np.pi / 2, f'scene {seed}, {one.label}, obstacle {name}'
-    found = sum(counts.values())
-    assert found > 2 * CLASS_SCENES
-    assert counts[Status.LEFT_CLASS] <= 0.02 * found, counts
-    assert counts[Status.SOLVED] + counts[Status.COMPROMISED] >= 0.94 * found, counts
+            found.append(one.status)
+            if one.has_likelihood:
+                sides = find_path_sides(one.solution.path, obstacles)
+                assert all(sides.get(name, side) == side for name, side in one.candidate.sides), f'scene {seed}, {one.label}'
+    assert len(found) > 6
+    assert found.count(Status.LEFT_CLASS) <= 0.02 * len(found), found
+    assert found.count(Status.SOLVED) + found.count(Status.COMPROMISED) >= 0.94 * len(found), found

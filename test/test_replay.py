@@ -16,7 +16,8 @@ from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, wr
 from message_helpers import marker, marker_array, read_columns, transform
 from rosbags.highlevel import AnyReader
 
-from foc_ros.analysis.replay import Replay, replay
+import foc_ros
+from foc_ros.analysis.replay import Replay
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, GuidanceConfig, replace_values
 from foc_ros.io.bags import BagReader
@@ -121,7 +122,7 @@ def test_a_slash_before_a_frame_is_no_part_of_its_name(tmp_path):
             message.header.frame_id = '/tool'
         given.append((topic, stamp_ns, message))
     bag, config = write_bag(tmp_path / 'slashes', given), replace_values(CONFIG, {'frame_id': '/world'})
-    assert len(list(replay(bag, config))) == len(reach(FEW))
+    assert len(list(foc_ros.replay(bag, config))) == len(reach(FEW))
 
 
 def test_a_hand_that_does_not_move_is_told(tmp_path, capsys):
@@ -158,8 +159,7 @@ def test_nothing_solved_is_exit_3_and_says_why(tmp_path, capsys):
         ('/obstacles', ns(-1), encode_obstacles(TYPES, ns(-4.5), FRAME, [])),
         ('/goals', ns(-1), encode_goals(TYPES, ns(-1), FRAME, np.zeros((1, 3)))),
     ]
-    bag = write_bag(tmp_path / 'stale', sorted(stale, key=lambda each: each[1]))
-    assert run(bag) == 3
+    assert run(write_bag(tmp_path / 'stale', by_stamp(stale))) == 3
     out, err = capsys.readouterr()
     assert 'predictions' in out
     assert err.startswith('foc_ros replay: no prediction has a solved candidate: obstacles are 4.6 s older')
@@ -203,7 +203,7 @@ def test_an_independent_reader_finds_topics_counts_and_numbers_in_the_output_bag
     information = yaml.safe_load((tmp_path / 'out' / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
     assert (information['version'], information['storage_identifier']) == (9, 'mcap')
     assert (information['message_count'], information['relative_file_paths']) == (sum(map(len, found.values())), ['out.mcap'])
-    for prediction, cloud in zip(replay(bag, CONFIG), found['/foc/prediction'], strict=True):
+    for prediction, cloud in zip(foc_ros.replay(bag, CONFIG), found['/foc/prediction'], strict=True):
         table, first = read_columns(cloud), next(each for each in prediction if each.label == prediction.most_likely)
         assert np.allclose(table['x'][table['candidate'] == 0], first.mean[:, 0], atol=1e-6)
         assert np.allclose(table['likelihood'][table['candidate'] == 0], first.likelihood)
@@ -251,26 +251,25 @@ def seen_by_camera(items):
 def test_the_transforms_of_a_recording_are_applied(tmp_path, capsys):
     """A camera on a moving arm, whose transforms are logged after the obstacles that need them; the goals are in the world."""
     transforms = [camera_at(0.1 * seconds, seconds) for seconds in np.arange(-0.2, 0.3, 0.05)]
-    items = sorted([*seen_by_camera(messages(0.24)), *transforms], key=lambda item: item[1])
+    items = by_stamp(seen_by_camera(messages(0.24)), transforms)
     config = replace_values(CONFIG, {'frame_id': FRAME})
     bag, still = write_bag(tmp_path / 'moving', items), write_bag(tmp_path / 'still', messages(0.24))
-    moving = list(replay(bag, config))
+    moving = list(foc_ros.replay(bag, config))
     assert len(moving) == len(reach(0.24))
-    by_stamp = {each.stamp_ns: each for each in replay(still, config)}
+    same = {each.stamp_ns: each for each in foc_ros.replay(still, config)}
     for prediction in moving[2:]:
-        (obstacle,), (expected,) = (each.obstacles.centre for each in (prediction, by_stamp[prediction.stamp_ns]))
+        (obstacle,), (expected,) = (each.obstacles.centre for each in (prediction, same[prediction.stamp_ns]))
         np.testing.assert_allclose(obstacle, expected, atol=1e-6)
-    assert main(['replay', str(bag), '--params', write_parameters(tmp_path, config), '--output', str(tmp_path / 'out')]) == 0
+    assert run(bag, '--output', str(tmp_path / 'out'), config=config) == 0
     with BagReader(tmp_path / 'out') as reader:
         assert sum(item.role == 'tf' for item in reader) == len(transforms)
     assert 'transform_newest' not in capsys.readouterr().out
 
 
 def test_what_was_refused_is_named(tmp_path, capsys):
-    config = replace_values(CONFIG, {'frame_id': FRAME})
-    bag = write_bag(tmp_path / 'blind', seen_by_camera(messages(0.24)))
     count = sum(topic == '/obstacles' for topic, _, _ in messages(0.24))
-    assert main(['replay', str(bag), '--params', write_parameters(tmp_path, config)]) == 3
+    bag = write_bag(tmp_path / 'blind', seen_by_camera(messages(0.24)))
+    assert run(bag, config=replace_values(CONFIG, {'frame_id': FRAME})) == 3
     line = capsys.readouterr().err.splitlines()[-1]
     assert f'{count} of {count} messages of obstacles refused' in line
     assert "expected the working frame 'world', got 'camera'; no transform to world: camera and world are not connected" in line

@@ -5,7 +5,6 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +21,6 @@ from foc_ros.ros.parameters import dump_parameter_file
 
 GOALS = np.array([[0.3, 0.1], [0.3, -0.1]])
 QUICK = Config(budget_s=0.0).with_values({'foc.steps': 20, 'homotopy.max_candidates': 2, 'rate_hz': 10.0})
-AT_REST = np.zeros((2, 2))
-
-
-def cross(goal_row=0):
-    """Return a straight movement to a goal, without obstacles."""
-    path = interpolate_minimum_jerk(np.array([[0.0, 0.0], GOALS[goal_row]]), np.array([0.0, 1.2]), AT_REST)
-    return Task(Arm(noise=0.0), make_obstacles(), GOALS, GOALS[goal_row], goal_row, path)
 
 
 @pytest.mark.parametrize('operator', OPERATORS[:-1])
@@ -42,7 +34,8 @@ def test_operators_intend_what_their_names_say(operator):
 
 
 def test_measures_of_a_trial_with_known_answers():
-    task = replace(cross(), obstacles=make_obstacles([(0.15, 0.05)], [0.02]))
+    path = interpolate_minimum_jerk(np.array([[0.0, 0.0], GOALS[0]]), np.array([0.0, 1.2]), np.zeros((2, 2)))
+    task = Task(Arm(noise=0.0), make_obstacles([(0.15, 0.05)], [0.02]), GOALS, GOALS[0], 0, path)
     position = np.linspace([0.0, 0.0], [0.3, 0.1], 101)
     direction = np.array([0.3, 0.1]) / np.hypot(0.3, 0.1)
     forces = np.tile(-2.0 * direction, (101, 1))
@@ -59,7 +52,6 @@ class Misled(Assistance):
     """Takes a wrong way to be the likeliest, and draws back."""
 
     def compute_force(self, step, position, velocity, acceleration):
-        """Return a constant force."""
         self.is_wrong = True
         return np.array([-1.0, 0.0])
 
@@ -83,9 +75,8 @@ def test_the_command_prints_equal_cells_whatever_the_workers_and_writes_a_report
     options = ['--operators', 'changes_way', '--assistance', 'foc', '--trials', '1', '--seed', '7']
     cells = run(tmp_path, capsys, *options, '--workers', '1', '--report', str(tmp_path))
     assert cells == run(tmp_path, capsys, *options, '--workers', '2')
-    assert [(cell['operator'], cell['assistance'], cell['trials']) for cell in cells] == [
-        (operator, rule, 1) for operator in ('changes_way',) for rule in ('none', 'foc')
-    ]
+    kinds = [(cell['operator'], cell['assistance'], cell['trials']) for cell in cells]
+    assert kinds == [('changes_way', rule, 1) for rule in ('none', 'foc')]
     for cell in cells:
         assert cell['completion_s_interval'][0] <= cell['completion_s'] <= cell['completion_s_interval'][1]
     assert (cells[0]['effort_difference'], cells[0]['wrong_way_s']) == (0.0, None)
@@ -109,7 +100,6 @@ def test_the_study_of_rival_rules_prints_the_cells_of_simulate():
     done = subprocess.run([sys.executable, STUDY, *options], capture_output=True, text=True, timeout=100, check=False)
     assert done.returncode == 0, done.stderr
     cells = json.loads(done.stdout)['cells']
-    assert [(cell['operator'], cell['assistance']) for cell in cells] == [
-        ('noisy', rule) for rule in ('none', 'blend', 'potential_field')
-    ]
+    kinds = [(cell['operator'], cell['assistance']) for cell in cells]
+    assert kinds == [('noisy', rule) for rule in ('none', 'blend', 'potential_field')]
     assert all(low <= cell['effort'] <= high for cell in cells for low, high in [cell['effort_interval']])

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers of a solution against finite differences and geometry."""
+"""The numbers of a solution against finite differences and geometry.
+
+So are the derivatives of margins: the second ones make warm predictions fast, and no result shows them.
+"""
 
 import math
 import re
@@ -17,7 +20,9 @@ from foc_ros.core.config import FocConfig
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import Edges, find_offset
 from foc_ros.core.obstacles.risk import RiskBound, compute_safety_factor, eta_of_k, size_moments
-from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Shape, collect_obstacles
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
+from foc_ros.core.ocp import gradients
+from foc_ros.core.ocp.margin import Contacts, Margins
 from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
@@ -45,15 +50,11 @@ def test_an_infeasible_geometry_says_how_much_it_lacks_and_where(strategy):
     assert solution.qp_solves >= 1
 
 
-def augmented(solution):
-    return sum(solution.costs.values())
-
-
 def test_multipliers_are_what_a_metre_of_distance_costs():
     """J_aug of `fixed` by tau: rows ask for sqrt(E[R^2] + tau), so dJ/dtau is the sum of the multipliers / (2 sqrt(...))."""
     tau, step = 1e-3, 1e-6
     less, middle, more = (solved(one_obstacle(), BOWED, 'fixed', tau=tau + by, lam=1e3) for by in (-step, 0.0, step))
-    measured = (augmented(more) - augmented(less)) / (2 * step)
+    measured = (sum(more.costs.values()) - sum(less.costs.values())) / (2 * step)
     reach_m = math.sqrt(0.03**2 + 0.003**2 + tau)
     assert sum(value for _, _, value in middle.multipliers) / (2 * reach_m) == pytest.approx(measured, rel=1e-2)
     assert middle.equivalent_weights == ((tau, 1e3),) * len(middle.multipliers)
@@ -157,29 +158,26 @@ def narrow_scene(seed):
     gap, x, y = 10 ** generator.uniform(-3, -1.7), generator.uniform(0.12, 0.18), generator.uniform(-0.02, 0.02)
     shapes: list[Shape] = []
     for side in (-1, 1):
-        radius, stddev = generator.uniform(0.004, 0.02), generator.choice([0.0, 0.001])
-        width, height = generator.uniform(0.01, 0.06, 2)
-        at = np.array([x, y + side * (gap / 2 + radius)])
-        far = np.add(at, (0.0, side * height))
-        velocity = (0.02, 0.0) if seed % 4 == 3 else (0.0, 0.0)
-        shapes.append(
-            (
-                Circle(at, radius, stddev, velocity=velocity),
-                Capsule(at, np.add(far, (width / 2, 0.0)), radius, stddev, velocity=velocity),
-                Box(np.add(at, (0.0, side * height / 2)), (width, height), 0.0, radius, stddev, velocity=velocity),
-            )[generator.integers(3)]
+        radius, width, height = generator.uniform([0.004, 0.01, 0.01], [0.02, 0.06, 0.06])
+        stddev, velocity = generator.choice([0.0, 0.001]), (0.02 if seed % 4 == 3 else 0.0, 0.0)
+        near = np.array([x, y + side * (gap / 2 + radius)])
+        far, middle = (near[0] + width / 2, near[1] + side * height), (near[0], near[1] + side * height / 2)
+        kinds = (
+            Circle(near, radius, stddev, velocity=velocity),
+            Capsule(near, far, radius, stddev, velocity=velocity),
+            Box(middle, (width, height), 0.0, radius, stddev, velocity=velocity),
         )
+        shapes.append(kinds[generator.integers(3)])
     if seed % 3 == 0:
         shapes.append(Box((0.23, generator.uniform(-0.03, 0.03)), (0.02, 0.03), generator.uniform(-3, 3)))
     preference = SafetyPreference(beta=1.0, shortfall=3.0, dt=0.025)
     problem = reach(collect_obstacles(shapes), steps=40, noise=(0.05, 0.05), preference=preference)
-    straight = bowed((0, 0), (0.3, 0), 40, 0.0)
-    return problem, straight + np.array([0.0, y]) * np.sin(np.pi * straight[:, :1] / 0.3)
+    return problem, bowed((0, 0), (0.3, 0), 40, y)
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'optimal', 'fixed'])
 def test_nothing_is_below_the_least_safety_factor_that_is_reported(strategy):
-    """At a hundred times a step, in scenes with gaps down to 1 mm."""
+    """At a hundred times a step, in scenes with gaps down to 1 mm, in a quarter of which all shapes move."""
     wrong = {}
     for seed in (5, 6) if strategy == 'lv' else range(10):
         problem, guess = narrow_scene(seed)
@@ -219,3 +217,103 @@ def test_the_safety_factor_is_that_of_samples_for_correlated_axes_and_uncertain_
     C = radius**2 - d @ d - 2 * (position - centre - d) @ d
     assert k == pytest.approx(-C.mean() / C.std(), rel=0.01)
     assert np.mean(C <= 0) >= eta_of_k(k)
+
+
+N, GOAL, K = 24, (0.3, 0.02), 2.0
+SHAPES: dict[str, list[Shape]] = {
+    'circle': [Circle((0.15, 0.0), radius=0.03)],
+    'moving uncertain circle': [Circle((0.14, -0.02), 0.03, 0.003, velocity=(0.03, 0.02), centre_stddev=0.002)],
+    'box': [Box((0.15, 0.0), size=(0.06, 0.04), yaw=0.4, radius=0.01, radius_stddev=0.002)],
+    'sharp box': [Box((0.14, -0.01), size=(0.08, 0.03), yaw=-0.3)],
+    'moving capsule': [Capsule((0.12, -0.01), (0.17, 0.02), 0.015, 0.002, velocity=(0.02, -0.03), centre_stddev=0.002)],
+    'hull': [Hull([(0.11, -0.03), (0.17, -0.04), (0.19, 0.0), (0.14, 0.02)], radius=0.01)],
+}
+STARTS = {'certain': np.zeros((6, 6)), 'uncertain': 1e-6 * (np.eye(6) + 0.3)}
+
+
+def make_problem(name, start, mass=None):
+    """Return a problem, and a control (2N,) in units of `Horizon.gain` that passes near its obstacle; mass: a damped one."""
+    obstacles, noise = collect_obstacles(SHAPES[name]), np.array([0.1, 0.15])
+    if mass is None:
+        made = reach(obstacles, goal=GOAL, steps=N, noise=noise, initial_covariance=STARTS[start])
+    else:
+        horizon = condense(discretise_damped_mass(1.0 / N, mass, 4.0), N)
+        made = rest_to_goal(horizon, np.zeros(4), np.array(GOAL), obstacles, noise, 0.9)
+    solution = solved(made, bowed((0, 0), GOAL, N, 0.08), 'fixed', tau=1e-3, lam=1e4 if mass is None else 10.0)
+    return made, solution.control.T.ravel() * made.horizon.gain
+
+
+MADE = {
+    **{f'{name}, {start} start': (name, start) for name in SHAPES for start in STARTS},
+    **{f'{name}, damped mass': (name, 'certain', 1.5) for name in ('circle', 'box')},
+}
+
+
+def linearise_at(margins, control, times, k=K, slides=True, is_free=False):
+    count = len(times)
+    none = np.zeros(count, dtype=np.intp)
+    controls, is_held = np.tile(control, (count, 1)), np.full(count, slides)
+    return gradients.linearise(
+        margins, Contacts(none, none, times), controls, np.full(count, k), is_held, np.full(count, is_free)
+    )
+
+
+def list_minima(margins, control):
+    """Return the times of the local minima of a margin, to a tenth of a step."""
+    times = np.arange(1.5, N - 0.4, 0.1)
+    values = linearise_at(margins, control, times).value
+    return times[np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1].tolist()
+
+
+def find_least(margins, control, time, is_free=False):
+    """Return the time near another at which the margin, or the safety factor that is free, is least, and its value then."""
+    none, within = np.zeros(21, dtype=np.intp), 0.3
+    motion = margins.move(np.zeros(1, dtype=np.intp), control[None])
+    for _ in range(8):
+        times = time + within * np.linspace(-1, 1, 21)
+        if is_free:
+            values = margins.measure(Contacts(none, none, times), none, motion, np.zeros(21)).factor
+        else:
+            values = linearise_at(margins, control, times).value
+        time, within = float(times[values.argmin()]), within / 5
+    return time, float(values.min())
+
+
+def is_smooth(margins, control, time):
+    """Return whether the nearest point is on one side or one corner around a time."""
+    none, times = np.zeros(5, dtype=np.intp), time + np.linspace(-0.1, 0.1, 5)
+    found = margins.measure(Contacts(none, none, times), none, margins.move(none[:1], control[None]), np.full(5, K))
+    return len(set(found.is_on_edge.tolist())) == 1
+
+
+def check_derivatives(made, control, find, least, rate, within):
+    """Compare the derivatives at a control with differences of `find`, a function of the control, times a rate."""
+    directions = np.random.default_rng(2).standard_normal((3, len(control)))
+    for direction in 1e-3 * np.abs(control).max() * directions:
+        more, less = (find(control + sign * direction) for sign in (1, -1))
+        along = made.factors[0] @ direction
+        added = made.diagonal[0] @ direction**2 + along @ made.weights[0] @ along
+        assert made.gradient[0] @ direction == pytest.approx(rate * (more - less) / 2, rel=1e-3, abs=1e-9)
+        assert added == pytest.approx(-rate * (more - 2 * least + less), rel=2e-2, abs=within)
+
+
+@pytest.mark.parametrize('case', MADE)
+@pytest.mark.parametrize('is_free', [False, True], ids=['margin', 'safety factor'])
+def test_the_hessian_is_that_of_the_least_margin_which_slides_or_of_the_least_safety_factor(case, is_free):
+    """Second differences of G(u) = min_t g(u, t), minus those that a unit of the multiplier adds to the Lagrangian.
+
+    Where the safety factor is free, those of min_t k(u, t), times the rate r by which a margin falls with k.
+    """
+    problem, control = make_problem(*MADE[case])
+    margins, seen = Margins([problem], np.zeros(1), is_chance=True), 0
+    for near in list_minima(margins, control):
+        time, least = find_least(margins, control, near, is_free)
+        if not is_smooth(margins, control, time) or (is_free and (abs(time - near) > 0.29 or least <= 0.0)):
+            continue
+        seen += 1
+        made = linearise_at(margins, control, np.array([time]), least if is_free else K, is_free=is_free)
+        assert made.value[0] == pytest.approx(0.0 if is_free else least, abs=1e-9)
+        rate, within = (made.stddev_rate[0], 2e-9) if is_free else (1.0, 1e-9)
+        find = lambda moved, time=time: find_least(margins, moved, time, is_free)[1]  # noqa: E731
+        check_derivatives(made, control, find, least, rate, within)
+    assert seen or 'circle' not in case, 'a circle has a least margin where it is smooth'

@@ -4,8 +4,8 @@
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -160,60 +160,46 @@ def test_a_problem_that_is_not_finite_is_refused_by_name(field, values):
         rest_to_goal(build_triple_integrator_horizon(0.02, 50), obstacles=make_obstacles(), eta=0.9, **(given | values))
 
 
-DT = 0.02
 SEEDS = (1, 4, 9)  # in others a gap is so narrow that the wanted k is out of reach
-QUARTER_SHORTFALL = SafetyPreference(beta=0.5, shortfall=0.25, fixed_cost=20.0, dt=DT)
-OPTIMAL = FocConfig(strategy='optimal')
+QUARTER_SHORTFALL = SafetyPreference(beta=0.5, shortfall=0.25, fixed_cost=20.0, dt=0.02)
+WHOLE_SHORTFALL = SafetyPreference(beta=0.5, shortfall=1.0, dt=0.02)
 
 
-def make_reach(seed, preference=HARD, **rest):
-    return random_reach(np.random.default_rng(seed), **{'noise': (0.1, 0.1), 'preference': preference, **rest})
+def make_reach(seed, preference=HARD, noise=(0.1, 0.1)):
+    return random_reach(np.random.default_rng(seed), noise=noise, preference=preference)
 
 
-def solve_optimal(problem, guess):
-    return solve_problem(problem, cold_start(guess), OPTIMAL)
+def find_loss(solution, problem, preference):
+    factor = min(max(solution.safety_factor, 0.0), problem.wanted_k)
+    return preference.compute_loss(solution.effort, factor, problem.wanted_k)
 
 
 @pytest.mark.parametrize('seed', SEEDS)
 def test_a_soft_margin_gives_the_least_loss_of_all_k(seed):
     problem, guess = make_reach(seed, QUARTER_SHORTFALL, noise=(0.15, 0.15))
-    solution = solve_optimal(problem, guess)
+    solution = solved(problem, guess, 'optimal')
     assert solution.status in (Status.SOLVED, Status.COMPROMISED)
-    loss = QUARTER_SHORTFALL.compute_loss(solution.effort, min(solution.safety_factor, problem.wanted_k), problem.wanted_k)
+    loss = find_loss(solution, problem, QUARTER_SHORTFALL)
     for k in np.linspace(0.3, solution.safety_factor, 6).tolist():
-        least = solve_optimal(replace(problem, preference=HARD, eta=eta_of_k(k)), guess)
+        least = solved(replace(problem, preference=HARD, eta=eta_of_k(k)), guess, 'optimal')
         assert least.status is Status.SOLVED
         assert loss <= QUARTER_SHORTFALL.compute_loss(least.effort, k, problem.wanted_k) + 1e-4
 
 
-WHOLE_SHORTFALL = SafetyPreference(beta=0.5, shortfall=1.0, dt=0.02)
-SETTINGS = {name: FocConfig(strategy=name) for name in ('lv', 'hc')}
-
-
-def soft_scenes(count, seed=1):
-    generator, noises = np.random.default_rng(seed), [(0.05, 0.05), (0.15, 0.15), (0.3, 0.3)]
-    return [random_reach(generator, noise=noises[number % 3], preference=WHOLE_SHORTFALL) for number in range(count)]
-
-
-def loss(solution, problem):
-    return problem.preference.compute_loss(solution.effort, max(solution.safety_factor, 0.0), problem.wanted_k)
-
-
 def test_a_cheap_eta_is_met_with_the_same_effort_and_a_compromise_costs_no_more_than_what_it_gains():
     """log J / J_0 <= shortfall / beta (k_wanted - k_0), J_0 and k_0 those of the least effort."""
-    kinds, scenes = [], soft_scenes(9)
+    kinds, generator = [], np.random.default_rng(1)
+    scenes = [random_reach(generator, noise=(c, c), preference=WHOLE_SHORTFALL) for c in 3 * (0.05, 0.15, 0.3)]
     for problem, guess in scenes[:3] + scenes[6:]:  # the others take several times as long
-        hard = solve_problem(
-            replace(problem, preference=replace(WHOLE_SHORTFALL, shortfall=math.inf)), cold_start(guess), SETTINGS['hc']
-        )
-        soft = solve_problem(problem, cold_start(guess), SETTINGS['hc'])
+        strict = replace(problem, preference=replace(WHOLE_SHORTFALL, shortfall=math.inf))
+        hard, soft = (solved(each, guess, 'hc') for each in (strict, problem))
         kinds.append((hard.status, soft.status))
         if soft.status is Status.SOLVED:
             assert soft.effort == pytest.approx(hard.effort, rel=1e-6)
         elif hard.status is Status.SOLVED:
-            assert loss(soft, problem) < loss(hard, problem)
+            assert find_loss(soft, problem, WHOLE_SHORTFALL) < find_loss(hard, problem, WHOLE_SHORTFALL)
         if soft.status is Status.COMPROMISED:
-            least = solve_problem(problem, cold_start(guess), FocConfig(strategy='fixed', tau=0.0, lam=1.0))
+            least = solved(problem, guess, 'fixed', tau=0.0, lam=1.0)
             gained = problem.wanted_k - least.safety_factor
             assert math.log(soft.effort / least.effort) <= WHOLE_SHORTFALL.shortfall / WHOLE_SHORTFALL.beta * gained + 1e-6
     assert {soft for hard, soft in kinds if hard is Status.ETA_UNREACHABLE} == {Status.COMPROMISED}
@@ -275,53 +261,48 @@ def test_effort_does_not_fall_with_eta(case, strategy):
 
 
 FAST = Config().with_values({'foc.steps': 25, 'duration.model': 'fixed', 'foc.noise_x': 0.1, 'foc.noise_y': 0.1})
-GOALS = np.array([[0.3, 0.0]])
-LARGEST, BISECTIONS = 0.03, 6
-LEAST_LIKELIHOOD = 0.01
-Answers = dict[str, tuple[float, float]]
-
-
-def answer(shapes, values, state=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0)):
-    """Return ln J and likelihood by class, for a prediction without a past."""
-    hand = HandState(0, np.array(state), np.zeros((6, 6)), onset_ns=0, onset_position=np.zeros(2))
-    prediction, _ = predict(FAST.with_values(values), hand, collect_obstacles(shapes), GOALS, NO_TRACKS)
-    for each in prediction.candidates:
-        is_unlikely = each.status.value in ('estimated', 'infeasible') and each.likelihood < 0.05
-        assert is_unlikely or each.status.value in ('solved', 'compromised'), (each.label, each.solution.message, values, state)
-    return {each.label: (float(np.log(each.solution.effort)), each.likelihood) for each in prediction.candidates}
-
-
 BOX = foc_ros.Box((0.15, 0.0), size=(0.06, 0.04), yaw=0.3, radius=0.005, radius_stddev=0.001)
 GAP = (
     foc_ros.Box((0.15, 0.045), size=(0.03, 0.05)),
     foc_ros.Capsule((0.15, -0.05), (0.18, -0.08), 0.015, 0.001, centre_stddev=0.001),
 )
-SWEEPS: dict[str, tuple[float, float, Callable[[float], Answers]]] = {
-    'eta before a box': (0.5, 0.97, lambda eta: answer([BOX], {'foc.eta': eta})),
-    'start before a gap': (-0.02, 0.02, lambda y: answer(GAP, {}, (0.0, y, 0.1, 0.0, 0.0, 0.0))),
-}
-"""Other sweeps take long, or have points at which a class does not settle, or in another minimum."""
+
+
+def answer(shapes, eta, y):
+    """Return ln J and likelihood by class, for a prediction without a past of a hand that begins at a height y."""
+    hand = HandState(0, np.array([0.0, y, 0.1, 0.0, 0.0, 0.0]), np.zeros((6, 6)), onset_ns=0, onset_position=np.zeros(2))
+    config, goals = FAST.with_values({'foc.eta': eta}), np.array([[0.3, 0.0]])
+    candidates = predict(config, hand, collect_obstacles(shapes), goals, NO_TRACKS)[0].candidates
+    for each in candidates:
+        is_unlikely = each.status.value in ('estimated', 'infeasible') and each.likelihood < 0.05
+        assert is_unlikely or each.status.value in ('solved', 'compromised'), (each.label, each.solution.message, eta, y)
+    return {each.label: (float(np.log(each.solution.effort)), each.likelihood) for each in candidates}
 
 
 def measure_jump(one, other):
-    """Return the largest difference of a likelihood, or of the effort of a class that is not unlikely."""
+    """Return the largest difference of a likelihood, or of the effort of a class with more than 1 % in both."""
     none, jumps = (0.0, 0.0), []
     for label in one.keys() | other.keys():
         (effort, share), (beside, later) = one.get(label, none), other.get(label, none)
-        jumps += [abs(share - later), abs(effort - beside) if min(share, later) > LEAST_LIKELIHOOD else 0.0]
+        jumps += [abs(share - later), abs(effort - beside) if min(share, later) > 0.01 else 0.0]
     return max(jumps)
 
 
-@pytest.mark.parametrize('name', SWEEPS)
-def test_effort_and_likelihood_have_no_jumps(name):
-    """Of 25 points, no two neighbours differ by more than 3 %, unless bisection shrinks the difference."""
-    low, high, find = SWEEPS[name]
+@pytest.mark.parametrize(
+    ('find', 'low', 'high'),
+    [(lambda eta: answer([BOX], eta, 0.0), 0.5, 0.97), (lambda y: answer(GAP, 0.9, y), -0.02, 0.02)],
+    ids=['eta before a box', 'start before a gap'],
+)
+def test_effort_and_likelihood_have_no_jumps(find, low, high):
+    """Of 25 points, no two neighbours differ by more than 3 %, unless bisection shrinks the difference.
+
+    Other sweeps take long, or have points at which a class does not settle, or in another minimum.
+    """
     values = np.linspace(low, high, 25).tolist()
-    answers, jumps = [find(value) for value in values], []
-    for i in range(len(values) - 1):
-        (left, one), (right, other) = (values[i], answers[i]), (values[i + 1], answers[i + 1])
-        for _ in range(BISECTIONS):
-            if measure_jump(one, other) < LARGEST:
+    answers = [find(value) for value in values]
+    for (left, right), (one, other) in zip(pairwise(values), pairwise(answers), strict=True):
+        for _ in range(6):
+            if measure_jump(one, other) < 0.03:
                 break
             middle = 0.5 * (left + right)
             between = find(middle)
@@ -329,9 +310,7 @@ def test_effort_and_likelihood_have_no_jumps(name):
                 right, other = middle, between
             else:
                 left, one = middle, between
-        if measure_jump(one, other) >= LARGEST:
-            jumps.append((left, right, one, other))
-    assert jumps == []
+        assert measure_jump(one, other) < 0.03, (left, right)
 
 
 @pytest.mark.parametrize('yaw', [0.0, 0.3])
@@ -349,12 +328,10 @@ def test_beside_a_box_before_a_hand_at_rest_eta_is_met(gap_mm, radius, yaw):
 @pytest.mark.parametrize('preference', [HARD, QUARTER_SHORTFALL], ids=['hard', 'soft'])
 def test_a_warm_start_finds_what_a_cold_one_finds(seed, preference):
     problem, guess = make_reach(seed, preference)
-    cold = solve_optimal(problem, guess)
-    warm = solve_problem(problem, warm_start(cold, problem), OPTIMAL)
+    cold = solved(problem, guess, 'optimal')
+    warm = solve_problem(problem, warm_start(cold, problem), FocConfig(strategy='optimal'))
     assert warm.status is cold.status
     rule = QUARTER_SHORTFALL if preference is QUARTER_SHORTFALL else SafetyPreference(1.0, 3.0)
-    losses = [
-        rule.compute_loss(each.effort, min(each.safety_factor, problem.wanted_k), problem.wanted_k) for each in (cold, warm)
-    ]
-    assert losses[0] == pytest.approx(losses[1], abs=1e-6 if preference is HARD else 1e-4)
+    exact = 1e-6 if preference is HARD else 1e-4
+    assert find_loss(cold, problem, rule) == pytest.approx(find_loss(warm, problem, rule), abs=exact)
     assert warm.qp_solves <= 4

@@ -25,7 +25,6 @@ from foc_ros.core.types import NANOSECONDS, HandSample, HandState
 
 CONFIG = replace_values(Config(), {'foc.steps': 20})
 GOALS = np.array([[0.3, 0.0]])
-MOVING = np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
 STEP_NS = 20_000_000
 
 
@@ -68,26 +67,26 @@ def test_no_class_is_gone_for_a_moment_while_obstacles_are_passed_on_the_way_to_
         tracks = Tracks(tuple(found), absent, next_number=max(last) + 1)
 
 
-def predict_at(tick, y, tracks, config=CONFIG, goals=GOALS, radius=0.02):
-    stamp_ns = STEP_NS * tick
-    hand = HandState(stamp_ns, MOVING, np.zeros((6, 6)), onset_ns=stamp_ns, onset_position=np.zeros(2))
-    return predict(config, hand, make_obstacles([[0.15, y]], radius, 0.001), goals, tracks)
+def predict_at(tick, y, tracks):
+    stamp_ns, mean = STEP_NS * tick, np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
+    hand = HandState(stamp_ns, mean, np.zeros((6, 6)), onset_ns=stamp_ns, onset_position=np.zeros(2))
+    return predict(CONFIG, hand, make_obstacles([[0.15, y]], 0.02, 0.001), GOALS, tracks)
 
 
-def find_likelihoods(prediction):
-    return {each.label: each.likelihood for each in prediction.candidates}
+def find_shares(prediction):
+    return {each.label: each.likelihood for each in prediction.candidates_with_likelihood}
 
 
 def test_no_likelihood_changes_by_one_in_less_than_the_stated_time():
     """After a step of the scene, likelihoods go straight to the new ones, and reach them when the largest change may have."""
-    first, after = (find_likelihoods(predict_at(0, y, NO_TRACKS)[0]) for y in (-0.015, 0.015))
+    first, after = (find_shares(predict_at(0, y, NO_TRACKS)[0]) for y in (-0.015, 0.015))
     largest = max(abs(first[label] - after[label]) for label in first)
     part = STEP_NS / NANOSECONDS / FULL_CHANGE_S
     assert largest > 2.0 * part, 'the scene is no test'
     _, tracks = predict_at(0, -0.015, NO_TRACKS)
     for tick in range(1, 8):
         prediction, tracks = predict_at(tick, 0.015, tracks)
-        found, gain = find_likelihoods(prediction), min(1.0, tick * part / largest)
+        found, gain = find_shares(prediction), min(1.0, tick * part / largest)
         assert sum(found.values()) + prediction.other == pytest.approx(1.0)
         for label, share in found.items():
             assert share == pytest.approx((1.0 - gain) * first[label] + gain * after[label], abs=5e-3)
@@ -129,12 +128,10 @@ def test_what_a_class_had_that_is_gone_is_unknown_until_the_others_have_won_it()
 
 def reaching(x, tracks):
     """Predict for a hand at (x, 0) that moves, among two obstacles of which it passes the first at x = 0.1."""
-    obstacles = make_obstacles([[0.1, 0.04], [0.2, -0.01]], 0.02, 0.001)
-    state = None
+    obstacles, state = make_obstacles([[0.1, 0.04], [0.2, -0.01]], 0.02, 0.001), None
     for tick in range(40):
-        place = np.array([x - 0.004 * (39 - tick), 0.0])
         stamp_ns = 1_000_000_000 + round(x / 0.4 * 1e9) + 10_000_000 * tick
-        state = update(state, HandSample(stamp_ns, place), CONFIG.estimator).state
+        state = update(state, HandSample(stamp_ns, np.array([x - 0.004 * (39 - tick), 0.0])), CONFIG.estimator).state
     return predict(CONFIG, state, obstacles, GOALS, tracks)
 
 
@@ -235,10 +232,6 @@ def predicted(tick, memory, deadline=NEVER, obstacles=TWO_CIRCLES):
     return predict(CONFIG, HANDS[tick], obstacles, GOALS, memory, deadline=deadline)
 
 
-def find_shares(prediction):
-    return {each.label: each.likelihood for each in prediction.candidates_with_likelihood}
-
-
 def test_a_budget_that_is_not_reached_changes_nothing():
     (free, memory), (ample, other) = predicted(0, NO_TRACKS), predicted(0, NO_TRACKS, Deadline(60.0))
     for one, two in ((free, ample), (predicted(1, memory)[0], predicted(1, other, Deadline(60.0))[0])):
@@ -248,20 +241,14 @@ def test_a_budget_that_is_not_reached_changes_nothing():
             np.testing.assert_array_equal(a.solution.mean, b.solution.mean)
 
 
-@pytest.mark.parametrize('name', SCENES)
-def test_a_deadline_that_has_passed_leaves_an_estimate_for_every_class(name):
-    late, _ = predicted(0, NO_TRACKS, Counted(0), SCENES[name])
-    final, _ = predicted(0, NO_TRACKS, obstacles=SCENES[name])
-    shares, expected = find_shares(late), find_shares(final)
-    assert shares.keys() == expected.keys()
+def check_estimates(late):
+    """Check a prediction for which there was no time at all."""
     for each in late.candidates:
         unsettled = each.status in (Status.DEADLINE, Status.ESTIMATED)
         assert unsettled or each.solution.safety_factor >= 3.0 - 1e-4, 'solved at once'
         assert each.likelihood > 0.0
         assert each.status is Status.SOLVED or 'estimated' in each.solution.message
         assert np.isfinite(each.cost)
-    for label, share in shares.items():
-        assert share == pytest.approx(expected[label], abs=0.4)
     assert late.notes['unfinished'] == sum(each.status is Status.DEADLINE for each in late.candidates)
 
 
@@ -274,8 +261,9 @@ def test_every_class_has_a_likelihood_whenever_the_time_ends(name):
         shares = find_shares(late)
         assert shares.keys() == expected.keys()
         assert sum(shares.values()) + late.unknown + late.other == pytest.approx(1.0)
-        if steps >= 4:
-            assert shares == pytest.approx(expected, abs=0.2)
+        assert shares == pytest.approx(expected, abs=0.4 if steps < 4 else 0.2)
+        if steps == 0:
+            check_estimates(late)
         if not late.notes.get('unfinished'):
             assert shares == pytest.approx(expected, abs=1e-9)
             break
@@ -312,34 +300,23 @@ def test_a_strategy_stops_at_its_deadline_with_the_best_so_far(strategy):
     np.testing.assert_array_equal(ample.mean, free.mean)
 
 
-PERIOD_NS = 10_000_000
 TICKS = {'optimal': 1000, 'lv': 120, 'hc': 120}
 """Ten seconds of the default strategy, and fewer of those that seek a point of a curve, which take several times as long."""
-NOISE = 0.001
-
-
-def predictions(count, **settings):
-    """Yield predictions at 100 Hz for a hand at rest before a circle on its straight path, with 1 mm of noise on both."""
-    config = replace_values(Config(), {'rate_hz': 100.0, 'foc.steps': 20, **settings})
-    pipeline, rng = Pipeline(config), np.random.default_rng(11)
-    pipeline.set_goals(np.array([[0.3, 0.0]]), 'world')
-    for tick in range(count):
-        stamp_ns = 1_000_000_000 + tick * PERIOD_NS
-        centre = np.array([[0.15, 0.0]]) + rng.normal(0.0, NOISE, 2)
-        pipeline.set_obstacles('cloud', make_obstacles(centre, 0.03, 0.001), stamp_ns, 'world')
-        pipeline.add_hand_sample(HandSample(stamp_ns, rng.normal(0.0, NOISE, 2), 0.0, 'world'))
-        prediction = pipeline.predict()
-        assert prediction is not None, pipeline.last_refusal
-        yield prediction
-
-
-def changes(values):
-    return sum(a != b for a, b in pairwise(values))
 
 
 @pytest.mark.parametrize('strategy', TICKS)
 def test_the_most_likely_class_of_a_symmetric_obstacle_does_not_flicker(strategy):
-    made = list(predictions(TICKS[strategy], **{'foc.strategy': strategy}))
-    assert len(made) == TICKS[strategy]
-    assert all({outcome.candidate.label for outcome in one.solved_candidates} == {'goal0:+0', 'goal0:-0'} for one in made)
-    assert changes([one.most_likely for one in made]) <= 1
+    """At 100 Hz, for a hand at rest before a circle on its straight path, with 1 mm of noise on both."""
+    config = replace_values(Config(), {'rate_hz': 100.0, 'foc.steps': 20, 'foc.strategy': strategy})
+    pipeline, rng, seen = Pipeline(config), np.random.default_rng(11), []
+    pipeline.set_goals(GOALS, 'world')
+    for tick in range(TICKS[strategy]):
+        stamp_ns = 1_000_000_000 + tick * 10_000_000
+        circle = make_obstacles(rng.normal([[0.15, 0.0]], 0.001), 0.03, 0.001)
+        pipeline.set_obstacles('cloud', circle, stamp_ns, 'world')
+        pipeline.add_hand_sample(HandSample(stamp_ns, rng.normal(0.0, 0.001, 2), 0.0, 'world'))
+        prediction = pipeline.predict()
+        assert prediction is not None, pipeline.last_refusal
+        assert {each.label for each in prediction.solved_candidates} == {'goal0:+0', 'goal0:-0'}
+        seen.append(prediction.most_likely)
+    assert sum(one != other for one, other in pairwise(seen)) <= 1

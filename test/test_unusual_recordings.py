@@ -21,6 +21,7 @@ from foc_ros.io.bags import BagReader
 
 SHORT = messages(seconds=0.3)
 WHOLE = sorted((topic, stamp_ns, bytes(STORE.serialize_cdr(made, made.__msgtype__))) for topic, stamp_ns, made in SHORT)
+SHORT_KINDS = {topic: made.__msgtype__ for topic, _, made in SHORT}
 TOPICS = 'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT'
 MESSAGES = 'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)'
 
@@ -36,9 +37,8 @@ def write_sqlite(file, content=WHOLE, encoding='cdr', rename=str, mode='DELETE')
     database.execute(f'PRAGMA journal_mode={mode}')
     database.execute(f"{TOPICS}, offered_qos_profiles TEXT DEFAULT '')")
     database.execute(MESSAGES)
-    kinds = {topic: made.__msgtype__ for topic, _, made in SHORT}
-    keys = {topic: key for key, topic in enumerate(kinds, 1)}
-    rows = [(key, topic, rename(kinds[topic]), encoding) for topic, key in keys.items()]
+    keys = {topic: key for key, topic in enumerate(SHORT_KINDS, 1)}
+    rows = [(key, topic, rename(SHORT_KINDS[topic]), encoding) for topic, key in keys.items()]
     database.executemany('INSERT INTO topics(id, name, type, serialization_format) VALUES(?, ?, ?, ?)', rows)
     values = [(keys[topic], stamp_ns, raw) for topic, stamp_ns, raw in content]
     database.executemany('INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)', values)
@@ -46,8 +46,27 @@ def write_sqlite(file, content=WHOLE, encoding='cdr', rename=str, mode='DELETE')
     return database
 
 
+def metadata(files, count):
+    return f'rosbag2_bagfile_information:\n  relative_file_paths: [{files}]\n  message_count: {count}\n'
+
+
 def write_metadata(folder, names, count):
     (folder / 'metadata.yaml').write_text(metadata(', '.join(names), count))
+
+
+def write_either(file):
+    file.parent.mkdir(exist_ok=True)
+    if file.suffix == '.mcap':
+        write_mcap(file, SHORT)
+    else:
+        write_sqlite(file).close()
+    return file
+
+
+def change_rows(database, statement, values):
+    database.executemany(statement, values)
+    database.commit()
+    database.close()
 
 
 @pytest.mark.parametrize('share', [1.0, 0.5])
@@ -106,10 +125,6 @@ def test_files_and_messages_may_be_compressed(tmp_path, kind, is_folder):
     assert read(tmp_path / 'single.db3') == WHOLE
 
 
-def metadata(files, count):
-    return f'rosbag2_bagfile_information:\n  relative_file_paths: [{files}]\n  message_count: {count}\n'
-
-
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
@@ -144,16 +159,6 @@ def test_a_missing_part_of_a_split_recording_is_named(tmp_path, lost, has_metada
         list(BagRecording('split', tmp_path).items())
 
 
-def write_either(file):
-    """Write an MCAP or an SQLite file."""
-    file.parent.mkdir(exist_ok=True)
-    if file.suffix == '.mcap':
-        write_mcap(file, SHORT)
-    else:
-        write_sqlite(file).close()
-    return file
-
-
 @pytest.mark.parametrize('name', ['a%20b', 'a?mode=rw', "it's", 'été 手', '-x', 'a\nb'])
 @pytest.mark.parametrize('kind', ['.mcap', '.db3'])
 def test_a_path_opens_the_file_that_it_names(tmp_path, name, kind):
@@ -174,19 +179,12 @@ def test_a_message_that_cannot_be_decoded_is_counted_and_the_rest_is_replayed(tm
     assert f'{topic[1:]}_invalid 1' in out and '1 of ' in err and f'a serialized {SHORT_KINDS[topic]}' in err
 
 
-SHORT_KINDS = {topic: made.__msgtype__ for topic, _, made in SHORT}
-
-
-DDS = re.compile(r'(\w+)/msg/(\w+)')
-
-
 @pytest.mark.parametrize('form', [r'\1/\2', r'\1::msg::\2', r'\1::msg::dds_::\2_'])
 def test_a_type_name_may_be_that_of_older_recorders(tmp_path, form):
-    rename = partial(DDS.sub, form)
+    rename = partial(re.sub, r'(\w+)/msg/(\w+)', form)
     write_sqlite(tmp_path / 'one.db3', rename=rename).close()
     assert read(tmp_path / 'one.db3') == WHOLE
-    renamed = {made.__msgtype__: rename(made.__msgtype__) for _, _, made in SHORT}
-    write_mcap(tmp_path / 'one.mcap', SHORT, kinds=renamed)
+    write_mcap(tmp_path / 'one.mcap', SHORT, kinds={kind: rename(kind) for kind in SHORT_KINDS.values()})
     assert read(tmp_path / 'one.mcap') == WHOLE
 
 
@@ -216,11 +214,8 @@ def test_definitions_may_be_those_of_another_system(tmp_path, change, is_told):
     """With the line ends of Windows, without those of other types, empty, or such that they cannot be parsed."""
     database = write_sqlite(tmp_path / 'one.db3')
     database.execute('CREATE TABLE message_definitions(topic_type TEXT, encoding TEXT, encoded_message_definition TEXT)')
-    for kind in SHORT_KINDS.values():
-        text = change(STORE.generate_msgdef(kind, ros_version=2)[0])
-        database.execute('INSERT INTO message_definitions VALUES(?, ?, ?)', (kind, 'ros2msg', text))
-    database.commit()
-    database.close()
+    texts = {kind: change(STORE.generate_msgdef(kind, ros_version=2)[0]) for kind in SHORT_KINDS.values()}
+    change_rows(database, "INSERT INTO message_definitions VALUES(?, 'ros2msg', ?)", list(texts.items()))
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter('always')
         with BagReader(tmp_path / 'one.db3') as reader:
@@ -232,9 +227,8 @@ def test_a_file_name_need_not_be_text(tmp_path, capsys):
     """As a name in Latin-1 that was written by another system."""
     file = tmp_path / os.fsdecode(b'caf\xe9.db3')
     write_sqlite(file).close()
-    assert (
-        main(['replay', str(file), '--report', str(tmp_path / 'report'), '--output', str(tmp_path / os.fsdecode(b'\xe9'))]) == 0
-    )
+    report, output = str(tmp_path / 'report'), str(tmp_path / os.fsdecode(b'\xe9'))
+    assert main(['replay', str(file), '--report', report, '--output', output]) == 0
     assert capsys.readouterr().err == ''
     assert 'caf?.db3' in (tmp_path / 'report' / 'index.html').read_text('utf-8')
 
@@ -247,10 +241,7 @@ def test_a_bag_of_ros_1_is_named(tmp_path):
 
 @pytest.mark.parametrize('time', [None, 'noon', 0.5])
 def test_a_message_without_a_time_is_named(tmp_path, capsys, time):
-    database = write_sqlite(tmp_path / 'one.db3')
-    database.execute('UPDATE messages SET timestamp = ? WHERE id = 4', (time,))
-    database.commit()
-    database.close()
+    change_rows(write_sqlite(tmp_path / 'one.db3'), 'UPDATE messages SET timestamp = ? WHERE id = 4', [(time,)])
     assert main(['replay', str(tmp_path / 'one.db3')]) == 2
     assert capsys.readouterr().err.endswith(f'damaged: 1 of its {len(WHOLE)} messages have no time\n')
 

@@ -18,7 +18,9 @@ FOLDER = Path(__file__).resolve().parent
 LONG = (
     # studies of the solver over many scenes
     'test_tracks.py::test_*symmetric_obstacle*',
-    'test_guarantee.py::*',
+    'test_shapes_in_ocp.py::test_what_is_solved_*',
+    'test_shapes_in_ocp.py::test_a_mean_that_only_just_*',
+    'test_shapes_in_ocp.py::test_with_the_risk_*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # a fit and its comparison or without obstacles, the paper's studies and long reports
     'test_play_session.py::test_a_fit_and_its_comparison',
@@ -71,8 +73,8 @@ PROCESS = (
     'test_strategies.py::*',
     'test_solution_numbers.py::test_nothing_is_below_*',
     'test_solution_numbers.py::test_an_infeasible_*',
-    'test_homotopy_shapes.py::test_brute_force_finds_*',
-    'test_homotopy_shapes.py::test_candidates_stay_*',
+    'test_homotopy.py::test_brute_force_finds_*',
+    'test_homotopy.py::test_candidates_stay_*',
     'test_extensions.py::test_a_qp_backend_*',
     'test_tracks.py::test_*_class_*',
     'test_tracks.py::test_a_strategy_stops_*',
