@@ -97,20 +97,39 @@ def test_every_dead_man_condition_releases_the_hand_within_the_ramp(case, settin
     assert output.authority == 0.0
 
 
-@pytest.mark.parametrize('case', DEAD_MAN)
-def test_a_blended_command_does_not_jump_when_the_hand_is_released(case):
-    settings, command = GuidanceConfig(), np.array([0.1, 0.0])
-    state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0)))
-    changes, _ = DEAD_MAN[case]
-    before = (1.0 - state.authority) * command + state.authority * np.hypot(*command) * state.heading
-    assert state.authority * np.hypot(*state.heading) > 0.1, 'guidance has no share'
-    for _ in range(round(settings.ramp_s / PERIOD) + 1):
+def check_blended_commands(settings, state, given, before, changes):
+    """Update until the share of guidance has changed, check that the command does not jump, and return the last one."""
+    for _ in range(round(2.0 * settings.ramp_s / PERIOD) + 1):
         given = replace(given, t=given.t + PERIOD, **changes)
         output, state = guide(Config(guidance=settings), state, given)
-        blended = output.blend_command(command)
-        assert np.hypot(*(blended - before)) <= 2.0 * np.hypot(*command) * PERIOD / settings.ramp_s * (1 + 1e-9)
+        blended = output.blend_command(COMMAND)
+        assert np.hypot(*(blended - before)) <= 2.0 * np.hypot(*COMMAND) * PERIOD / settings.ramp_s * (1 + 1e-9)
         before = blended
-    assert before.tolist() == command.tolist()
+    return before
+
+
+COMMAND = np.array([0.1, 0.0])
+
+
+@pytest.mark.parametrize('case', DEAD_MAN)
+def test_a_blended_command_does_not_jump_when_the_hand_is_released(case):
+    settings = GuidanceConfig()
+    state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0)))
+    before = guide(Config(guidance=settings), state, given)[0].blend_command(COMMAND)
+    assert np.hypot(*(before - COMMAND)) > 0.01, 'guidance has no share'
+    after = check_blended_commands(settings, state, given, before, DEAD_MAN[case][0])
+    assert after.tolist() == COMMAND.tolist()
+
+
+def test_a_blended_command_does_not_jump_when_the_path_turns_round():
+    settings = GuidanceConfig()
+    state, given = build_guiding_state(Config(guidance=replace(settings, k_max=5000.0, tank=10.0, clearance=0.0)))
+    before = guide(Config(guidance=settings), state, given)[0].blend_command(COMMAND)
+    candidate = given.prediction.candidates[0]
+    mean = candidate.mean * np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
+    turned = replace(given.prediction, candidates=(replace(candidate, solution=replace(candidate.solution, mean=mean)),))
+    after = check_blended_commands(settings, state, given, before, {'prediction': turned})
+    assert before + after == pytest.approx(COMMAND, abs=1e-3) and np.hypot(*(after - before)) > 0.08
 
 
 SAMPLES, PERIOD = 12, 0.005

@@ -148,28 +148,30 @@ class Followed(Record):
 class GuidanceState(Record):
     """What the next update needs of this one.
 
-    energy: content of the tank [J], None before the first update; t, position (2,), force (2,), authority and heading (2,): of
-    the last update.
+    energy: content of the tank [J], None before the first update; t, position (2,), force (2,): of the last update; share (2,):
+    its authority in the direction of the paths.
     """
 
     energy: float | None = None
     t: float = 0.0
     position: Array = field(default_factory=lambda: np.zeros(2))
     force: Array = field(default_factory=lambda: np.zeros(2))
-    authority: float = 0.0
-    heading: Array = field(default_factory=lambda: np.zeros(2))
+    share: Array = field(default_factory=lambda: np.zeros(2))
     followed: Followed = field(default_factory=Followed)
 
 
 @dataclass(frozen=True, eq=False)
 class _Demand(Record):
-    """What the candidates ask for, before the limits: force, stiffness, agreement, authority, heading."""
+    """What the candidates ask for, before the limits: force, stiffness, agreement.
+
+    share (2,): the authority, in the direction of the paths; line (2,): from the hand along them [m], None without paths.
+    """
 
     force: Array = field(default_factory=lambda: np.zeros(2))
     stiffness: Array = field(default_factory=lambda: np.zeros((2, 2)))
     agreement: float = 0.0
-    authority: float = 0.0
-    heading: Array = field(default_factory=lambda: np.zeros(2))
+    share: Array = field(default_factory=lambda: np.zeros(2))
+    line: Array | None = None
 
 
 def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[GuidanceOutput, GuidanceState]:
@@ -190,18 +192,18 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
         progress = advance_progress(followed.paths, followed.progress, given.position, given.velocity, dt)
         followed = replace(followed, progress=progress)
         demand = _compute_demand(settings, followed, seen, given)
-    target, heading = demand.force, demand.heading
-    if status is not GuidanceStatus.GUIDING:  # a command in which the share of guidance falls to zero keeps its direction
-        target, heading = _release(settings, state.force, dt), turn_along(seen, HEADING_M * state.heading, state.heading)
+    target = demand.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
     longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
     force = step_force(state.force, target, settings.slew * min(dt, longest), partial(_find_bound, settings, seen, energy))
-    change = dt / settings.ramp_s
-    authority = state.authority + min(max(demand.authority - state.authority, -change), change)
+    # the command changes by no more than its size within `ramp_s`, whether the authority or the direction changes
+    share = state.share + shorten(demand.share - state.share, dt / settings.ramp_s)
+    authority, direction = float(np.hypot(*share)), normalize(share)
+    heading = turn_along(seen, HEADING_M * direction if demand.line is None else demand.line, direction)
     reference = given.position + find_deflection(demand.stiffness, force)
     output = GuidanceOutput(
         given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, heading, energy
     )
-    return output, GuidanceState(energy, given.t, given.position, force, authority, heading, followed)
+    return output, GuidanceState(energy, given.t, given.position, force, share, followed)
 
 
 def find_status(settings: GuidanceConfig, given: GuidanceInput) -> GuidanceStatus:
@@ -271,8 +273,8 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
         turn_along(seen, weights @ errors, force),
         need.share * agreement * np.einsum('c,cab->ab', paths.likelihoods, stiffness),
         agreement,
-        settings.authority * min(float(np.hypot(*heading)), 1.0),
-        turn_along(seen, weights @ lines, normalize(heading)),
+        settings.authority * shorten(heading, 1.0),
+        weights @ lines,
     )
 
 
