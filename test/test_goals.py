@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals that are obstacles, that nobody announced, and that were reached before."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from reach_helpers import make_predictor
@@ -101,6 +103,20 @@ def test_the_predictor_takes_the_object_of_a_goal():
     for given, label in ((None, 'goal0:+cup'), ('cup', 'goal0:')):
         goal, cup = foc_ros.Goal((0.25, 0.001), object=given), foc_ros.Circle((0.2, 0.0), 0.03, name='cup')
         assert label in [each.label for each in make_predictor(Config(budget_s=0.0), goal, cup).update(0.0, (0.0, 0.0))]
+
+
+def test_a_goal_whose_object_is_missing_is_noted_by_predictors_and_refused_elsewhere():
+    cup, goal, predictor = (
+        foc_ros.Circle((0.15, 0.0), 0.03, name='cup'),
+        foc_ros.Goal((0.3, 0.0), object='jug'),
+        foc_ros.Predictor(),
+    )
+    predictor.set_goals(goal)
+    for name, missing in (('cup', 1), ('jug', 0)):
+        predictor.set_obstacles(replace(cup, name=name))
+        assert predictor.update(float(missing == 0), (0.0, 0.0)).notes.get('object_missing', 0) == missing
+    with pytest.raises(foc_ros.InputError, match=r"^goals\[0\]\.object: expected the id of an obstacle, got 'jug'"):
+        foc_ros.solve((0.0, 0.0), goal, cup)
 
 
 def test_likelihoods_do_not_depend_on_the_side_on_which_a_path_ends_in_its_goal():

@@ -114,6 +114,7 @@ def predict(
         'merged': len(answered) - len(ranked),
         'culled': len(scene.blocking) - len(scene.near),
         'cleared_by_height': int(scene.cleared.sum()),
+        'object_missing': sum(name is not None and name not in obstacles.ids for name in objects),
         'recalled': len(candidates) - len(found.candidates),
         'kept': sum(each.age_s > 0.0 for each in predicted),
         'unfinished': sum(each.status is Status.DEADLINE for each in predicted),
