@@ -43,7 +43,6 @@ SETTINGS = {
     (HLP, 'free_hand.yaml'): load_parameter_file(EXAMPLES / 'free_hand.yaml').with_values({'rate_hz': 4.0}),
 }
 PICK = Config().with_values({'rate_hz': 10.0})
-GOAL_SETTINGS = {'defaults, past goals not counted': PICK.with_values({'likelihood.past_goals': 0.0}), 'defaults': PICK}
 OTHER_SCORES = {'area_under_curve_half_way': 2, 'calibration_error': 3, 'loss': 3}
 """Scores of the share of another goal, with their digits."""
 POINTS = np.arange(1, 10)
@@ -131,7 +130,7 @@ def main() -> None:
     parser.add_argument('--every', type=int, default=1, help='use every n-th recording of a person only')
     parser.add_argument('--workers', type=int, default=len(os.sched_getaffinity(0)), metavar='N', help='worker processes')
     arguments = parser.parse_args()
-    ways, goals, positions = [], [], []
+    ways, positions = [], []
     with open_workers(arguments.workers):
         for (data, setting), config in SETTINGS.items():
             items = {person: found[:: arguments.every] for person, found in find_persons(SHARED / data).items()}
@@ -139,18 +138,17 @@ def main() -> None:
             ways.append((data, setting, *format_ways(recordings)))
             positions.append((data, setting, *format_positions(recordings)))
         items = {person: found[:: arguments.every] for person, found in find_persons(SHARED / PICKS).items()}
-        for setting, config in GOAL_SETTINGS.items():
-            recordings = observe_persons(items, config, f'{PICKS}: {setting}')
-            goals.append((setting, *format_goals(recordings)))
+        recordings = observe_persons(items, PICK, f'{PICKS}: defaults')
+        goals = format_goals(recordings)
         without = {person: [*leave_goals_out({each.name: each for each in found}).values()] for person, found in items.items()}
-        left_out = observe_persons(without, config, f'{PICKS}: without the goals that were reached')
-        others = format_other(recordings, left_out, config.likelihood.other_goal)
+        left_out = observe_persons(without, PICK, f'{PICKS}: without the goals that were reached')
+        others = format_other(recordings, left_out, PICK.likelihood.other_goal)
     heads = 'gain [nat]', 'right [%]', 'ECE', 'worst tenth [nat]'
     measures = 'error [mm]', 'NLPD', 'NLPD, Singer', 'in 50 % region [%]', 'in 90 % region [%]'
     asked = 'gain [nat]', 'worst point [nat]', 'right [%]', 'right half way [%]', 'ECE'
     tables = {
         'ways': (('data', 'parameters', *heads), ways),
-        'goals': (('parameters', *asked), goals),
+        'goals': (asked, [goals]),
         'other': (('area half way', 'calibration error', 'loss [nat]'), [others]),
         'positions': (('data', 'parameters', *measures), positions),
     }
