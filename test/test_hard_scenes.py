@@ -189,3 +189,11 @@ def test_a_class_that_the_search_misses_keeps_its_answer_for_a_moment():
     lost = {each.label for each in whole.candidates} - {whole.most_likely}
     for tick, found in enumerate(ages, 1):
         assert found == ({label: pytest.approx(0.02 * tick) for label in lost} if tick <= 10 else {})
+
+
+@pytest.mark.parametrize('aside', [-0.03, 0.0, 0.06])
+def test_a_guess_is_in_the_class_in_which_it_passes_a_moving_obstacle_in_time(aside):
+    """The post is on the left of the straight line now, and on the right of it when the hand comes."""
+    post = foc_ros.Circle((0.15, 0.12), 0.03, velocity=(0.0, -0.36), name='post')
+    solution = foc_ros.solve((0.0, 0.0), (0.3, 0.0), post, duration_s=1.0, guess=[(0.15, aside)])
+    assert (solution.status.value, solution.label) == ('solved', 'goal0:+post')

@@ -57,7 +57,7 @@ def solve_candidates(
     before = [None] * len(candidates) if earlier is None else earlier
     starts = _begin(candidates, problems, before)
     solutions = solve_problems(problems, starts, settings, deadline)
-    sides = _find_all_sides([each.path for each in solutions], problems)
+    sides = find_all_sides([each.path for each in solutions], problems)
     return [_classify(*each) for each in zip(candidates, solutions, sides, strict=True)]
 
 
@@ -67,14 +67,14 @@ def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier
         cold_start(each.guess) if solution is None else warm_start(solution, problem)
         for each, problem, solution in zip(candidates, problems, earlier, strict=True)
     ]
-    sides = _find_all_sides([each.path for each in starts], problems)
+    sides = find_all_sides([each.path for each in starts], problems)
     return [
         start if each.contains(found) else cold_start(each.guess)
         for each, start, found in zip(candidates, starts, sides, strict=True)
     ]
 
 
-def _find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list[dict[str, int]]:
+def find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list[dict[str, int]]:
     """Return the sides on which the path of each problem passes its obstacles, for all paths of a problem at once."""
     found: dict[int, dict[str, int]] = {}
     for problem in {id(each): each for each in problems}.values():

@@ -7,11 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from .candidates import rank_candidates, solve_candidates
-from .classes import Turn, find_path_sides, search
+from .candidates import find_all_sides, rank_candidates, solve_candidates
+from .classes import Turn, search
 from .classes.library import GuessTiming
 from .hand.duration import is_passing
-from .obstacle_table import Obstacles
 from .ocp.problem import Problem
 from .plant.models import make_plant_model
 from .predict import build_problem, take_in_the_way
@@ -46,8 +45,7 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
     """
     config, avoided = scene.config, scene.avoided
     if scene.guess is not None:
-        in_the_way = take_in_the_way(avoided, scene.goals, [scene.duration_s], scene.goal_objects)[0]
-        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, in_the_way),)
+        candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, problems[0]),)
     else:
         timing, turn = GuessTiming([scene.duration_s] * len(scene.goals), config.foc.steps), Turn(objects=scene.goal_objects)
         candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, *timing, (), turn).candidates
@@ -56,6 +54,6 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
     return [each.with_goal_name(scene.goal_names[each.candidate.goal]) for each in ranked] if scene.goal_names else ranked
 
 
-def _make_guessed_candidate(guess: Array, obstacles: Obstacles) -> Candidate:
-    sides = tuple(sorted(find_path_sides(guess, obstacles).items()))
+def _make_guessed_candidate(guess: Array, problem: Problem) -> Candidate:
+    sides = tuple(sorted(find_all_sides([guess], [problem])[0].items()))
     return Candidate(label_class(0, sides), 0, sides, guess, 0.0)
