@@ -10,8 +10,8 @@ goals are therefore compared for the common time
 
 with the distance D_i of the goal: the last term is what a hand half way of a minimum-jerk movement has left, and the first one
 what a hand that is at one goal takes to go to another. M_i(T) is the least integral of squared jerk that brings the hand to rest
-at goal i at T. By these alone, near goals would seem likelier than people find them, who take more time for farther ones, and
-obstacles would count on the way only. With the cost J_i of the best candidate to goal i, in the time T_i, and m = `MOVEMENT`,
+at goal i at T. People take more time for farther goals: by M_i(T) alone, near goals would seem too likely. Obstacles would not
+count in the choice of the goal. With the cost J_i of the best candidate to goal i, in the time T_i, and m = `MOVEMENT`,
 
     goal i costs M_i(T)^(1 - m) J_i^m.
 

@@ -18,7 +18,7 @@ prediction, l_i before (0 for a new class), and the time h between both,
     l_i <- ((1 - g) l_i + g p_i) / sum,   g = min(1, h / (`FULL_CHANGE_S` max_i |p_i - l_i|)).
 
 Small changes are not delayed. With a new goal all likelihoods are those of this prediction, because a goal of which nothing was
-known is not unlikely. What a class had that no candidate continues was not won by the others: it counts as unknown before.
+known is not unlikely. The likelihood of a class that no candidate continues counts as unknown in l_i.
 """
 
 from __future__ import annotations
@@ -192,10 +192,10 @@ class Tracks(Record):
         return ranked + [each for each in predicted if not each.has_likelihood], Rest(factor * unknown, factor * other)
 
     def _hand_down(self, taking_part: Sequence[PredictedCandidate]) -> tuple[dict[int, float], float]:
-        """Return the likelihoods before by the numbers of the tracks, and what belongs to tracks that no candidate continues.
+        """Return the last likelihood of each track, by its number, and the sum of those that no candidate continues.
 
-        Where two classes have become one, because the obstacle that told them apart is no more between their paths, their
-        likelihoods are added.
+        Two classes become one when the obstacle that told them apart is no longer between their paths. Their likelihoods are
+        then added.
         """
         known, lost = (*self.followed, *self.absent), 0.0
         before, present = {each.number: each.likelihood for each in known}, {each.way for each in taking_part}

@@ -98,7 +98,7 @@ def find_decisions(
 ) -> Decisions:
     """Find the decisions of classes that pass obstacles on sides (k, n) and lead to goals (k,), rows of goals (g, 2) [m].
 
-    The side 0, of an obstacle in which a path ends, is neither of the two: to go there is a gap of its own.
+    A path that ends in an obstacle has the side 0 there, which is a gap of its own.
     """
     here, start = hand.mean[:2], hand.mean[:2] if hand.onset_position is None else hand.onset_position
     direction = find_direction(start, goals)

@@ -129,7 +129,8 @@ def find_holders(
 ) -> NDArray[np.bool_]:
     """Tell which of n obstacles are goals (g, 2) [m], (g, n): those that hold a goal, or are named as the object of it.
 
-    times_s: the time to go to each goal [s], after which an obstacle has to hold it, too: one that moves over a goal is not it.
+    times_s: the time to go to each goal [s]. An obstacle has to hold the goal at this time, too: one that only moves over a goal
+    is not the goal.
     """
     is_held: NDArray[np.bool_] = measure_offsets(goals, obstacles)[1] < obstacles.radius
     if len(times_s) and obstacles.velocity.any():
