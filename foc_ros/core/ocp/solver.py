@@ -44,9 +44,10 @@ CLOSE, CLOSE_FOR_NOW = 3e-5, 1e-3
 """Relative excess over the wanted safety factor that is aimed at. With the first number, a step that misses its aim by rounding
 meets the wanted factor. The second one holds where a later prediction goes on: a step may then miss by the error of its QP, and
 is not repeated for that."""
-UNLIKELY, SMALL_PART = 6.0, 0.04
-"""A class can wait for the next prediction if it is less likely than the best one to its goal by more than the first number, as a
-logarithm, and if its QP promises less than the second one as a part of that."""
+UNLIKELY, SMALL_PART = 4.0, 0.04
+"""A class can wait for the next prediction if it stays less likely than the best one to its goal by more than the first number, as
+a logarithm, with all that its QP promises. At a guess, QPs promise too little: the class waits only if that is less than the second
+number as a part of what it is behind."""
 LARGEST_TOLERANCE = 5e-3
 """Gain of its last whole step up to which a class without the wanted eta counts as settled."""
 MOST_TRIALS, SHORTER = 5, 0.35
@@ -141,13 +142,14 @@ class Solver:
                 self._postpone(now)
 
     def _postpone(self, now: Iterates) -> None:
-        """Leave unlikely classes to the next prediction whose QPs promise little of what they lack to the best class.
+        """Leave classes to the next prediction that stay unlikely with all that their QPs promise.
 
         A class whose loss has just risen goes on, because what its QP has promised was not there.
         Where the wanted eta is a condition, every class is solved to its end: whether it meets eta decides, not what it costs.
         """
         behind = self.objective.compare(now.at.loss)
-        is_enough = (behind > UNLIKELY) & (self.objective.beta * now.gain < SMALL_PART * behind) & (now.at.loss < now.bound)
+        enough = np.where(now.is_exact, SMALL_PART * behind, behind - UNLIKELY)
+        is_enough = (behind > UNLIKELY) & (self.objective.beta * now.gain < enough) & (now.at.loss < now.bound)
         now.is_waiting |= ~now.is_done & is_enough & ~self._is_condition
         now.is_done |= now.is_waiting
 
