@@ -26,7 +26,7 @@ from foc_ros.io.bags import BagReader
 from foc_ros.io.topics import TYPES
 from foc_ros.play import jobs, recording
 from foc_ros.play.predictor import Predictor
-from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START
+from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START, view_prediction
 from foc_ros.play.session import Session
 from foc_ros.reporting.encode import LENGTH
 from foc_ros.ros.parameters import dump_parameter_file
@@ -78,7 +78,7 @@ def test_a_blinded_page_learns_nothing_from_what_it_receives(page):
         page.send(TASKS | {'assistance': assistance, 'blinded': True})
         begin = len(page.received)
         page.move(START, 100)
-        page.session._receive(predictions(samples())[0])
+        page.session._receive(view_prediction(predictions(samples())[0]))
         received[assistance] = page.received[begin:]
         page.send({'type': 'stop'})
     assert received['with'] == received['without']

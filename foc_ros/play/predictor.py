@@ -25,10 +25,12 @@ from foc_ros.ros.guidance import GuidanceLoop
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.encode_guidance import Place
 
+from .scene import View, view_prediction
+
 REMEMBERED = 20
 """Number of predictions from which the state is told."""
-Outcome = Prediction | tuple[GuidanceOutput, Place]
-"""A prediction, or guidance and where it holds."""
+Outcome = View | tuple[GuidanceOutput, Place]
+"""A prediction for the page, or guidance and where it holds."""
 Receive = Callable[[Outcome], None]
 
 
@@ -118,7 +120,7 @@ class Predictor:
             self._error = ''
             self._recent.append(prediction)
             self._guidance.note_prediction(prediction, received_s)
-            self._receive(prediction)
+            self._receive(view_prediction(prediction))  # here: two threads that compute at once delay one another
 
     def _note_error(self, error: Exception) -> None:
         self._error = f'internal error: {error}'

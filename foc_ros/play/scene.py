@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,7 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.fields import Fields
 from foc_ros.reporting.encode import encode_candidates, encode_unsolved
-from foc_ros.reporting.views import Slots, list_unsolved
+from foc_ros.reporting.views import build_snapshot, list_unsolved
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
 from foc_ros.ros.messages.types import MessageTypes
 
@@ -144,15 +144,23 @@ def make_random_scene(random: np.random.Generator, goals: Sequence[Place]) -> Pl
     return PlayScene(obstacles=obstacles, goals=list(goals))
 
 
-def view_candidates(snapshot: Prediction, slots: Slots) -> list[dict[str, Any]]:
-    """Return the candidates of a prediction as the page draws them, the most likely one first, those without a likelihood last.
+class View(NamedTuple):
+    """A prediction, as pictures show it, and its candidates as the page draws them: those without a likelihood last."""
 
-    Each has, besides what `reporting.encode` says, its slot, class number (way), goal and likelihood, None where it is not known.
+    prediction: Prediction
+    snapshot: Prediction
+    candidates: list[dict[str, Any]]
+
+
+def view_prediction(prediction: Prediction) -> View:
+    """Return a prediction for the page; raises FocError if it holds a number that is not finite.
+
+    A candidate has, besides what `reporting.encode` says, its class number (way), goal and likelihood, None where it is unknown.
     """
+    snapshot = build_snapshot(prediction)
     shown, lost = snapshot.candidates_with_likelihood, list_unsolved(snapshot)
-    given = zip(shown, slots.assign([each.way for each in shown]), encode_candidates(snapshot), strict=True)
-    views: list[dict[str, Any]] = [
-        {'slot': slot, 'way': each.way, 'likelihood': round(each.likelihood, 4), **encoded} for each, slot, encoded in given
-    ]
-    views += [{'slot': None, 'way': None, 'likelihood': None} | encode_unsolved(snapshot, each) for each in lost]
-    return [view | {'goal': each.candidate.goal} for view, each in zip(views, (*shown, *lost), strict=True)]
+    encoded = [*encode_candidates(snapshot), *(encode_unsolved(snapshot, each) for each in lost)]
+    known = [{'way': each.way, 'likelihood': round(each.likelihood, 4)} for each in shown]
+    unknown = [{'way': None, 'likelihood': None} for _ in lost]
+    parts = zip((*shown, *lost), (*known, *unknown), encoded, strict=True)
+    return View(prediction, snapshot, [first | rest | {'goal': each.candidate.goal} for each, first, rest in parts])

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from itertools import zip_longest
 from pathlib import Path
 from time import monotonic, time_ns
 from typing import Any
@@ -14,10 +15,9 @@ import numpy as np
 
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.core.prediction import Prediction
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND
-from foc_ros.reporting.views import Slots, build_snapshot
+from foc_ros.reporting.views import Slots
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import load_parameter_file
@@ -266,7 +266,7 @@ class Session:
 
     def _receive(self, outcome: Any) -> None:
         """Take a prediction, or guidance and where it holds."""
-        if isinstance(outcome, Prediction):
+        if isinstance(outcome, scene.View):
             self._receive_prediction(outcome)
         else:
             self._record(lambda recording: recording.add_guidance(*outcome))
@@ -275,14 +275,16 @@ class Session:
                 self._force_s = now_s
                 self._say('force', force=force.round(4).tolist())
 
-    def _receive_prediction(self, prediction: Prediction) -> None:
-        stamp_ns, snapshot = prediction.stamp_ns, build_snapshot(prediction)
+    def _receive_prediction(self, view: scene.View) -> None:
+        snapshot = view.snapshot
+        stamp_ns = snapshot.stamp_ns
         hand = next((hand for stamp, hand in reversed(self._hands) if stamp == stamp_ns), None)
-        self._record(lambda recording: recording.add_prediction(prediction, snapshot))
+        self._record(lambda recording: recording.add_prediction(view.prediction, snapshot))
         if self._tasks is not None and snapshot.most_likely is not None:
             self._tasks.note_most_likely(stamp_ns * 1e-9, snapshot.candidates[0].way)
         if hand is not None and not self._is_blind:
-            candidates = scene.view_candidates(snapshot, self._slots)
+            slots = self._slots.assign([each.way for each in snapshot.candidates_with_likelihood])
+            candidates = [each | {'slot': slot} for each, slot in zip_longest(view.candidates, slots)]
             shares = {'unknown': round(snapshot.unknown, 4), 'other': round(snapshot.other, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)
 

@@ -45,9 +45,9 @@ CLOSE, CLOSE_FOR_NOW = 3e-5, 1e-3
 meets the wanted factor. The second one holds where a later prediction goes on: a step may then miss by the error of its QP, and
 is not repeated for that."""
 UNLIKELY, SMALL_PART = 4.0, 0.04
-"""A class can wait for the next prediction if it stays less likely than the best one to its goal by more than the first number, as
-a logarithm, with all that its QP promises. At a guess, QPs promise too little: the class waits only if that is less than the second
-number as a part of what it is behind."""
+"""A class can wait for the next prediction if it stays less likely than the best one to its goal by more than the first number,
+as a logarithm, with all that its QP promises. At a guess QPs promise too little: there it waits only if that is less than the
+second number as a part of what it is behind."""
 LARGEST_TOLERANCE = 5e-3
 """Gain of its last whole step up to which a class without the wanted eta counts as settled."""
 MOST_TRIALS, SHORTER = 5, 0.35
