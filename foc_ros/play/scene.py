@@ -159,8 +159,10 @@ def view_prediction(prediction: Prediction) -> View:
     """
     snapshot = build_snapshot(prediction)
     shown, lost = snapshot.candidates_with_likelihood, list_unsolved(snapshot)
-    encoded = [*encode_candidates(snapshot), *(encode_unsolved(snapshot, each) for each in lost)]
-    known = [{'way': each.way, 'likelihood': round(each.likelihood, 4)} for each in shown]
-    unknown = [{'way': None, 'likelihood': None} for _ in lost]
-    parts = zip((*shown, *lost), (*known, *unknown), encoded, strict=True)
-    return View(prediction, snapshot, [first | rest | {'goal': each.candidate.goal} for each, first, rest in parts])
+    views: list[dict[str, Any]] = [
+        {'way': each.way, 'goal': each.candidate.goal, 'likelihood': round(each.likelihood, 4), **encoded}
+        for each, encoded in zip(shown, encode_candidates(snapshot), strict=True)
+    ]
+    no_likelihood = {'way': None, 'likelihood': None}
+    views += [{'goal': each.candidate.goal, **no_likelihood, **encode_unsolved(snapshot, each)} for each in lost]
+    return View(prediction, snapshot, views)
