@@ -313,6 +313,13 @@ def test_a_movement_that_ends_far_from_all_goals_says_nothing_and_a_reset_forget
     assert session.share(1) == pytest.approx(before)
 
 
+def test_a_stop_on_the_way_is_no_reach_although_it_has_covered_half_of_it():
+    session = Session([NEAR, FAR])
+    before = session.share(1)
+    session.reach((0.65 * FAR[0], 0.65 * FAR[1]))
+    assert session.share(1) == pytest.approx(before)
+
+
 def test_reaches_are_expected_to_end_where_the_earlier_ones_did():
     goals = [NEAR, (NEAR[0], NEAR[1] - 0.05)]
     session = Session(goals, **{'likelihood.past_goals': 1e-6})

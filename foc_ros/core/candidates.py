@@ -16,7 +16,8 @@ from .config import FocConfig, LikelihoodConfig
 from .deadline import NEVER, Deadline
 from .likelihood import BETWEEN_OPERATORS, ClassGoals, compute_likelihoods, compute_lookahead_share
 from .obstacle_table import Obstacles
-from .obstacles.clearance import measure_clearance
+from .obstacles.clearance import is_free, measure_clearance
+from .obstacles.risk import centre_trajectories
 from .ocp.problem import Problem
 from .ocp.solve import solve_problems
 from .ocp.start import Start, cold_start, warm_start
@@ -82,6 +83,15 @@ def find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list[
         together = np.stack([paths[row] for row in rows])
         found |= zip(rows, find_sides(together, problem.obstacles, problem.centre_trajectories), strict=True)
     return [found[row] for row in range(len(problems))]
+
+
+def is_there(candidate: Candidate, solution: Solution, obstacles: Obstacles) -> bool:
+    """Tell whether an earlier solution is still a path of its class: the obstacles in the name are there, and none blocks it."""
+    if not {name for name, _ in candidate.sides} <= set(obstacles.ids):
+        return False
+    centres = centre_trajectories(obstacles.centre, obstacles.velocity * solution.dt, len(solution.control))
+    sides = find_sides(solution.path[None], obstacles, centres)[0]
+    return candidate.contains(sides) and is_free(solution.path, obstacles, solution.dt)
 
 
 def _classify(candidate: Candidate, solution: Solution, sides: dict[str, int]) -> PredictedCandidate:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import estimate_unfollowed, estimate_unsolved, rank_candidates, solve_candidates, split_unknown
+from .candidates import estimate_unfollowed, estimate_unsolved, is_there, rank_candidates, solve_candidates, split_unknown
 from .classes import Search, Turn, search
 from .classes.library import GuessTiming, recall_demonstrations
 from .config import REFERENCE_STEP_S, Config, EstimatorConfig
@@ -87,9 +87,9 @@ def predict(
     reserve_s = (RESERVE_S + POOLING_S * bool(library.recordings)) * len(candidates)
     resting = known.find_resting(matched, obstacles, stamp_ns)
     solved = _solve(scene, config, candidates, matched, resting, deadline.take_share(SOLVE_SHARE, reserve_s))
-    held = [_hold_answer(*each, scene.hand) for each in zip(solved, matched, strict=True)]
+    held = [_hold_answer(*each, scene) for each in zip(solved, matched, strict=True)]
     absent = known.find_absent(candidates, matched, stamp_ns)
-    held += [each for track in absent if (each := _hold_absent(track, scene.hand)) is not None]
+    held += [each for track in absent if (each := _hold_absent(track, scene)) is not None]
     answered = estimate_unsolved(held, scene.in_the_way)
     others = estimate_unfollowed(found.unfollowed, answered, scene.durations_s)
     compared, ends = [*answered, *others], habits.find_ends(goals)
@@ -108,7 +108,7 @@ def predict(
         rest = Rest((1.0 - other) * unknown, other)
     known_share = 1.0 - sum(rest)
     shared = [replace(each, likelihood=known_share * each.likelihood) for each in pooled]
-    limited, rest = known.limit_changes(shared, rest, stamp_ns)
+    limited, rest = known.limit_changes(shared, rest, stamp_ns, absent)
     predicted, best = scene.heights.add_to(limited), known.choose_most_likely(limited)
     counts = {
         'merged': len(answered) - len(ranked),
@@ -215,7 +215,7 @@ def _solve(
     The solutions have predictive covariances. resting: numbers of tracks of which the rest of their last solution is taken.
     """
     found = [
-        _hold_track(track, candidate, scene.hand, 'unlikely, and solved again soon') if track.number in resting else None
+        _hold_track(track, candidate, scene, 'unlikely, and solved again soon') if track.number in resting else None
         for candidate, track in zip(candidates, matched, strict=True)
     ]
     open_rows = [row for row, each in enumerate(found) if each is None]
@@ -233,25 +233,29 @@ def _solve(
     return [each for each in found if each is not None]
 
 
-def _hold_answer(solved: PredictedCandidate, track: Track, hand: HandState) -> PredictedCandidate:
-    """Return the rest of the last answer of a class that could not be solved, if it is young enough."""
+def _hold_answer(solved: PredictedCandidate, track: Track, scene: _PredictionScene) -> PredictedCandidate:
+    """Return the rest of the last answer of a class that could not be solved, if it still holds."""
     if solved.has_likelihood:
         return solved
-    return _hold_track(track, solved.candidate, hand, solved.solution.message) or solved
+    return _hold_track(track, solved.candidate, scene, solved.solution.message) or solved
 
 
-def _hold_absent(track: Track, hand: HandState) -> PredictedCandidate | None:
-    """Return the rest of the last answer of a class that is no candidate any more, if it is young enough."""
-    return _hold_track(track, track.candidate, hand, 'the class is not followed any more')
+def _hold_absent(track: Track, scene: _PredictionScene) -> PredictedCandidate | None:
+    """Return the rest of the last answer of a class that is no candidate any more, if it still holds."""
+    return _hold_track(track, track.candidate, scene, 'the class is not followed any more')
 
 
-def _hold_track(track: Track, candidate: Candidate, hand: HandState, reason: str) -> PredictedCandidate | None:
-    """Return what remains of the solution of a track, under the name of a candidate; None if it is too old or nothing remains."""
+def _hold_track(track: Track, candidate: Candidate, scene: _PredictionScene, reason: str) -> PredictedCandidate | None:
+    """Return what remains of the solution of a track, under the name of a candidate.
+
+    None if it is too old, if nothing remains, or if the obstacles are not any more where the class and its path need them.
+    """
+    hand, obstacles = scene.hand, scene.in_the_way[candidate.goal]
     if track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):
         return None
     age_s = (hand.stamp_ns - track.solved_ns) / NANOSECONDS
     rest = take_rest(track.solution, age_s, hand.mean[:2], reason)
-    if rest is None:
+    if rest is None or not is_there(candidate, rest, obstacles):
         return None
     return PredictedCandidate(candidate, rest, track.sides, rest.expected_effort * rest.dt, 0.0, age_s, track.number)
 

@@ -28,6 +28,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
@@ -172,14 +173,19 @@ class Tracks(Record):
         )
 
     def limit_changes(
-        self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int
+        self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int, absent: Sequence[Track] = ()
     ) -> tuple[list[PredictedCandidate], Rest]:
-        """Return candidates with likelihoods p_i with the likelihoods l_i, ranked, and what no candidate has likewise."""
+        """Return candidates with likelihoods p_i with the likelihoods l_i, ranked, and what no candidate has likewise.
+
+        absent: the tracks that are no candidates any more. They gain nothing: their paths were found from where the hand was.
+        """
         taking_part = [each for each in predicted if each.has_likelihood]
         before, lost = self._hand_down(taking_part)
         goals = {each.candidate.goal for each in (*self.followed, *self.absent)}
         old = np.array([*(before.get(each.way, 0.0) for each in taking_part), self.rest.unknown + lost, self.rest.other])
-        change = np.array([*(each.likelihood for each in taking_part), *rest]) - old
+        found, numbers = np.array([*(each.likelihood for each in taking_part), *rest]), {each.number for each in absent}
+        is_absent = np.array([*(each.way in numbers for each in taking_part), False, False])
+        change = _limit_gains(found, old, is_absent) - old
         largest, allowed = float(abs(change).max()), self.measure_time(stamp_ns) / FULL_CHANGE_S
         is_new = all(each.way not in before for each in taking_part) or any(
             each.candidate.goal not in goals for each in taking_part
@@ -257,11 +263,24 @@ def count_shared(before: Candidate, now: Candidate) -> int | None:
     return min(len(before.sides), len(now.sides))
 
 
+def _limit_gains(shares: Array, old: Array, limited: NDArray[np.bool_]) -> Array:
+    """Return shares (s,) of one, of which the limited ones are not larger than before; the others have the rest."""
+    others = float(shares[~limited].sum())
+    if not others:
+        return shares
+    kept = np.minimum(shares, old)
+    return np.where(limited, kept, shares * (1.0 - float(kept[limited].sum())) / others)
+
+
 def _inherits(candidate: PredictedCandidate, before: Candidate) -> bool:
-    """Tell whether a candidate is a class that was followed before, under any name, or its path is in that class."""
+    """Tell whether a candidate is a class that was followed before, under any name, or its path is in that class.
+
+    A path that passes none of the obstacles in the name of a class says nothing of it.
+    """
     if count_shared(before, candidate.candidate) is not None:
         return True
-    return candidate.candidate.goal == before.goal and before.contains(candidate.sides)
+    is_to_goal, is_known = candidate.candidate.goal == before.goal, any(name in candidate.sides for name, _ in before.sides)
+    return is_to_goal and is_known and before.contains(candidate.sides)
 
 
 def take_rest(solution: Solution, age_s: float, position: Array, reason: str) -> Solution | None:
@@ -282,9 +301,12 @@ def take_rest(solution: Solution, age_s: float, position: Array, reason: str) ->
         motor = as_readonly(interpolate_rest(motor, begin))
     during = (begin + (steps - begin) * (np.arange(steps) + 0.5) / steps).astype(np.intp)
     control = as_readonly(solution.control[np.minimum(during, steps - 1)])
-    message = f'{reason}; the answer is from {age_s:.3g} s ago'
+    message, effort = f'{reason}; the answer is from {age_s:.3g} s ago', float((control**2).sum())
+    expected = solution.expected
+    if expected is not None and solution.effort > 0.0:
+        expected *= effort / solution.effort
     rest = replace(solution, mean=as_readonly(mean), covariance=covariance, motor_covariance=motor, control=control)
-    return replace(rest, effort=float((control**2).sum()), dt=left_s / steps, message=message)
+    return replace(rest, effort=effort, expected=expected, dt=left_s / steps, message=message)
 
 
 def interpolate_rest(states: Array, begin: float) -> Array:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.obstacles.clearance import GRAZE_M
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
@@ -30,8 +31,6 @@ NOTED, LIKELY = 0.01, 0.05
 """Likelihoods from which a candidate is worth mentioning, and from which its ellipses are drawn."""
 ONSET_SPEED, PAUSE_S, LEAST_M = 0.05, 0.15, 0.03
 """Speed [m/s] above which the hand counts as moving, longest pause within a movement, and its least extent."""
-GRAZE_M = 1e-3
-"""Depth [m] up to which a path within an obstacle counts as one along its boundary."""
 
 
 def build_snapshot(prediction: Prediction) -> Prediction:

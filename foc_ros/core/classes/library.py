@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.clearance import is_free
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, label_class
 from foc_ros.core.types import Array, HandState, Record
 
@@ -136,7 +136,7 @@ def recall_demonstrations(
             if all(name in shown for name in names[goal]) and _name(goal, names[goal], shown)[0] in labels:
                 continue
             rest = _deform(demonstration.path, hand.mean[:2], goals[goal])
-            if rest is None or not _is_free(rest, obstacles):
+            if rest is None or not is_free(rest, obstacles, 0.0):
                 continue
             guess = timed(rest, hand.mean[2:4], timing.durations_s[goal], timing.steps)
             sides = find_path_sides(guess, obstacles)
@@ -174,15 +174,6 @@ def _deform(path: Array, hand: Array, goal: Array) -> Array | None:
     share = np.linspace(0.0, 1.0, len(rest))[:, None]
     moved: Array = rest + (1.0 - share) * (hand - rest[0]) + share * (goal - rest[-1])
     return moved
-
-
-def _is_free(path: Array, obstacles: Obstacles) -> bool:
-    """Tell whether no point of a path lies in an obstacle, other than those that hold its first or its last point."""
-    share = np.arange(4)[:, None] / 4  # points lie about 2 mm apart
-    points = (path[:-1, None] + share * (path[1:] - path[:-1])[:, None]).reshape(-1, 2)
-    _, distance = measure_offsets(np.vstack([points, path[-1:]]), obstacles)
-    is_inside = distance < obstacles.radius
-    return not bool((is_inside.any(axis=0) & ~is_inside[0] & ~is_inside[-1]).any())
 
 
 def _is_near(points: Array, others: Array) -> bool:

@@ -34,6 +34,9 @@ from foc_ros.core.types import Array, HandState, Record
 
 from .movements import find_goal_at_end
 
+MOST_LEFT_M = 0.1
+"""Most of the way that a reach may leave [m], and not more than half of it: hands touch objects at their edges."""
+
 
 class KnownGoal(NamedTuple):
     """One goal: id of the obstacle that it is, or none; place (2,) [m]; how often it was reached, and was expected to be."""
@@ -103,8 +106,7 @@ class Habits(Record):
     def _end(self, reach: Reach, beta: float) -> Habits:
         """Return the habits after a reach, which counts if it ended at a goal."""
         goal, left = find_goal_at_end(reach.position[None], reach.goals)
-        # a reach may leave half of its first distance, because hands touch edges of objects
-        if left > 0.5 * math.dist(reach.onset, reach.goals[goal]):
+        if left > min(MOST_LEFT_M, 0.5 * math.dist(reach.onset, reach.goals[goal])):
             return self.interrupt()
         first = np.hypot(*(self.find_ends(reach.goals) - reach.onset).T)
         expected = normalise_logs(-2.0 * beta * np.log(np.maximum(first, 1e-3)))  # a goal at the hand has a finite one

@@ -23,16 +23,29 @@ from .risk import centre_trajectories
 
 FINER = 4
 """Number of parts of a step at which distances are measured."""
+GRAZE_M = 1e-3
+"""Depth up to which a path within an obstacle counts as one along its boundary [m]."""
 
 
 def measure_clearance(path: Array, obstacles: Obstacles, dt: float) -> float:
     """Return the smallest distance [m] of a path (N + 1, 2) [m] from obstacles, negative inside; dt: the time step [s]."""
+    return float(_measure_distances(path, obstacles, dt).min(initial=np.inf))
+
+
+def is_free(path: Array, obstacles: Obstacles, dt: float) -> bool:
+    """Tell whether a path (N + 1, 2) [m] leads through no obstacle but those that hold its first or its last point; dt [s]."""
+    is_inside = _measure_distances(path, obstacles, dt) < -GRAZE_M
+    return not bool((is_inside.any(axis=0) & ~is_inside[0] & ~is_inside[-1]).any())
+
+
+def _measure_distances(path: Array, obstacles: Obstacles, dt: float) -> Array:
+    """Return the distances (m, n) [m] of points along a path from obstacles that move on meanwhile, negative inside."""
     steps = len(path) - 1
     at = np.linspace(0.0, steps, FINER * steps + 1)
     points = np.column_stack([np.interp(at, np.arange(steps + 1), axis) for axis in path.T])
     centres = centre_trajectories(obstacles.centre, dt / FINER * obstacles.velocity, FINER * steps)
-    distance = measure_offsets(points, obstacles, centres)[1] - obstacles.radius
-    return float(distance.min(initial=np.inf))
+    distances: Array = measure_offsets(points, obstacles, centres)[1] - obstacles.radius
+    return distances
 
 
 def cull_obstacles(obstacles: Obstacles, hand: Array, goals: Array, duration_s: float, most: int) -> Obstacles:
