@@ -16,18 +16,16 @@ from foc_ros.core.solution import LEFT, RIGHT
 H = len(TIMES_S)
 
 
-def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=None) -> CandidateTable:
+def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None) -> CandidateTable:
     """Return candidates that pass obstacles on sides (k, n); each in its own class, all branching now."""
     k, n = np.shape(sides)
-    solved = np.ones(k, dtype=bool) if solved is None else np.array(solved)
-    even = np.where(solved, 1.0 / solved.sum(), 0.0)
     return CandidateTable(
         labels=tuple(f'class{i}' for i in range(k)),
         goal=np.zeros(k, dtype=int) if goal is None else np.array(goal),
-        has_likelihood=solved,
-        safety_shortfall=np.zeros(len(solved)),
+        has_likelihood=np.ones(k, dtype=bool),
+        safety_shortfall=np.zeros(k),
         cost_to_go=np.ones(k) if cost_to_go is None else np.array(cost_to_go, dtype=float),
-        likelihood=even if likelihood is None else np.array(likelihood, dtype=float),
+        likelihood=np.full(k, 1.0 / k) if likelihood is None else np.array(likelihood, dtype=float),
         length=np.arange(1.0, k + 1.0),
         time_s=np.ones(k),
         named=frozenset(str(i) for i in range(n)),
@@ -36,7 +34,7 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None, solved=N
         covariance=np.tile(np.eye(2), (k, len(HORIZONS_S), 1, 1)),
         duration_sensitivity=np.zeros((k, len(HORIZONS_S), 2)),
         branch_times=BranchTimes(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
-        decisions=Decisions(np.arange(solved.sum()), np.arange(solved.sum()), np.zeros(solved.sum(), dtype=np.intp)),
+        decisions=Decisions(np.arange(k), np.arange(k), np.zeros(k, dtype=np.intp)),
     )
 
 

@@ -34,9 +34,9 @@ OBSTACLES = make_obstacles([[0.15, 0.0], [0.15, 0.06], [0.15, -0.06]], 0.015)
 GOAL = np.array([[0.3, 0.0]])
 
 
-def bow(height, end=(0.3, 0.0)):
+def bow(height):
     s = np.linspace(0.0, 1.0, 40)
-    return np.column_stack([s * end[0], s * end[1] + height * np.sin(np.pi * s)])
+    return np.column_stack([0.3 * s, height * np.sin(np.pi * s)])
 
 
 def hand(at=(0.0, 0.0), frame_id='world'):

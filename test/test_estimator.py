@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from foc_ros.core.config import Config, DurationConfig, EstimatorConfig, replace_values
-from foc_ros.core.hand.duration import compute_movement_time, estimate_times_to_go
+from foc_ros.core.hand.duration import estimate_times_to_go
 from foc_ros.core.hand.kalman import FilterState, compute_gramian, compute_transition, update
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.ocp.problem import rest_to_goal
@@ -117,16 +117,10 @@ def time_to_go(state, config):
     return estimate_times_to_go(state, np.array([[0.3, 0.0]]), config)[0]
 
 
-def test_fitts_law_at_whole_bits():
-    for bits in range(8):
-        distance = 0.02 * (2.0**bits - 1.0)
-        assert compute_movement_time(distance, FITTS) == pytest.approx(0.2 + 0.25 * bits)
-
-
 @pytest.mark.parametrize(
     ('state', 'config', 'expected'),
     [
-        # during a movement, the duration less the time since its onset
+        # during a movement, the duration, here that of four bits, less the time since its onset
         (hand(0.1, onset=0.0, since_s=0.4), FITTS, 1.2 - 0.4),
         (hand(0.1, onset=0.0, since_s=0.4), FIXED, 1.5 - 0.4),
         # the lower and the upper limit

@@ -12,7 +12,6 @@ import foc_ros
 from foc_ros.core.config import Config
 from foc_ros.core.errors import ParameterError
 from foc_ros.core.goals import compute_straight_effort, find_common_time
-from foc_ros.core.guidance.guide import combine, weigh_candidates
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
 from foc_ros.core.obstacles.geometry import find_holders
@@ -190,13 +189,6 @@ def test_a_goal_that_cannot_be_reached_makes_no_other_one_likelier():
     assert beside.goals[1].likelihood is None
     assert beside.goals[0].likelihood == pytest.approx(alone.goals[0].likelihood, abs=0.005)
     assert beside.other == pytest.approx(alone.other, abs=0.005) and alone.other > 2.0 * PRIOR
-
-
-def test_guidance_yields_to_another_goal():
-    pull, shares, still = np.array([[0.0, 2.0]]), ((1.0, 0.0), (0.7, 0.3), (0.3, 0.7)), np.zeros(2)
-    weights = [weigh_candidates(np.array([known]), pull, still, other=other) for known, other in shares]
-    sizes = [combine(each, pull, np.zeros(1, dtype=bool))[0][1] for each in weights]
-    assert sizes[0] > 2.0 * sizes[1] > 0.0 and sizes[2] == 0.0
 
 
 def test_a_fast_hand_that_slows_down_goes_to_the_near_goal():

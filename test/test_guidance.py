@@ -95,6 +95,12 @@ def test_a_hand_beside_its_only_path_is_drawn_to_it():
     assert output.agreement == pytest.approx(SURE)
 
 
+@pytest.mark.parametrize('share', ['unknown', 'other'])
+def test_a_force_yields_to_classes_and_goals_that_are_not_followed(share):
+    output = guide_hand(prediction(straight(likelihood=0.8), **{share: 0.2}), (0.1, 0.01), (0.0, 0.0))
+    assert output.force == pytest.approx([0.0, 1.0 - 2.0 * 0.8 / (1.0 + DOUBT)], abs=1e-6)
+
+
 def test_the_mode_trajectory_keeps_the_force_along_the_path():
     newest = prediction(straight())
     path, trajectory = (

@@ -45,16 +45,16 @@ GOAL = np.array([[0.4, 0.0]])
 START = np.array([0.1, 0.2, -0.5])
 
 
-def hand_at(height, *, moving=True):
-    """Return a hand at the origin of the plane that knows its state well."""
-    onset = {'onset_ns': 0, 'onset_position': np.zeros(2)} if moving else {}
+def hand_at(height):
+    """Return a moving hand at the origin of the plane, whose state is known well."""
+    onset = {'onset_ns': 0, 'onset_position': np.zeros(2)}
     return HandState(0, np.zeros(6), 1e-8 * np.eye(6), height, height_mean=np.array([height, 0.0, 0.0]), **onset)
 
 
-def boxes(*heights, x=0.2, velocity=0.0):
+def boxes(*heights, x=0.2):
     """Return circles beside each other, with their lowest and highest points."""
     centres = [[x, 0.06 * row] for row in range(len(heights))]
-    return make_obstacles(centres, 0.02, 0.0, velocity=[velocity, 0.0], heights=heights)
+    return make_obstacles(centres, 0.02, heights=heights)
 
 
 def predict_over(obstacles, height, goal_height, **changes):

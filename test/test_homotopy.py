@@ -296,10 +296,10 @@ SIX_GOALS = np.column_stack([np.full(6, 0.4), np.linspace(-0.2, 0.2, 6)])
 CROWD = np.random.default_rng(2).uniform([0.05, -0.2], [0.35, 0.2], (40, 2))
 
 
-def search_within(seconds, obstacles, goals=SIX_GOALS, previous=(), first_goal=0, k=6, hand=(0.0, 0.0)):
+def search_within(seconds, obstacles, goals=SIX_GOALS, previous=(), first_goal=0, k=6):
     settings = HomotopyConfig(max_candidates=k, clearance=CLEARANCE)
     turn = Turn(Deadline(seconds), first_goal)
-    return search(np.array([*hand, 0.0, 0.0, 0.0, 0.0]), goals, obstacles, settings, [1.0] * len(goals), 20, previous, turn)
+    return search(np.zeros(6), goals, obstacles, settings, [1.0] * len(goals), 20, previous, turn)
 
 
 def test_without_time_each_goal_has_a_candidate_at_once_and_one_goal_after_the_other_is_searched_again():

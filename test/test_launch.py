@@ -16,7 +16,6 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-import ros_helpers
 import yaml
 from message_helpers import message_types
 
@@ -117,7 +116,8 @@ def test_rviz_is_remapped_to_every_topic_of_its_configuration(described):
 
 @pytest.fixture
 def prefix(tmp_path):
-    """Return a prefix in which the package is found as pip and colcon install it."""
+    """Return a prefix in which the package is found as pip and colcon install it, for `ros2 launch`."""
+    pytest.importorskip('launch_ros', reason='optional message package: launch_ros')
     index = tmp_path / 'share' / 'ament_index' / 'resource_index' / 'packages'
     index.mkdir(parents=True)
     (index / 'foc_ros').touch()
@@ -149,8 +149,6 @@ def names_of(node):
 
 
 def test_one_node_is_launched_with_its_topics_and_parameters(ros, prefix):
-    ros_helpers.require_ros()
-    pytest.importorskip('launch_ros', reason='optional message package: launch_ros')
     from rcl_interfaces.srv import GetParameters
 
     watcher = ros.node('watcher')
@@ -165,8 +163,6 @@ def test_one_node_is_launched_with_its_topics_and_parameters(ros, prefix):
 
 
 def test_two_arms_share_the_obstacles(ros, prefix):
-    ros_helpers.require_ros()
-    pytest.importorskip('launch_ros', reason='optional message package: launch_ros')
     watcher = ros.node('watcher')
     with launched(ros, prefix, 'two_arms', 'right_hand:=/MTMX/measured_cp'):
         ros.spin_until(lambda: {'/left/foc', '/right/foc'} <= names_of(watcher), 'the nodes', 60.0)

@@ -24,6 +24,7 @@ from foc_ros.ros import node as module
 from foc_ros.ros.endpoints import describe_incompatible_subscriptions
 
 EARLY = round(9.9 * SECOND)
+REPEATED = 'stamps repeat: 11 of 13 poses have that of the pose before'
 
 
 def hand(x=0.0, stamp_ns=20 * SECOND, frame_id='world'):
@@ -178,29 +179,24 @@ def test_a_silent_hand_is_told_and_one_whose_poses_wait_is_not_silent(ros, clock
     assert figures(bench.health())['count hand_restarted_gap'] == '1'
 
 
-@pytest.mark.parametrize('is_moving', [True, False])
-def test_stamps_that_repeat_are_no_silence(ros, clock, is_moving):
-    """As of a clock of whole seconds, and of a driver that repeats its last message."""
+@pytest.mark.parametrize(
+    ('step_ns', 'step_m', 'w', 'last', 'count'),
+    [
+        pytest.param(0, 0.01, 1.0, 'stamps repeat: ', REPEATED, id='a clock of whole seconds'),
+        pytest.param(0, 0.0, 1.0, 'stamps repeat: ', REPEATED, id='a driver that repeats its last message'),
+        pytest.param(SECOND // 50, 0.0, 0.0, '.*the tracker has lost the hand', 'hand_lost 11', id='a tracker without data'),
+    ],
+)
+def test_poses_that_cannot_be_used_are_no_silence(ros, clock, step_ns, step_m, w, last, count):
     bench = begin(ros, 2, estimator__hand_timeout_s=0.05)
     for i in range(1, 12):
-        bench.deliver('hand_pose', pose_stamped(TYPES, (0.01 * i * is_moving, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns))
+        pose = pose_stamped(TYPES, (step_m * i, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns + step_ns * i)
+        pose.pose.orientation.w = w
+        bench.deliver('hand_pose', pose)
         clock.now_s += 0.01
     status = bench.health()
-    words = r'no prediction: no hand_pose could be used for \d\.\d s, the last: hand_pose: stamps repeat: '
-    assert status.level == WARN and re.match(words, status.message) and 'silent' not in status.message
-    assert 'stamps repeat: 11 of 13 poses have that of the pose before' in status.message
-
-
-def test_a_pose_without_data_is_a_lost_hand(ros, clock):
-    bench = begin(ros, 2, estimator__hand_timeout_s=0.05)
-    for i in range(1, 12):
-        lost = pose_stamped(TYPES, (0.0, 0.0, 0.0), bench.node.pipeline.hand_state.stamp_ns + i * SECOND // 50)
-        lost.pose.orientation.w = 0.0
-        bench.deliver('hand_pose', lost)
-        clock.now_s += 0.01
-    status = bench.health()
-    assert status.level == WARN and 'hand_lost 11' in status.message
-    assert re.match(r'no prediction: no hand_pose could be used for .* the tracker has lost the hand', status.message)
+    assert status.level == WARN and count in status.message and 'silent' not in status.message
+    assert re.match(rf'no prediction: no hand_pose could be used for \d\.\d s, the last: hand_pose: {last}', status.message)
 
 
 @pytest.mark.parametrize('where', ['begin', 'predict', 'encode_outputs'])

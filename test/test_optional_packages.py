@@ -15,8 +15,6 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
-import ros_helpers
-
 ROOT = Path(__file__).parents[1]
 OPTIONAL = ('cyclopts', 'distributed', 'jinja2', 'joblib', 'matplotlib', 'mcap', 'pydantic', 'rich', 'rosbags', 'tornado')
 """Packages that are blocked below: as where only package.xml was installed."""
@@ -126,7 +124,6 @@ sys.exit(main(arguments))
 
 def test_the_node_predicts_without_them(ros, tmp_path, monkeypatch):
     """Started as by `ros2 run` and `ros2 launch`, by a file in `lib/foc_ros`."""
-    ros_helpers.require_ros()
     from process_helpers import ended, predict_once, running
 
     (tmp_path / 'sitecustomize.py').write_text(BLOCK.format(names=OPTIONAL))

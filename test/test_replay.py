@@ -166,17 +166,6 @@ def test_nothing_solved_is_exit_3_and_says_why(tmp_path, capsys):
     assert err.count('\n') == 1
 
 
-def test_parameters_are_the_nodes(tmp_path, bag, capsys):
-    few = write_parameters(tmp_path, replace_values(CONFIG, {'homotopy.max_candidates': 1, 'foc.steps': 20}))
-    assert main(['replay', str(bag), '--json', '--params', few]) == 0
-    predictions = json.loads(capsys.readouterr().out)['predictions']
-    assert {len(each['candidates']) for each in predictions} == {1}
-    assert np.shape(predictions[0]['candidates'][0]['mean']) == (21, 2)
-    Path(few).write_text('/**:\n  ros__parameters:\n    foc.steps: 2\n')
-    assert main(['replay', str(bag), '--params', few]) == 2
-    assert capsys.readouterr().err == 'foc_ros replay: foc.steps: expected a number in [5, 400], got 2\n'
-
-
 def test_the_output_bag_holds_inputs_and_predictions(tmp_path, bag, answer):
     assert run(bag, '--output', str(tmp_path / 'out')) == 0
     with BagReader(bag) as before, BagReader(tmp_path / 'out') as after:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages of evaluations and fits, and views of predictions: those of the records and of the node's messages agree."""
 
+from dataclasses import replace
 from datetime import datetime
 from importlib.metadata import version
 from itertools import islice
@@ -12,9 +13,6 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from dataclasses import replace
-
-import pytest
 from bag_helpers import TYPES
 from report_samples import START_NS, prediction, samples, scene
 
