@@ -203,6 +203,21 @@ def test_a_path_approaches_the_recordings_with_their_number():
     assert (np.diff(stddevs) < 0.0).all()
 
 
+def test_a_hand_at_rest_follows_recordings_from_their_onset():
+    """Half a second of rest comes before the movement; noise does not decide how much of it the prediction contains."""
+    generator = np.random.default_rng(0)
+    at_rest = np.arange(len(ABOVE.states)) < 0.5 / STEP_S
+    noise = generator.normal(0.0, 1e-3, ABOVE.states.shape) * at_rest[:, None]
+    library = make_library([replace(ABOVE, states=ABOVE.states + noise)] * 8)
+    paths = []
+    for place in generator.normal(0.0, 1e-3, (6, 2)):
+        taken = find_taken(ask(library, replace(HAND, mean=np.array([*place, 0.0, 0.0, 0.0, 0.0]))))
+        paths.append(taken.solution.path - place)
+    assert np.ptp(paths, axis=0).max() < 0.01
+    without_rest = record_demonstration('world', bow(0.03), OBSTACLES, move(bow(0.03), rest_s=0.1))
+    np.testing.assert_allclose(paths[0], find_taken(ask(make_library([without_rest] * 8))).solution.path, atol=0.01)
+
+
 @given(st.floats(0.012, 0.05), st.floats(-0.01, 0.01), st.floats(0.0, 0.9))
 @settings(max_examples=10, deadline=None)
 def test_a_pooled_path_stays_in_its_class_and_out_of_obstacles(height, beside, share):

@@ -6,6 +6,8 @@ A recording r counts by how near its states come to the position p [m] and the v
 
     w_r = max_m exp(-|p - p_rm|^2 / 2 a^2 - |v - v_rm|^2 / 2 b^2),  a = `POSITION_STDDEV`,  b = `VELOCITY_STDDEV`.
 
+It counts from shortly before its onset on: for a hand at rest the movement begins now, as it does for the plan.
+
 Of the N_g recordings that end at goal g, n_g = sum of their w_r are where the hand is now. The likelihoods of the goals change as
 these shares differ from that of all recordings, q = sum_g n_g / sum_g N_g, which counts as n_2 = `PRIOR_COUNT_GOAL` recordings of
 each goal. With W all classes, or those of the same way through all rows if a row is ahead,
@@ -26,7 +28,7 @@ with the p_G and p_W of the model in the fraction p_W / p_G.
 The path of a class is pooled with the recordings that take its gap in the next row, each up to where it passes an obstacle on
 another side than the class. If this path leaves the class or enters an obstacle, only the recordings of the class count, and if
 that one does so too, the path stays that of the plan. Effort and eta are always those of the plan. Without recordings near the
-hand, all is the model. Recordings of the running program change the likelihoods of goals and the paths only, unless
+hand, all is the model. Recordings of the running program change likelihoods of goals and paths only, unless
 `experience.learning` is `online`: people vary their ways between obstacles more than their paths.
 
 **Pooled paths.**
@@ -78,6 +80,10 @@ LEAST_WEIGHT = 1e-3
 """Weight of a recording below which it is not near."""
 FADE_S = 0.25
 """Time over which the weight of a recording falls to zero before its end [s]."""
+SEEN_AFTER_S = 0.1
+"""How long a movement has begun when its onset is seen [s]: the hand is at rest before that, and not at the onset."""
+ROUNDING_M = 1e-5
+"""Distance of a recorded state from the beginning of the path that is rounding [m]."""
 EXACT = 1e-12
 """Variance of a position that is known [m^2]: that of a micrometre."""
 
@@ -87,7 +93,7 @@ class Library(Record):
     """The class library.
 
     demonstrations: one of each class, to recall; recordings: those with states, r of them; states (r, m, 4): x, y, vx, vy [m,
-    m/s], infinite beyond the end of each; ends (r,): the last state of each; goals (r, 2): where they lead [m]; scene (r,): equal
+    m/s], infinite before the movement of each and beyond its end; ends (r,): the last state of each; goals (r, 2): where they lead [m]; scene (r,): equal
     numbers for recordings in the same scene; shows_ways (r,): whether a recording is evidence of ways between obstacles, or only
     of goals and paths.
     """
@@ -134,8 +140,11 @@ def make_library(given: Sequence[Demonstration], learnt: Sequence[Demonstration]
     recordings = tuple(each for each in found if each.states is not None)
     tables = [each.states for each in recordings if each.states is not None]
     states = np.full((len(tables), max(map(len, tables), default=0), 4), np.inf)
-    for row, table in enumerate(tables):
-        states[row, : len(table)] = table
+    for row, (each, table) in enumerate(zip(recordings, tables, strict=True)):
+        apart = np.hypot(*(table[:, :2] - each.path[0]).T)
+        onset = int(np.flatnonzero(apart <= apart.min() + ROUNDING_M)[-1])
+        begin = max(onset - round(SEEN_AFTER_S / STEP_S), 0)
+        states[row, begin : len(table)] = table[begin:]
     ends = np.array([len(table) - 1 for table in tables], dtype=np.intp)
     goals = np.array([each.path[-1] for each in recordings]).reshape(-1, 2)
     numbers = dict[tuple[object, ...], int]()
