@@ -93,9 +93,9 @@ class Library(Record):
     """The class library.
 
     demonstrations: one of each class, to recall; recordings: those with states, r of them; states (r, m, 4): x, y, vx, vy [m,
-    m/s], infinite before the movement of each and beyond its end; ends (r,): the last state of each; goals (r, 2): where they lead [m]; scene (r,): equal
-    numbers for recordings in the same scene; shows_ways (r,): whether a recording is evidence of ways between obstacles, or only
-    of goals and paths.
+    m/s], infinite before the movement of each and beyond its end; ends (r,): the last state of each; goals (r, 2): where they
+    lead [m]; scene (r,): equal numbers for recordings in the same scene; shows_ways (r,): whether a recording is evidence of ways
+    between obstacles, or only of goals and paths.
     """
 
     demonstrations: tuple[Demonstration, ...]
