@@ -12,10 +12,12 @@ from prediction_samples import outcome
 import foc_ros
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.guidance.guide import DOUBT, EVIDENCE, GuidanceInput, GuidanceState, combine, guide, weigh_candidates
+from foc_ros.core.guidance.limits import build_margins
 from foc_ros.core.guidance.paths import POSITION_STDDEV, compute_stiffness, find_crossing, find_need
 from foc_ros.core.obstacle_table import make_obstacles
 
 ROUND = make_obstacles([(0.1, 0.0)], [0.03])
+ZONES = build_margins(ROUND, 0.02)
 SETTINGS = GuidanceConfig(k_max=100.0, clearance=0.0)
 SURE = (1.0 - DOUBT) / (1.0 + DOUBT)
 """Share of the force of a certain candidate at rest."""
@@ -137,7 +139,7 @@ def test_the_look_ahead_damps_movement_across_the_path():
 
 
 def test_no_force_leads_across_an_obstacle_to_the_other_side():
-    need = find_need(GuidanceConfig(clearance=0.02, lookahead_s=0.2), ROUND, np.array([0.06, 0.045]), np.array([0.4, 0.0]))
+    need = find_need(GuidanceConfig(clearance=0.02, lookahead_s=0.2), ZONES, np.array([0.06, 0.045]), np.array([0.4, 0.0]))
     assert find_crossing(need, np.array([[0.0, 0.01], [0.0, -0.01], [0.01, 0.0]])).tolist() == [False, True, False]
     settings = replace(SETTINGS, clearance=0.02)
     position, velocity = (0.01, 0.01), (0.5, 0.0)

@@ -25,6 +25,9 @@ def check_bounds(run):
     assert np.hypot(*forces.T).max() <= settings.f_max * (1 + 1e-9)
     slews = np.hypot(*np.diff(forces, axis=0).T) / np.diff(run.times)
     assert slews.max() <= settings.slew * (1 + 1e-6)
+    shares = np.array([each.authority * each.heading for each in run.outputs])
+    rates = np.hypot(*np.diff(shares, axis=0).T) / np.diff(run.times)
+    assert rates.max() <= settings.authority / settings.ramp_s * (1 + 1e-6)
     for output in run.outputs:
         values, asymmetry = np.linalg.eigvalsh(output.stiffness), output.stiffness - output.stiffness.T
         assert values.min() >= -1e-6 and values.max() <= settings.k_max * (1 + 1e-9) and np.abs(asymmetry).max() < 1e-6
@@ -103,7 +106,7 @@ def check_blended_commands(settings, state, given, before, changes):
         given = replace(given, t=given.t + PERIOD, **changes)
         output, state = guide(Config(guidance=settings), state, given)
         blended = output.blend_command(COMMAND)
-        assert np.hypot(*(blended - before)) <= 2.0 * np.hypot(*COMMAND) * PERIOD / settings.ramp_s * (1 + 1e-9)
+        assert np.hypot(*(blended - before)) <= np.hypot(*COMMAND) * PERIOD / settings.ramp_s * (1 + 1e-9)
         before = blended
     return before
 

@@ -25,6 +25,7 @@ from .limits import (
     Margins,
     SeenMargins,
     build_margins,
+    find_crossed,
     find_largest_force,
     limit_by_energy,
     measure_opposing_distance,
@@ -134,7 +135,7 @@ class Followed(Record):
     """The newest prediction as guidance uses it.
 
     paths: of its candidates, None if none has a likelihood; progress (c,): on them [m]; obstacles: as far as the hand has to keep
-    away; margins: of these.
+    away; margins, zones: of these, as large as force and clearance need them.
     """
 
     prediction: Prediction | None = None
@@ -142,6 +143,7 @@ class Followed(Record):
     progress: Array = field(default_factory=lambda: np.zeros(0))
     obstacles: Obstacles = field(default_factory=make_obstacles)
     margins: Margins = field(default_factory=lambda: build_margins(make_obstacles(), 0.0))
+    zones: Margins = field(default_factory=lambda: build_margins(make_obstacles(), 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,14 +166,13 @@ class GuidanceState(Record):
 class _Demand(Record):
     """What the candidates ask for, before the limits: force, stiffness, agreement.
 
-    share (2,): the authority, in the direction of the paths; line (2,): from the hand along them [m], None without paths.
+    share (2,): the authority, in the direction of the paths.
     """
 
     force: Array = field(default_factory=lambda: np.zeros(2))
     stiffness: Array = field(default_factory=lambda: np.zeros((2, 2)))
     agreement: float = 0.0
     share: Array = field(default_factory=lambda: np.zeros(2))
-    line: Array | None = None
 
 
 def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[GuidanceOutput, GuidanceState]:
@@ -195,13 +196,10 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
     target = demand.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
     longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
     force = step_force(state.force, target, settings.slew * min(dt, longest), partial(_find_bound, settings, seen, energy))
-    # the command changes by no more than its size within `ramp_s`, whether the authority or the direction changes
-    share = state.share + shorten(demand.share - state.share, dt / settings.ramp_s)
-    authority, direction = float(np.hypot(*share)), normalize(share)
-    heading = turn_along(seen, HEADING_M * direction if demand.line is None else demand.line, direction)
-    reference = given.position + find_deflection(demand.stiffness, force)
+    share = state.share + shorten(demand.share - state.share, dt * _find_share_rate(settings))
+    reference, authority = given.position + find_deflection(demand.stiffness, force), float(np.hypot(*share))
     output = GuidanceOutput(
-        given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, heading, energy
+        given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, normalize(share), energy
     )
     return output, GuidanceState(energy, given.t, given.position, force, share, followed)
 
@@ -222,20 +220,20 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
     prediction = given.prediction
     if prediction is None or prediction is before.prediction:
         return before
-    obstacles, margins = before.obstacles, before.margins
+    obstacles, margins, zones = before.obstacles, before.margins, before.zones
     known = before.prediction
     if known is None or prediction.obstacles is not known.obstacles or prediction.cleared != known.cleared:
         obstacles = prediction.blocking_obstacles.grow(config.scene.hand_radius)
-        margins = build_margins(obstacles, config.guidance.margin)
+        margins, zones = (build_margins(obstacles, growth) for growth in (config.guidance.margin, config.guidance.clearance))
     if not prediction.candidates_with_likelihood:
-        return Followed(prediction, obstacles=obstacles, margins=margins)
+        return Followed(prediction, obstacles=obstacles, margins=margins, zones=zones)
     paths, references = build_paths(prediction), {}
     if before.paths is not None:
         points = before.paths.interpolate(before.paths.points, before.paths.locate(before.progress))
         references = dict(zip(before.paths.labels, points, strict=True))
     travelled = float(np.hypot(*given.velocity)) * max(given.prediction_age_s, 0.0)
     progress = transfer_progress(paths, references, given.position, travelled)
-    return Followed(prediction, paths, progress, obstacles, margins)
+    return Followed(prediction, paths, progress, obstacles, margins, zones)
 
 
 def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMargins, given: GuidanceInput) -> _Demand:
@@ -252,7 +250,7 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
     """
     paths, progress, speed = followed.paths, followed.progress, float(np.hypot(*given.velocity))
     assert paths is not None
-    need = find_need(settings, followed.obstacles, given.position, given.velocity)
+    need = find_need(settings, followed.zones, given.position, given.velocity)
     ahead = np.minimum(progress + need.time_s * speed, paths.lengths[:, -1])
     times = np.minimum(need.time_s, (ahead - progress) / max(speed, 1e-9))
     places = paths.locate(ahead)
@@ -267,15 +265,23 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
     weights = weigh_candidates(paths.likelihoods, forces, given.acceleration, *shares)
     force, agreement = combine(weights, forces, find_crossing(need, errors))
     places = paths.locate(np.maximum(ahead, progress + HEADING_M))
-    lines = paths.interpolate(paths.points, places) - given.position
-    heading = paths.likelihoods @ normalize(lines)
+    heading = paths.likelihoods @ normalize(paths.interpolate(paths.points, places) - given.position)
+    # as for the force, the part into a margin is so small that it can be zero when the hand is there
+    most = _find_share_rate(settings) * np.maximum(seen.distance.min(axis=1) - NEAR_M, 0.0) / settings.max_speed
     return _Demand(
-        turn_along(seen, weights @ errors, force),
+        turn_along(seen, np.where(find_crossed(seen, weights @ errors), 0.0, np.inf), force),
         need.share * agreement * np.einsum('c,cab->ab', paths.likelihoods, stiffness),
         agreement,
-        settings.authority * shorten(heading, 1.0),
-        weights @ lines,
+        turn_along(seen, most, settings.authority * shorten(heading, 1.0)),
     )
+
+
+def _find_share_rate(settings: GuidanceConfig) -> float:
+    """Return the largest rate of change of the share of guidance [1/s]: a released share is zero within `ramp_s`.
+
+    A blended command changes by twice as much of its size at most: with an authority up to 0.5, by its size within `ramp_s`.
+    """
+    return max(settings.authority, 0.5) / settings.ramp_s
 
 
 def _release(settings: GuidanceConfig, force: Array, dt: float) -> Array:

@@ -120,15 +120,16 @@ def see_margins(margins: Margins, position: Array) -> SeenMargins:
     return SeenMargins(margins.normal, height, np.where(is_inside & is_nearest, 0.0, distance))
 
 
-def turn_along(seen: SeenMargins, line: Array, force: Array) -> Array:
-    """Return a force (2,) without its part into margins that a line (2,) [m] from the hand crosses.
+def turn_along(seen: SeenMargins, most: Array, vector: Array) -> Array:
+    """Return a vector f (2,) with a part into each margin of at most `most` (n,).
 
-    With n the outward normal of the edge that is nearest to the hand, f <- f + max(-f . n, 0) n for one obstacle after the other.
+    With n the outward normal of the edge that is nearest to the hand, f <- f + max(-f . n - most, 0) n for one obstacle after the
+    other.
     """
-    for row in _find_crossed(seen, line):
-        normal = seen.normal[row, seen.distance[row].argmin()]
-        force = force + max(-float(force @ normal), 0.0) * normal
-    return force
+    for row, nearest in enumerate(seen.distance.argmin(axis=1)):
+        normal = seen.normal[row, nearest]
+        vector = vector + max(-float(vector @ normal) - float(most[row]), 0.0) * normal
+    return vector
 
 
 def measure_opposing_distance(seen: SeenMargins, force: Array) -> float:
@@ -140,11 +141,12 @@ def measure_opposing_distance(seen: SeenMargins, force: Array) -> float:
     return float(seen.distance[is_opposing].min(initial=np.inf))
 
 
-def _find_crossed(seen: SeenMargins, line: Array) -> NDArray[np.intp]:
-    """Return the rows of the margins that a line (2,) [m] from the hand crosses (clipping by Cyrus and Beck)."""
+def find_crossed(seen: SeenMargins, line: Array) -> NDArray[np.bool_]:
+    """Return which margins a line (2,) [m] from the hand crosses, (n,) (clipping by Cyrus and Beck)."""
     slopes = seen.normal @ line
     at = -seen.height / np.where(slopes == 0.0, 1.0, slopes)
     enters = np.where(slopes < 0.0, at, 0.0).max(axis=1)
     leaves = np.where(slopes > 0.0, at, 1.0).min(axis=1)
     is_beside = ((slopes == 0.0) & (seen.height > 0.0)).any(axis=1)
-    return np.flatnonzero((enters < leaves) & ~is_beside)
+    crossed: NDArray[np.bool_] = (enters < leaves) & ~is_beside
+    return crossed

@@ -10,6 +10,7 @@ as `lookahead_s`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,6 +22,8 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array, Record
+
+from .limits import Margins
 
 WINDOW_M = 0.02
 """Length of path [m] on both sides of the progress within which the nearest point is sought."""
@@ -178,8 +181,8 @@ def find_deflection(stiffness: Array, force: Array) -> Array:
 class Need(NamedTuple):
     """Where help is needed, and how much.
 
-    time_s: how far ahead [s]; share in [0, 1]: of the clearance, which the hand lacks by then; normal (2,): outward unit normal
-    of the obstacle that is nearest there, zeros without one.
+    time_s: how far ahead [s]; share in [0, 1]: of the clearance, which the hand lacks on its way; normal (2,): unit vector in
+    which it would have to be shifted, zeros without an obstacle.
     """
 
     time_s: float
@@ -187,25 +190,38 @@ class Need(NamedTuple):
     normal: Array
 
 
-def find_need(settings: GuidanceConfig, obstacles: Obstacles, position: Array, velocity: Array) -> Need:
+def find_need(settings: GuidanceConfig, zones: Margins, position: Array, velocity: Array) -> Need:
     """Return where help is needed, and how much.
 
-    The hand goes on at its velocity v for the look-ahead h at most. It is nearest to an obstacle at the time t*, at the distance
-    d. The share of the clearance D that it lacks by then is
+    The hand goes on at its velocity v for the look-ahead H at most. A zone is an obstacle that is larger by the clearance D. With
+    the outward normal m and the length s of the shortest shift that brings the line x + t v, 0 <= t <= H, out of the zone,
 
-        t* = argmin_{0 <= t <= h} min_j d_j(x + t v),    n = clip((D - d) / D, 0, 1).
+        s m = argmin |y| over all y for which x + y + t v is outside,    n = clip(s / D, 0, 1).
+
+    For the distance d of a line that stays outside of the obstacle, n is (D - d) / D and m the normal at its nearest point. For
+    a line that leads through it, m is at right angles to v, towards the side that is nearer, as soon as this is shorter than a
+    shift backward; a shift forward through the obstacle does not count. All of this is that of the zone with the largest s, and
+    the time is the middle of that within this zone, as far as it is ahead.
     """
     if not settings.clearance:
         return Need(settings.lookahead_s, 1.0, np.zeros(2))
-    if not len(obstacles):
+    if not len(zones.start):
         return Need(0.0, 0.0, np.zeros(2))
-    times = np.linspace(0.0, settings.lookahead_s, 13)
-    points = position + times[:, None] * velocity
-    offsets, distances = measure_offsets(points, obstacles)
-    heights = distances - obstacles.radius
-    instant, row = np.unravel_index(heights.argmin(), heights.shape)
-    share = 1.0 - float(heights[instant, row]) / settings.clearance
-    return Need(float(times[instant]), min(max(share, 0.0), 1.0), normalize(offsets[instant, row]))
+    way, angle = settings.lookahead_s * velocity, math.atan2(velocity[1], velocity[0])
+    aside, offsets = np.array([-math.sin(angle), math.cos(angle)]), position - zones.start
+    heights, slopes, left = (offsets * zones.normal).sum(axis=-1), zones.normal @ way, offsets @ aside
+    shifts = -(heights + np.minimum(slopes, 0.0))
+    shifts[(slopes > 0.0) & (shifts > settings.clearance)] = np.inf  # forward through the obstacle
+    shifts = np.column_stack([shifts, -left.min(axis=1), left.max(axis=1)])
+    row = int(shifts.min(axis=1).argmax())
+    best = int(shifts[row].argmin())
+    normal = [*zones.normal[row], aside, -aside][best]
+    share = min(max(float(shifts[row, best]) / settings.clearance, 0.0), 1.0)
+    slope = slopes[row]
+    at = -heights[row] / np.where(slope == 0.0, 1.0, slope)
+    # a line that enters and leaves a convex zone; a hand at rest does neither
+    middle = 0.5 * (at[slope < 0.0].max(initial=-1e6) + at[slope > 0.0].min(initial=1e6))
+    return Need(settings.lookahead_s * min(max(float(middle), 0.0), 1.0), share, normal)
 
 
 def keep_clear(settings: GuidanceConfig, obstacles: Obstacles, points: Array) -> Array:
@@ -226,9 +242,9 @@ def keep_clear(settings: GuidanceConfig, obstacles: Obstacles, points: Array) ->
 
 
 def find_crossing(need: Need, errors: Array) -> NDArray[np.bool_]:
-    """Return which errors e_i (c, 2) [m] lead across the nearest obstacle: e_i . m < 0 for its outward normal m.
+    """Return which errors e_i (c, 2) [m] lead across the nearest obstacle: e_i . m < 0 for the normal m of the need.
 
-    The hand, going straight on, passes that obstacle on one side, and the candidate on the other one. Before the obstacle is
+    The hand, going straight on, passes that obstacle on the side of m, and the candidate on the other one. Before the obstacle is
     crossed a force to the other side leads into it. So it is the operator who changes the side.
     """
     crossing: NDArray[np.bool_] = errors @ need.normal < 0.0
