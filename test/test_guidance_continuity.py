@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from prediction_samples import outcome, prediction
 
-from foc_ros.core.config import Config, GuidanceConfig
+from foc_ros.core.config import Config, GuidanceConfig, replace_values
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceState, guide
 from foc_ros.core.guidance.limits import build_margins
 from foc_ros.core.guidance.paths import find_need
@@ -123,3 +123,14 @@ def test_a_way_through_an_obstacle_has_the_normal_of_the_nearer_side():
             need = find_need(settings, zones, np.array([0.0, aside]), np.array([0.35, 0.0]))
             assert need.normal == pytest.approx([0.0, side], abs=1e-9) and need.share == 1.0
             assert need.time_s == pytest.approx(0.2 / 0.35, abs=0.1)
+
+
+def test_another_clearance_counts_from_the_next_prediction_on_among_the_same_obstacles():
+    position, obstacles = np.array([0.1, 0.035]), place('circle')
+    wide, narrow = (replace_values(Config(), {'guidance.clearance': each}) for each in (0.05, 0.001))
+    first, later = (GuidanceInput(0.0, position, np.array([0.3, 0.0]), predict(position, obstacles, 1)) for _ in range(2))
+    before, state = guide(wide, GuidanceState(), first)
+    fresh, _ = guide(narrow, GuidanceState(), first)
+    after, _ = guide(narrow, state, later)
+    assert not np.allclose(before.stiffness, fresh.stiffness), 'the clearance is no test'
+    np.testing.assert_allclose(after.stiffness, fresh.stiffness, atol=1e-9)
