@@ -96,12 +96,13 @@ def test_the_library_predicts_what_a_replay_does(bag, replayed):
 
 def test_the_page_predicts_what_a_replay_does(bag, replayed):
     from foc_ros.play.predictor import Predictor
+    from foc_ros.play.scene import View
 
     received, arrived = list[Prediction](), Event()
 
     def receive(outcome):
-        if isinstance(outcome, Prediction):
-            received.append(outcome)
+        if isinstance(outcome, View):
+            received.append(outcome.prediction)
             arrived.set()
 
     page = Predictor(replace_values(CONFIG, {'scene.timeout_s': 0.0}), receive)
