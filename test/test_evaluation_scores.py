@@ -14,6 +14,7 @@ from foc_ros.analysis.evaluation.baselines import (
     boltzmann_shares,
     compute_straight_costs,
     compute_straight_positions,
+    forecast_published,
     forecast_uniform,
     guess_constant_velocity,
     guess_nearest_gap,
@@ -47,6 +48,16 @@ def test_rows_of_two_and_one_have_six_classes_and_the_next_row_three_gaps():
     path_class, gap = ask(PATH_CLASS, observed, relevant), ask(GAP, observed, relevant)
     assert path_class.possible == 6 and path_class.answers[path_class.truth] == (R, L, R) and path_class.given.tolist() == [0, 1]
     assert gap.possible == 3 and gap.answers[gap.truth] == (R, L)
+
+
+def test_a_way_that_was_taken_is_possible_although_it_weaves_and_no_candidate_gives_it():
+    observed = observation(make_candidates([[L, L, L], [R, L, R]]), **TWO_ROWS, true_sides=(L, R, R))
+    for name, count in ((PATH_CLASS, 7), (GAP, 4)):
+        question = ask(name, observed, find_relevant_obstacles(recorded(observed)))
+        assert question.possible == count
+        uniform, ours = (rule(observed, question, None) for rule in (forecast_uniform, forecast_published))
+        assert uniform.true_probability(question) == pytest.approx(1.0 / count)
+        assert 0.0 < ours.true_probability(question) < 1.0 / count
 
 
 def test_the_goal_is_in_question_where_there_are_several_and_one_was_reached():

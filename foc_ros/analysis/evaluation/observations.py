@@ -12,7 +12,7 @@ fits need nothing else. The questions:
 In a row of m obstacles (`rows`) a path that does not turn back takes one of m + 1 gaps, so that rows of m_1, m_2, ... obstacles
 leave (m_1 + 1)(m_2 + 1)... homotopy classes. A gap that is too narrow for the hand is none. A question is put only where at least
 two answers are possible. Candidates may also weave through a row; such an answer can be given, but a uniform guess does not count
-it.
+it, unless it is the true one: what was done is possible.
 """
 
 from __future__ import annotations
@@ -323,4 +323,6 @@ def ask(name: str, observation: Observation, relevant: frozenset[str]) -> Questi
         is_possible &= (listed[:, None, row == number] == gaps).all(axis=2).any(axis=1)
     if possible < 2:
         return None
+    if not is_possible[true]:
+        is_possible[true], possible = True, possible + 1
     return Question(name, ahead, possible, tuple(indices), np.array(rows, dtype=np.intp), is_possible, true)
