@@ -86,16 +86,16 @@ def find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list[
 
 
 def is_there(candidate: Candidate, solution: Solution, obstacles: Obstacles) -> bool:
-    """Tell whether an earlier solution is still a path of its class: the obstacles in the name are there, and none blocks it.
+    """Tell whether an earlier solution is still a path of its class, among the obstacles of now.
 
-    The path of an estimate may lead through an obstacle.
+    The obstacles in the name of the class are there, the path passes them on its sides, and no obstacle blocks it. The path of an
+    estimate may lead through an obstacle.
     """
     if not {name for name, _ in candidate.sides} <= set(obstacles.ids):
         return False
     centres = centre_trajectories(obstacles.centre, obstacles.velocity * solution.dt, len(solution.control))
     sides = find_sides(solution.path[None], obstacles, centres)[0]
-    is_estimate = solution.status in (Status.DEADLINE, Status.ESTIMATED)
-    return candidate.contains(sides) and (is_estimate or is_free(solution.path, obstacles, solution.dt))
+    return candidate.contains(sides) and (solution.status.is_estimate or is_free(solution.path, obstacles, solution.dt))
 
 
 def _classify(candidate: Candidate, solution: Solution, sides: dict[str, int]) -> PredictedCandidate:

@@ -248,7 +248,7 @@ def _hold_absent(track: Track, scene: _PredictionScene) -> PredictedCandidate | 
 def _hold_track(track: Track, candidate: Candidate, scene: _PredictionScene, reason: str) -> PredictedCandidate | None:
     """Return what remains of the solution of a track, under the name of a candidate.
 
-    None if it is too old, if nothing remains, or if the obstacles are not any more where the class and its path need them.
+    None if it is too old, if nothing remains, or if it is no path of its class any more.
     """
     hand, obstacles = scene.hand, scene.in_the_way[candidate.goal]
     if track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):

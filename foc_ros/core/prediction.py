@@ -74,7 +74,7 @@ class PredictedCandidate:
     @property
     def is_estimated(self) -> bool:
         """Whether the solution was not found to its end, so that its effort and its safety are estimated."""
-        return self.solution.status in (Status.DEADLINE, Status.ESTIMATED)
+        return self.solution.status.is_estimate
 
     @property
     def has_likelihood(self) -> bool:

@@ -146,6 +146,11 @@ class Status(Enum):
         return self in (Status.SOLVED, Status.COMPROMISED, Status.DEADLINE, Status.ESTIMATED)
 
     @property
+    def is_estimate(self) -> bool:
+        """Whether effort and safety are estimated, because the solution was not found to its end."""
+        return self in (Status.DEADLINE, Status.ESTIMATED)
+
+    @property
     def remedy(self) -> str:
         """What helps against this result, in words; empty for a solved candidate."""
         return _REMEDIES[self.value]

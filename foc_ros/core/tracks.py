@@ -177,7 +177,8 @@ class Tracks(Record):
     ) -> tuple[list[PredictedCandidate], Rest]:
         """Return candidates with likelihoods p_i with the likelihoods l_i, ranked, and what no candidate has likewise.
 
-        absent: the tracks that are no candidates any more. They gain nothing: their paths were found from where the hand was.
+        absent: the tracks that are no candidates any more. Their likelihoods do not rise, because their paths do not follow the
+        hand.
         """
         taking_part = [each for each in predicted if each.has_likelihood]
         before, lost = self._hand_down(taking_part)
@@ -264,7 +265,7 @@ def count_shared(before: Candidate, now: Candidate) -> int | None:
 
 
 def _limit_gains(shares: Array, old: Array, limited: NDArray[np.bool_]) -> Array:
-    """Return shares (s,) of one, of which the limited ones are not larger than before; the others have the rest."""
+    """Return shares (s,) that sum to one. The limited ones are not larger than the old ones; the others share the rest."""
     others = float(shares[~limited].sum())
     if not others:
         return shares

@@ -120,7 +120,8 @@ class Predictor:
             self._error = ''
             self._recent.append(prediction)
             self._guidance.note_prediction(prediction, received_s)
-            self._receive(view_prediction(prediction))  # here: two threads that compute at once delay one another
+            # encoded in this thread: if the thread of the page did it during the next prediction, each would delay the other
+            self._receive(view_prediction(prediction))
 
     def _note_error(self, error: Exception) -> None:
         self._error = f'internal error: {error}'

@@ -145,7 +145,10 @@ def make_random_scene(random: np.random.Generator, goals: Sequence[Place]) -> Pl
 
 
 class View(NamedTuple):
-    """A prediction, as pictures show it, and its candidates as the page draws them: those without a likelihood last."""
+    """A prediction for the page.
+
+    snapshot: as pictures show it; candidates: as the page draws them, those without a likelihood last.
+    """
 
     prediction: Prediction
     snapshot: Prediction

@@ -284,6 +284,7 @@ class Session:
             self._tasks.note_most_likely(stamp_ns * 1e-9, snapshot.candidates[0].way)
         if hand is not None and not self._is_blind:
             slots = self._slots.assign([each.way for each in snapshot.candidates_with_likelihood])
+            # those without a likelihood, which are last, have no slot
             candidates = [each | {'slot': slot} for each, slot in zip_longest(view.candidates, slots)]
             shares = {'unknown': round(snapshot.unknown, 4), 'other': round(snapshot.other, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)

@@ -12,7 +12,7 @@ fits need nothing else. The questions:
 In a row of m obstacles (`rows`) a path that does not turn back takes one of m + 1 gaps, so that rows of m_1, m_2, ... obstacles
 leave (m_1 + 1)(m_2 + 1)... homotopy classes. A gap that is too narrow for the hand is none. A question is put only where at least
 two answers are possible. Candidates may also weave through a row; such an answer can be given, but a uniform guess does not count
-it, unless it is the true one: what was done is possible.
+it. The true answer always counts as possible.
 """
 
 from __future__ import annotations

@@ -281,7 +281,8 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
 def _find_share_rate(settings: GuidanceConfig) -> float:
     """Return the largest rate of change of the share of guidance [1/s]: a released share is zero within `ramp_s`.
 
-    A blended command changes by twice as much of its size at most: with an authority up to 0.5, by its size within `ramp_s`.
+    A blended command changes at twice this rate at most, relative to its size. With an authority up to 0.5, that is by its size
+    within `ramp_s`.
     """
     return max(settings.authority, 0.5) / settings.ramp_s
 

@@ -35,7 +35,8 @@ from foc_ros.core.types import Array, HandState, Record
 from .movements import find_goal_at_end
 
 MOST_LEFT_M = 0.1
-"""Most of the way that a reach may leave [m], and not more than half of it: hands touch objects at their edges."""
+"""Largest distance from its goal at which a reach may end [m]: hands touch objects at their edges. A short reach has to cover
+half of its way."""
 
 
 class KnownGoal(NamedTuple):

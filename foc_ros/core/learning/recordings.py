@@ -81,7 +81,7 @@ LEAST_WEIGHT = 1e-3
 FADE_S = 0.25
 """Time over which the weight of a recording falls to zero before its end [s]."""
 SEEN_AFTER_S = 0.1
-"""How long a movement has begun when its onset is seen [s]: the hand is at rest before that, and not at the onset."""
+"""Time from the beginning of a movement to its onset [s]: the onset is seen when the hand already moves."""
 ROUNDING_M = 1e-5
 """Distance of a recorded state from the beginning of the path that is rounding [m]."""
 EXACT = 1e-12

@@ -127,7 +127,7 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
         violation, violated = compute_violation(problem, mean, result.tau, parts)
     effort, names = float(control @ control), problem.obstacles.ids
     shortfall, expected = 0.0 if status is Status.SOLVED else max(problem.wanted_k - k, 0.0), None
-    if status in (Status.DEADLINE, Status.ESTIMATED):
+    if status.is_estimate:
         expected, shortfall = _expect(problem, effort, shortfall, min(REMAINING * result.gain, LARGEST_GAIN))
     obstacles, times, pushes = (each.tolist() for each in result.forces)
     return Solution(
