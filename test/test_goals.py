@@ -305,6 +305,19 @@ def test_a_movement_that_ends_far_from_all_goals_says_nothing_and_a_reset_forget
     assert session.share(1) == pytest.approx(before)
 
 
+def test_other_parameters_leave_habits_but_for_that_by_which_reaches_were_expected():
+    session = Session([NEAR, FAR])
+    before = session.share(1)
+    session.reach(FAR, times=3)
+    session.pipeline.reconfigure(CONFIG.with_values({'likelihood.shortfall': 2.0, 'rate_hz': 20.0}))
+    session.reach(HOME)
+    assert session.share(1) > 1.2 * before
+    for beta in (2.0 * BETA, BETA):
+        session.pipeline.reconfigure(CONFIG.with_values({'likelihood.beta': beta}))
+    session.reach(HOME)
+    assert session.share(1) == pytest.approx(before)
+
+
 def test_a_stop_on_the_way_is_no_reach_although_it_has_covered_half_of_it():
     session = Session([NEAR, FAR])
     before = session.share(1)

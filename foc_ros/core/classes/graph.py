@@ -105,11 +105,6 @@ class Graph(Record):
     length: Array
     crossings: Crossings
 
-    @cached_property
-    def lists(self) -> tuple[list[int], list[int], list[float]]:
-        """The first line of each node, and the heads and lengths of the lines, as lists, which Python reads faster."""
-        return self.first.tolist(), self.head.tolist(), self.length.tolist()
-
     def join(self, point: Array) -> Lines:
         """Return the lines from a point (2,) [m] to the nodes of the graph that are visible from it."""
         nodes, outlines = self.nodes, self.nodes.outlines

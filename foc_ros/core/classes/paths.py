@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from heapq import heappop, heappush
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -72,8 +73,7 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
     notes: `search_cut` is increased if states are left at the largest number, `search_late` if the deadline ends the search.
     """
     graph, goal, named, centre = query.graph, query.goal, query.named, query.graph.nodes.outlines.centre
-    first, head, length = graph.lists
-    codes, ends = _encode_graph(graph, named.tobytes()), len(query.rest)
+    lines, ends = _list_lines(graph, named.tobytes()), len(query.rest)
     rest = [*query.rest, 0.0]
     to_goal = dict(zip(goal.nodes.tolist(), zip(goal.length.tolist(), _encode(-goal.crossings, named), strict=True), strict=True))
     ones = sum(1 << BITS * row for row in range(len(named)))
@@ -107,9 +107,9 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
                 tied.append(Arrival(key, _collect_points(query, node_of, before), swept))
                 found += 1
             continue
-        following = [(head[line], length[line], codes[line]) for line in range(first[node], first[node + 1])]
+        following = lines[node]
         if node in to_goal:
-            following.append((ends, *to_goal[node]))
+            following = [*following, (ends, *to_goal[node])]
         if before[state] < 0:
             following = [each for each in following if _is_taut(query, node, each[0])]
         for other, step, crossed in following:
@@ -173,9 +173,11 @@ def _collect_points(query: PathQuery, node_of: list[int], before: list[int]) -> 
 
 
 @lru_cache(maxsize=64)
-def _encode_graph(graph: Graph, named: bytes) -> list[int]:
-    """Return what the lines of a graph cross, encoded; kept while graph and names stay the same."""
-    return _encode(graph.crossings, np.frombuffer(named, dtype=np.intp))
+def _list_lines(graph: Graph, named: bytes) -> list[list[tuple[int, float, int]]]:
+    """Return the lines that leave each node: node at the end, length [m], and crossings, encoded; kept for the next search."""
+    codes = _encode(graph.crossings, np.frombuffer(named, dtype=np.intp))
+    lines = list(zip(graph.head.tolist(), graph.length.tolist(), codes, strict=True))
+    return [lines[begin:end] for begin, end in pairwise(graph.first.tolist())]
 
 
 def _encode(crossings: Crossings, named: Rows) -> list[int]:

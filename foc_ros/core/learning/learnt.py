@@ -95,5 +95,5 @@ class Learnt:
             self.pace if before.duration == now.duration else Pace(),
             Dispersion() if is_dispersed else self.dispersion,
             self.movements if is_recorded else Movements(),
-            self.habits if before.likelihood == now.likelihood else Habits(),
+            self.habits if before.likelihood.beta == now.likelihood.beta else Habits(),
         )

@@ -15,11 +15,9 @@ from foc_ros.core.types import Array
 
 from .margin import Contacts, Indices, Margin, Margins, Motion
 
-BRACKET = np.linspace(-1.0, 1.0, 9)
-"""Times, relative to a bracket, at which safety factors are sampled; the next bracket is a quarter of it."""
-NARROWINGS = 2
-"""Brackets after the one in which minima are told apart: the last points are 4e-3 steps apart, and a parabola or two lines pass
-through them."""
+BRACKET, NARROW = np.linspace(-1.0, 1.0, 9), np.linspace(-0.25, 0.25, 33)
+"""Times, relative to the distance of points on the grid, at which safety factors are sampled: first to tell minima apart, then
+around each. The last ones are 4e-3 steps apart, and a parabola or two lines pass through them."""
 BOLD = 1.5
 """Between two points of the grid a safety factor may change by this much more than from one point to the next."""
 
@@ -99,8 +97,7 @@ def _refine(
     There may be several beside one place, next to the corners of a small obstacle. Those are left out that cannot be below
     the least factor found for their movement and a bound (r,), if there is one.
     """
-    spacing = margins.spacing * (BRACKET[1] - BRACKET[0])
-    times, factors, is_on_edge = _sample(margins, motion, k, at, places, margins.spacing)
+    times, factors, is_on_edge = _sample(margins, motion, k, at, places, BRACKET)
     is_lowest = mark_lowest(factors.T)
     if bound is not None:
         bound = bound.copy()
@@ -109,34 +106,33 @@ def _refine(
     which, column = np.nonzero(is_lowest)
     at, places = at[which], Contacts(places.problem[which], places.obstacle[which], times[column, which])
     times, factors, is_on_edge = times[:, which], factors[:, which], is_on_edge[:, which]
-    for _ in range(NARROWINGS):
-        places = places._replace(time=_estimate(margins, times, factors, is_on_edge, column, spacing))
-        half, spacing = spacing, spacing * (BRACKET[1] - BRACKET[0])
-        times, factors, is_on_edge = _sample(margins, motion, k, at, places, half)
-        column = factors.argmin(axis=0)
-    found = places._replace(time=_estimate(margins, times, factors, is_on_edge, column, spacing))
+    places = places._replace(time=_estimate(margins, times, factors, is_on_edge, column, BRACKET))
+    times, factors, is_on_edge = _sample(margins, motion, k, at, places, NARROW)
+    column = factors.argmin(axis=0)
+    found = places._replace(time=_estimate(margins, times, factors, is_on_edge, column, NARROW))
     best = np.arange(len(column))
     lowest, least = factors[column, best], margins.measure(found, at, motion, k[at]).factor
     return found._replace(time=np.where(least <= lowest, found.time, times[column, best])), np.minimum(least, lowest)
 
 
 def _sample(
-    margins: Margins, motion: Motion, k: Array, at: Indices, places: Contacts, half: float
+    margins: Margins, motion: Motion, k: Array, at: Indices, places: Contacts, bracket: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return times (n, q) in brackets around places (q,), the safety factors, and whether an edge is nearest there."""
-    times = np.clip(places.time + half * BRACKET[:, None], 1.0, float(margins.steps))
+    """Return times (n, q) in a bracket (n,) around places (q,), the safety factors, and whether an edge is nearest there."""
+    times = np.clip(places.time + margins.spacing * bracket[:, None], 1.0, float(margins.steps))
     margin = margins.measure(places._replace(time=times), at, motion, k[at])
     return times, margin.factor, margin.is_on_edge
 
 
 def _estimate(
-    margins: Margins, times: Array, factors: Array, is_on_edge: NDArray[np.bool_], column: Indices, spacing: float
+    margins: Margins, times: Array, factors: Array, is_on_edge: NDArray[np.bool_], column: Indices, bracket: Array
 ) -> Array:
-    """Return the times (q,) of minima near the given one of n even samples (n, q) of each."""
+    """Return the times (q,) of minima near the given one of the samples (n, q) of each in a bracket (n,)."""
     row, best = np.clip(column, 2, len(times) - 3), np.arange(len(column))
     near = np.stack([factors[row + step, best] for step in range(-2, 3)])
     shift = _find_lowest(near, is_on_edge[row - 2, best] != is_on_edge[row + 2, best])
     is_inside = (times[0] > 1.0) & (times[-1] < margins.steps)
+    spacing = margins.spacing * (bracket[1] - bracket[0])
     return np.where(is_inside, times[row, best] + spacing * shift, times[column, best])
 
 
