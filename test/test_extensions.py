@@ -19,8 +19,9 @@ from foc_ros.core.ocp.backend import DenseQP, solve_piqp
 from foc_ros.core.ocp.strategies import Strategy, solve_fixed
 from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
 from foc_ros.core.plant.plants import Plant, discretise_damped_mass, discretise_triple_integrator
-from foc_ros.core.predict import build_problem, predict
+from foc_ros.core.predict import predict
 from foc_ros.core.registry import QP_BACKENDS, STRATEGIES
+from foc_ros.core.situation import build_problem
 from foc_ros.core.solution import Status
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState

@@ -26,8 +26,9 @@ from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.plant.covariance import SharedCovariances
-from foc_ros.core.predict import build_problem, predict
+from foc_ros.core.predict import predict
 from foc_ros.core.prediction import HeightTrajectory
+from foc_ros.core.situation import build_problem
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
 from foc_ros.io.json_output import encode_prediction

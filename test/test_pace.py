@@ -129,7 +129,7 @@ def judge(ahead_s, factor, duration_s):
 
 
 @pytest.mark.parametrize('factor', [0.25, 3.0])
-@pytest.mark.parametrize(('ahead_s', 'duration_s', 'share'), [(0.25, 10.0, 0.025), (1.0, 2.0, 0.5), (1.0, 0.8, 1.0)])
+@pytest.mark.parametrize(('ahead_s', 'duration_s', 'share'), [(0.25, 10.0, 0.000625), (1.0, 2.0, 0.25), (1.0, 0.8, 1.0)])
 def test_the_factor_of_gaussian_errors_is_recovered(factor, ahead_s, duration_s, share):
     dispersion = judge(ahead_s, factor, duration_s)
     assert dispersion.errors == 60
@@ -155,7 +155,8 @@ def test_factors_scale_the_covariance_and_nothing_else():
     for one, other in zip(plain, scaled, strict=True):
         for before, after in zip(one.candidates, other.candidates, strict=True):
             at_rest.append(bool(after.covariance[0, 0, 0] < 3.9 * before.covariance[0, 0, 0]))
-            factors = 2.0 ** np.linspace(2.0 / 3.0 if at_rest[-1] else 1.0, 1.0, len(after.mean))
+            now, share = 2.0 / 3.0 if at_rest[-1] else 1.0, np.linspace(0.0, 1.0, len(after.mean)) ** 2
+            factors = 2.0 ** (now + (1.0 - now) * share)
             np.testing.assert_allclose(after.covariance, factors[:, None, None] ** 2 * before.covariance, rtol=1e-12)
             np.testing.assert_array_equal(after.mean, before.mean)
             np.testing.assert_array_equal(after.motor_covariance, before.motor_covariance)

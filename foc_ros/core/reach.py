@@ -13,9 +13,9 @@ from .classes.library import GuessTiming
 from .hand.duration import is_passing
 from .ocp.problem import Problem
 from .plant.models import make_plant_model
-from .predict import build_problem, take_in_the_way
 from .prediction import PredictedCandidate
 from .scene import ReachingScene
+from .situation import build_problem, take_in_the_way
 from .solution import Candidate, label_class
 from .types import Array
 

@@ -6,7 +6,7 @@ The parameters of the covariance are expectations, and devices and people differ
 positions show what the standard deviations should be. The standard deviations of a candidate that lasts T are multiplied, at a
 time t ahead, by a factor that leads from `covariance.near` = f now to `covariance.far` = f' at its end:
 
-    f(t) = f^(1 - s) f'^s,  s = t / T.                                                                                      (1)
+    f(t) = f^(1 - s) f'^s,  s = (t / T)^2.                                                                                  (1)
 
 A hand that is on its way follows a plan closely. How it arrives, when, and what it does then are known less well, however near
 the end is. A hand at rest may begin to move at any time, and what holds for one on its way holds less for it: f counts with the
@@ -144,7 +144,7 @@ def make_forecast(
         at = min(ahead_s / solution.dt, len(solution.control))
         row = min(int(at), len(solution.control) - 1)
         after = at - row
-        shares.append(at / len(solution.control))
+        shares.append((at / len(solution.control)) ** 2)
         means.append((1.0 - after) * solution.mean[row, :2] + after * solution.mean[row + 1, :2])
         covariances.append((1.0 - after) * solution.covariance[row, :2, :2] + after * solution.covariance[row + 1, :2, :2])
     share = np.array(shares)
@@ -155,7 +155,7 @@ def make_forecast(
 
 
 def interpolate_factors(share: Array, config: CovarianceConfig) -> Array:
-    """Return the factors on standard deviations at shares s of the duration, any shape: equation 1."""
+    """Return the factors on standard deviations at shares s, any shape: equation 1."""
     factors: Array = config.near ** (1.0 - share) * config.far**share
     return factors
 
@@ -167,5 +167,6 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig, *,
     if at_rest:
         config = replace(config, near=config.near ** (2.0 / 3.0))
     solution = candidate.solution
-    covariance = solution.covariance * interpolate_factors(np.linspace(0.0, 1.0, len(solution.mean)), config)[:, None, None] ** 2
+    factors = interpolate_factors(np.linspace(0.0, 1.0, len(solution.mean)) ** 2, config)
+    covariance = solution.covariance * factors[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))
