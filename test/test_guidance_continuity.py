@@ -82,6 +82,18 @@ def test_a_blended_command_changes_by_no_more_than_its_size_within_the_ramp(shap
         assert changes.max() <= 0.1 * PERIOD / GuidanceConfig().ramp_s * (1 + 1e-6)
 
 
+@pytest.mark.parametrize('gap_s', [0.02, 0.2])
+def test_after_a_gap_of_updates_neither_force_nor_share_is_sudden(gap_s):
+    config, velocity, late = Config().with_values({'guidance.slew': 20.0}), np.array([0.35, 0.0]), []
+    for ahead_m in (0.05, 0.1, 0.13, 0.15):
+        position = np.array([ahead_m, 0.006])
+        newest = predict(position, place('circle'), 1)
+        _, state = guide(config, GuidanceState(), GuidanceInput(0.0, position - gap_s * velocity, velocity, newest))
+        late.append(guide(config, state, GuidanceInput(gap_s, position, velocity, newest))[0])
+    assert 0.1 < max(np.hypot(*each.force) for each in late) <= 2.0 * PERIOD * 20.0 + 1e-9
+    assert 0.01 < max(each.authority for each in late) <= 2.0 * PERIOD * 0.5 / GuidanceConfig().ramp_s + 1e-9
+
+
 @pytest.mark.parametrize('shape', SHAPES)
 def test_the_share_of_guidance_does_not_lead_into_an_obstacle_nearby(shape):
     for aside in (-0.034, -0.012, 0.003, 0.012, 0.034):

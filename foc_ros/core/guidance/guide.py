@@ -195,9 +195,10 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
         followed = replace(followed, progress=progress)
         demand = _compute_demand(settings, followed, seen, given)
     target = demand.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
-    longest = LATE_PERIODS / settings.rate_hz if status is GuidanceStatus.GUIDING else dt  # no sudden force after a gap
-    force = step_force(state.force, target, settings.slew * min(dt, longest), partial(_find_bound, settings, seen, energy))
-    share = state.share + shorten(demand.share - state.share, dt * _find_share_rate(settings))
+    # after a gap nothing rises suddenly; what is released falls by the whole time
+    counted = min(dt, LATE_PERIODS / settings.rate_hz) if status is GuidanceStatus.GUIDING else dt
+    force = step_force(state.force, target, settings.slew * counted, partial(_find_bound, settings, seen, energy))
+    share = state.share + shorten(demand.share - state.share, counted * _find_share_rate(settings))
     reference, authority = given.position + find_deflection(demand.stiffness, force), float(np.hypot(*share))
     output = GuidanceOutput(
         given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, normalize(share), energy
