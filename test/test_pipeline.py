@@ -95,6 +95,13 @@ def seen(intake):
     return intake.pipeline.scene.obstacles(state.stamp_ns).ids
 
 
+def test_markers_from_before_the_working_frame_was_known_are_forgotten_if_they_are_in_another_one(intake):
+    show(intake, marker(TYPES, id=1, frame_id='camera'))
+    move(intake, 1.0)
+    show(intake, marker(TYPES, id=2))
+    assert seen(intake) == ('a/2',)
+
+
 def test_a_marker_expires_by_the_stamp_of_the_hand(intake):
     move(intake, 1.0)
     show(intake, marker(TYPES, id=1, lifetime=0.5), marker(TYPES, id=2))
