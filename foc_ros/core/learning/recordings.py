@@ -44,7 +44,6 @@ doi:10.1214/ss/1177013825) of both normal distributions, in which the plan count
 
     S' = ((1 - a) S^-1 + a R^-1)^-1,   m' = S' ((1 - a) S^-1 m + a R^-1 r),   a = n / (n + n_3).
 
-From the time on at which less than half of the weight is left, m' - m decreases linearly to zero at the end of the plan.
 Velocity and acceleration change by the derivatives of m' - m. Given the position, their distribution remains that of the plan.
 """
 
@@ -306,7 +305,6 @@ def pool_path(solution: Solution, paths: Array, weights: Array, position_covaria
         The b / 2 by which a recording departs from the hand [m/s].
     """
     times, count = solution.times, weights.sum(axis=0)
-    covered = int(np.flatnonzero(count >= 0.5 * count[0])[-1])
     shares = np.divide(weights, count, out=np.zeros_like(weights), where=count > 0.0)
     centre, position = np.einsum('em,emi->mi', shares, paths), solution.covariance[:, :2, :2] + EXACT * np.eye(2)
     offset = paths - centre
@@ -319,8 +317,6 @@ def pool_path(solution: Solution, paths: Array, weights: Array, position_covaria
     pooled[0] = position[0]
     displaced = (pooled @ (share * recorded_precision) @ (centre - solution.path)[..., None])[..., 0]
     displaced[0] = 0.0
-    if covered < len(times) - 1:
-        displaced[covered:] = displaced[covered] * np.linspace(1.0, 0.0, len(times) - covered)[:, None]
     gain = solution.covariance[:, :, :2] @ precision
     covariance = solution.covariance + gain @ (pooled - position) @ gain.swapaxes(1, 2)
     mean = solution.mean + _differentiate(displaced, solution.dt, solution.mean.shape[1] // 2)
