@@ -115,9 +115,10 @@ class BulgeFields(Fields):
     kind: Any = None
 
 
-def _find_kind(obstacle: Any) -> str:
-    given = obstacle if isinstance(obstacle, Mapping) else {}
-    return '(hull)' if 'points' in given else '(box)' if 'size' in given else '(circle)'
+def _find_kind(obstacle: Any) -> str | None:
+    kinds = {'points': '(hull)', 'size': '(box)', 'x': '(circle)', 'y': '(circle)'}
+    given = obstacle if isinstance(obstacle, Mapping) else {'x'}
+    return next((kind for field, kind in kinds.items() if field in given), None)
 
 
 def _list_or(tag: str) -> Discriminator:
@@ -126,7 +127,11 @@ def _list_or(tag: str) -> Discriminator:
 
 AnyObstacle = Annotated[
     Annotated[CircleFields, Tag('(circle)')] | Annotated[BoxFields, Tag('(box)')] | Annotated[HullFields, Tag('(hull)')],
-    Discriminator(_find_kind),
+    Discriminator(
+        _find_kind,
+        custom_error_type='no_shape',
+        custom_error_message='x, y and radius of a circle, x, y and size of a box, or points: two for a capsule, more for a hull',
+    ),
 ]
 AnyGoal = Annotated[Annotated[Point, Tag('(list)')] | Annotated[GoalFields, Tag('(goal)')], _list_or('(goal)')]
 AnyGuess = Annotated[Annotated[Points, Tag('(list)')] | Annotated[BulgeFields, Tag('(guess)')], _list_or('(guess)')]
