@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config
-from foc_ros.core.errors import RecordingError, SceneError
+from foc_ros.core.errors import FocWarning, RecordingError, SceneError
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles
 from foc_ros.io.scene_file import load_scene, parse_scene
 
@@ -98,6 +98,18 @@ ROUND = [[2 + np.cos(turn), 2 + np.sin(turn)] for turn in np.linspace(0, 2 * np.
 
 def obstacle(count=1, **fields):
     return {**SCENE, 'obstacles': count * [{'x': 1, 'y': 1, 'radius': 0.1, **fields}]}
+
+
+@pytest.mark.parametrize(
+    ('given', 'message'),
+    [
+        ({'goal': [300, 0]}, r'goal: 300 m away, to be reached in 0.8 s: lengths are in metres, and times in seconds'),
+        (obstacle(size=[0.1, 0.1], yaw=45), r'obstacles\[0\].yaw: 45 is more than a turn: angles are in radians'),
+    ],
+)
+def test_units_that_are_probably_not_meant_are_told(given, message):
+    with pytest.warns(FocWarning, match=message):
+        parse_scene({**SCENE, **given})
 
 
 @pytest.mark.parametrize(
