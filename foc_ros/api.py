@@ -127,7 +127,8 @@ class Predictor:
         Parameters; the defaults if not given. `rate_hz` and the timeouts have no effect here: every update predicts. `budget_s`
         holds by the clock as in the node; with 0 the answers do not depend on the machine.
     library : path or sequence of demonstrations, optional
-        Demonstrated paths that `foc_ros replay --learn` wrote; by default the file that `homotopy.library` names.
+        Demonstrated paths that `foc_ros learn` or `foc_ros replay --learn` wrote; by default the file that `homotopy.library`
+        names. They count in their frame, or in any if the config names no `frame_id`.
 
     Examples
     --------

@@ -12,6 +12,7 @@ from evaluation_samples import write_tables
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import foc_ros
 from foc_ros.analysis.replay import Replay
 from foc_ros.cli.main import main
 from foc_ros.core.classes import find_path_sides, search
@@ -267,6 +268,21 @@ def test_learn_writes_a_library_of_recordings(tmp_path):
         assert 0.5 < STEP_S * len(each.states) < 1.5
         assert np.diff(each.states[:, 0]).min() > -1e-3
         assert each.states[-1, :2] == pytest.approx([0.3, 0.0], abs=0.02)
+
+
+def test_a_predictor_without_a_frame_uses_a_library(tmp_path):
+    write_reaches(tmp_path, [0.3, 0.3])
+    assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 0
+    file, shares = tmp_path / 'ways.json', []
+    for frame, library in (('', ()), ('', file), ('world', file), ('arm', file)):
+        predictor = foc_ros.Predictor(Config(budget_s=0.0, frame_id=frame), library=library)
+        predictor.set_goals([(0.3, 0.0)])
+        predictor.set_obstacles([foc_ros.Circle((0.15, 0.0), 0.015, name='0')])
+        for share in np.linspace(0.0, 0.2, 11):
+            prediction = predictor.update(share, (0.3 * share, 0.0))
+        shares.append({each.label: each.likelihood for each in prediction}['goal0:+0'])
+    assert shares[1] == shares[2] > shares[0] + 0.02, 'the recordings pass on the left'
+    assert shares[3] == shares[0], 'in another frame they say nothing'
 
 
 def test_a_recording_that_does_not_reach_its_goal_is_named(tmp_path, capsys):

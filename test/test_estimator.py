@@ -234,7 +234,7 @@ def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoo
         added = after.solution.covariance - before.solution.covariance
         assert_allclose(added[-1, :2, :2], 0.006**2 * np.eye(2), atol=1e-9)
         assert_allclose(added, added.swapaxes(1, 2), atol=1e-12)
-        late = compute_duration_sensitivity(before.solution, False)[STEPS // 2, :2]
+        late = compute_duration_sensitivity(before.solution, False, TRIPLE_INTEGRATOR)[STEPS // 2, :2]
         across = np.array([-late[1], late[0]]) / np.hypot(*late)
         half_way = TRIPLE_INTEGRATOR.compute_goal_map(before.solution.dt, STEPS, False)[STEPS // 2, 0, 0]
         assert across @ added[STEPS // 2, :2, :2] @ across == pytest.approx((0.006 * half_way) ** 2)

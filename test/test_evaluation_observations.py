@@ -11,6 +11,7 @@ from foc_ros.analysis.evaluation import observations
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
 from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles, observe
 from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth
+from foc_ros.analysis.fitting.one_replay import NO_WIDENING, widen_covariances
 from foc_ros.analysis.recordings import EPOCH_NS, find_recordings
 from foc_ros.core import tracks
 from foc_ros.core.classes.rows import find_rows
@@ -48,6 +49,17 @@ def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_
         tried = dict(zip(plain.candidates.labels, power_rule_shares(plain, AHEAD.likelihood), strict=True))
         published = dict(zip(ahead.candidates.labels, ahead.candidates.likelihood, strict=True))
         assert tried == pytest.approx(published)
+
+
+@pytest.mark.parametrize('plant', ['triple_integrator', 'damped_mass'])
+def test_other_widenings_of_observations_give_the_covariances_of_a_replay_with_them(data, plant):
+    own = {'foc.plant': plant, 'foc.steps': 100, 'duration.adaptation': 'none', 'covariance.adaptation': 'none'}
+    known = replace_values(PLAIN, own)
+    wide = {'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.02, 'duration.spread': 0.3}
+    replays = (observe_one(data, replace_values(known, each)).observations for each in (NO_WIDENING, wide))
+    for narrow, widened in zip(*replays, strict=True):
+        tried = widen_covariances(narrow, [tuple(wide.values())], known)[0]
+        np.testing.assert_allclose(tried, widened.candidates.covariance, rtol=0.01, atol=1e-5)
 
 
 def test_the_ground_truth_is_that_of_the_path(data):

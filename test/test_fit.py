@@ -101,7 +101,9 @@ def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_la
     answer, config = _fit(tmp_path / 'bags', capsys, **FIXED)
     assert answer['recordings'] == 1 and set(answer['failed']) == {'bad'}
     assert any(words.startswith('cross-validation: 1 recordings are too few') for words in answer['warnings'])
+    assert any(words.startswith('intervals: one recording') for words in answer['warnings'])
     assert not {'foc.tau', 'foc.lam', 'foc.eta'} & set(answer['parameters'])
+    assert {'duration.fitts_a_s', 'duration.arrival'} <= set(answer['undetermined']), 'they may be the best by chance'
     assert config.foc.tau == 1e-4
     assert any(words.startswith('foc.tau, foc.lam: kept as they are') for words in answer['warnings'])
 

@@ -190,7 +190,7 @@ def test_the_better_choice_is_taken():
     assert config == SEARCH_CONFIG and found.chosen == {}, 'equal scores'
 
 
-@pytest.mark.parametrize('scores', [[1.5, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2, 0.0], [0.5, 1.5], [1.0]])
+@pytest.mark.parametrize('scores', [[1.5, -0.2, -0.2, -0.2, -0.2, -0.2, -0.2, 0.0], [0.5, 1.5], [1.0], [-1.0]])
 def test_a_choice_that_is_better_by_chance_only_is_undetermined(scores):
     config, found = KnownReplays([[0.0] * len(scores), scores]).search(ARRIVALS)
     assert config == SEARCH_CONFIG and found.chosen == {}

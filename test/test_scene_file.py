@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from foc_ros.core.config import Config
-from foc_ros.core.errors import RecordingError, SceneError
-from foc_ros.core.obstacles.shapes import Box, Circle, Hull, collect_obstacles
+from foc_ros.core.errors import FocWarning, RecordingError, SceneError
+from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles
 from foc_ros.io.scene_file import load_scene, parse_scene
 
 SCENE: dict[str, Any] = {
@@ -74,11 +74,13 @@ def test_boxes_capsules_and_hulls_are_read():
         {'x': 1, 'y': 2, 'size': [0.4, 0.2], 'yaw': 0.5, 'id': 'tray'},
         {'x': 3, 'y': 4, 'size': [0, 0.2], 'radius': 0.01, 'radius_stddev': 0.002},
         {'points': [*corners, [0.2, 1.1]], 'radius': 0.01},
+        {'points': [[4, 1], [4, 2]], 'radius': 0.01},
         {'x': 5, 'y': 6, 'radius': 0.02},
     ]
     obstacles = parse_scene({**SCENE, 'obstacles': given}).obstacles
     boxes = Box((1, 2), (0.4, 0.2), 0.5, name='tray'), Box((3, 4), (0, 0.2), radius=0.01, radius_stddev=0.002)
-    expected = collect_obstacles([*boxes, Hull(corners, radius=0.01), Circle((5, 6), radius=0.02)])
+    hulls = Hull(corners, radius=0.01), Capsule((4, 1), (4, 2), 0.01)
+    expected = collect_obstacles([*boxes, *hulls, Circle((5, 6), radius=0.02)])
     for name, values in vars(expected).items():
         np.testing.assert_array_equal(getattr(obstacles, name), values, err_msg=name)
 
@@ -90,11 +92,24 @@ def test_yaml_and_json_give_the_same_scene(tmp_path, name):
     assert scene.config.foc.lam == 1e6 and scene.obstacles.ids == ('cup', '1')
 
 
+CAPSULE = {'start': [0.1, 0.1], 'end': [0.1, 0.2], 'radius': 0.01}
 ROUND = [[2 + np.cos(turn), 2 + np.sin(turn)] for turn in np.linspace(0, 2 * np.pi, 18)[:17]]
 
 
 def obstacle(count=1, **fields):
     return {**SCENE, 'obstacles': count * [{'x': 1, 'y': 1, 'radius': 0.1, **fields}]}
+
+
+@pytest.mark.parametrize(
+    ('given', 'message'),
+    [
+        ({'goal': [300, 0]}, r'goal: 300 m away, to be reached in 0.8 s: lengths are in metres, and times in seconds'),
+        (obstacle(size=[0.1, 0.1], yaw=45), r'obstacles\[0\].yaw: 45 is more than a turn: angles are in radians'),
+    ],
+)
+def test_units_that_are_probably_not_meant_are_told(given, message):
+    with pytest.warns(FocWarning, match=message):
+        parse_scene({**SCENE, **given})
 
 
 @pytest.mark.parametrize(
@@ -127,6 +142,7 @@ def obstacle(count=1, **fields):
         ({**SCENE, 'obstacles': [{'points': []}]}, r'obstacles\[0\].points: expected finite numbers of shape \(n, 2\), got \[\]'),
         ({**SCENE, 'obstacles': [{'points': ROUND}]}, r'obstacles\[0\].points: expected a hull of at most 16 corners, got 17'),
         ({**SCENE, 'hand_radius': -1}, r'hand_radius: expected a number in \[0, 1\] m, got -1'),
+        ({**SCENE, 'obstacles': [CAPSULE]}, r'obstacles\[0\]: expected x, .*, or points: two for a capsule, .*, got .*start.*'),
         (obstacle(r=1), r'obstacles\[0\]\.r: expected a known field: x, .*, got 1'),
         (obstacle(2, id=3), "obstacles: expected a different name for each obstacle, got '3' twice"),
         (obstacle(id='a;b'), r"obstacles\[0\].id: expected a whole number, or a name .*, got 'a;b'"),

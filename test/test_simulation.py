@@ -48,6 +48,28 @@ def test_measures_of_a_trial_with_known_answers():
     assert measures['opposing_share'] == pytest.approx(0.5, rel=0.02)
 
 
+def test_without_a_force_guidance_opposes_nothing(tmp_path, capsys):
+    options = ['--operators', 'accurate', '--trials', '1', '--json']
+    (tmp_path / 'weak.yaml').write_text(dump_parameter_file(QUICK.with_values({'guidance.f_max': 0.0})))
+    assert main(['simulate', '--params', str(tmp_path / 'weak.yaml'), *options]) == 0
+    alone, guided = json.loads(capsys.readouterr().out)['cells']
+    assert alone['opposing_share'] == guided['opposing_share'] == 0.0
+    assert alone['completion_s'] == guided['completion_s'] and alone['path_m'] == guided['path_m']
+
+
+def test_the_hand_of_an_operator_is_as_large_as_the_parameters_say(tmp_path, capsys):
+    options = ['--operators', 'accurate', '--assistance', 'none', '--trials', '5', '--json']
+    clearances, paths = [], []
+    for radius in (0.0, 0.012):
+        (tmp_path / 'hand.yaml').write_text(dump_parameter_file(QUICK.with_values({'scene.hand_radius': radius})))
+        assert main(['simulate', '--params', str(tmp_path / 'hand.yaml'), *options]) == 0
+        (cell,) = json.loads(capsys.readouterr().out)['cells']
+        clearances.append(cell['min_clearance_m'])
+        paths.append(cell['path_m'])
+    assert paths[1] > paths[0] + 0.005, 'a larger hand makes larger detours'
+    assert abs(clearances[1] - clearances[0]) < 0.006, 'and keeps about the same distance'
+
+
 class Misled(Assistance):
     """Takes a wrong way to be the likeliest, and draws back."""
 

@@ -7,8 +7,9 @@ A missing field has the default of its parameter.
 
 from __future__ import annotations
 
+import math
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,7 +18,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag, Validat
 
 from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, collect_all, join_errors
+from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, collect_all, join_errors, warn
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.scene import ReachingScene
@@ -30,6 +31,8 @@ from .fields import Fields, describe_errors
 
 MOST_OBSTACLES, MOST_GOALS = 20_000, 256
 """Bounds on the rows of a scene, those of the node's messages."""
+FASTEST, TURN = 10.0, 2.0 * math.pi
+"""Mean speed [m/s] and angle [rad] beyond which a scene is probably not in metres, seconds and radians."""
 
 PARAMETERS = {
     'duration_s': 'duration.fixed_s',
@@ -115,9 +118,10 @@ class BulgeFields(Fields):
     kind: Any = None
 
 
-def _find_kind(obstacle: Any) -> str:
-    given = obstacle if isinstance(obstacle, Mapping) else {}
-    return '(hull)' if 'points' in given else '(box)' if 'size' in given else '(circle)'
+def _find_kind(obstacle: Any) -> str | None:
+    kinds = {'points': '(hull)', 'size': '(box)', 'x': '(circle)', 'y': '(circle)'}
+    given = obstacle if isinstance(obstacle, Mapping) else {'x'}
+    return next((kind for field, kind in kinds.items() if field in given), None)
 
 
 def _list_or(tag: str) -> Discriminator:
@@ -126,7 +130,11 @@ def _list_or(tag: str) -> Discriminator:
 
 AnyObstacle = Annotated[
     Annotated[CircleFields, Tag('(circle)')] | Annotated[BoxFields, Tag('(box)')] | Annotated[HullFields, Tag('(hull)')],
-    Discriminator(_find_kind),
+    Discriminator(
+        _find_kind,
+        custom_error_type='no_shape',
+        custom_error_message='x, y and radius of a circle, x, y and size of a box, or points: two for a capsule, more for a hull',
+    ),
 ]
 AnyGoal = Annotated[Annotated[Point, Tag('(list)')] | Annotated[GoalFields, Tag('(goal)')], _list_or('(goal)')]
 AnyGuess = Annotated[Annotated[Points, Tag('(list)')] | Annotated[BulgeFields, Tag('(guess)')], _list_or('(guess)')]
@@ -199,6 +207,7 @@ def parse_scene(document: object) -> ReachingScene:
     noise = None if fields.noise is None else np.array([config.foc.noise_x, config.foc.noise_y])
     scene = ReachingScene(fields.build_hand(), table.positions, obstacles, noise, None, config, table.names, table.objects)
     scene.check()
+    _doubt_units(scene, fields.obstacles)
     if fields.guess is None:
         return scene
     if len(scene.goals) > 1:
@@ -233,6 +242,16 @@ def _read_fields(scene: Mapping[str, Any]) -> SceneFields:
     except ValidationError as invalid:
         errors = [SceneError(*each) for each in describe_errors(invalid, NAMES)]
     raise join_errors(errors)
+
+
+def _doubt_units(scene: ReachingScene, obstacles: Sequence[CircleFields | HullFields]) -> None:
+    """Warn of numbers that are probably not in metres, seconds and radians."""
+    farthest = max(math.dist(scene.hand.mean[:2], goal) for goal in scene.goals)
+    if farthest > FASTEST * scene.duration_s:
+        warn(f'goal: {farthest:g} m away, to be reached in {scene.duration_s:g} s: lengths are in metres, and times in seconds')
+    for row, each in enumerate(obstacles):
+        if isinstance(each, BoxFields) and abs(each.yaw) > TURN:
+            warn(f'obstacles[{row}].yaw: {each.yaw:g} is more than a turn: angles are in radians')
 
 
 def _build_shape(row: int, given: CircleFields | BoxFields | HullFields) -> Shape:

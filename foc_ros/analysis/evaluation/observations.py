@@ -35,6 +35,7 @@ from foc_ros.core.errors import FocError, RecordingError, warn
 from foc_ros.core.hand.duration import is_passing
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.plant.covariance import compute_duration_sensitivity
+from foc_ros.core.plant.models import make_plant_model
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record
 
@@ -217,7 +218,7 @@ def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Co
 def _tabulate_candidates(
     prediction: Prediction, obstacles: Obstacles, hand: HandState, goals: Array, config: Config
 ) -> CandidateTable:
-    predicted, passing = prediction.candidates, is_passing(config.duration)
+    predicted, passing, plant = prediction.candidates, is_passing(config.duration), make_plant_model(config.foc)
     solutions = [each.solution for each in predicted]
     has_likelihood = np.array([each.has_likelihood for each in predicted])
     passages = measure_passages(solutions, obstacles)
@@ -246,7 +247,7 @@ def _tabulate_candidates(
         ),
         covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]) + EXACT * np.eye(2),
         duration_sensitivity=np.array(
-            [interpolate_steps(compute_duration_sensitivity(each, passing)[:, :2], each.dt) for each in solutions]
+            [interpolate_steps(compute_duration_sensitivity(each, passing, plant)[:, :2], each.dt) for each in solutions]
         ),
         branch_times=compute_branch_times(passages),
         decisions=find_decisions(sides[has_likelihood], goal[has_likelihood], grown, hand, goals),

@@ -125,6 +125,8 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
         fit.take(step(observed, fit.config))
     if not is_cross_validated(observed):
         fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
+    if len(observed) == 1:
+        fit.warnings.append('intervals: one recording, which shows no differences between recordings')
 
 
 def compare_configs(

@@ -24,7 +24,7 @@ from foc_ros.analysis.evaluation.truth import HORIZONS
 from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, flatten, replace_values
 from foc_ros.core.hand.duration import is_passing
-from foc_ros.core.plant.models import TRIPLE_INTEGRATOR
+from foc_ros.core.plant.models import make_plant_model
 from foc_ros.core.types import Array
 
 from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
@@ -142,12 +142,13 @@ def compute_mean_densities(
 def widen_covariances(observation: Observation, widenings: Iterable[Sequence[float]], config: Config) -> Array:
     """Return the covariance (q, k, 3, 2, 2) [m^2] of the candidates' positions at `HORIZONS_S` with each widening."""
     candidates, late, squares = observation.candidates, observation.candidates.duration_sensitivity, np.array(widenings) ** 2
+    plant = make_plant_model(config.foc)
     unit = []  # variances by process noise and by scatter of the end, of 1 each, (k, 2, 3)
     for time_s in candidates.time_s.tolist():
         kind = time_s / config.foc.steps, config.foc.steps, is_passing(config.duration)
-        jerk = TRIPLE_INTEGRATOR.compute_process_covariance(*kind)
-        end = TRIPLE_INTEGRATOR.compute_goal_map(*kind) ** 2
-        unit.append([interpolate_steps(each[:, 0, 0], kind[0]) for each in (jerk, end)])
+        process = plant.compute_process_covariance(*kind)
+        end = plant.compute_goal_map(*kind) ** 2
+        unit.append([interpolate_steps(each[:, 0, 0], kind[0]) for each in (process, end)])
     both = np.tensordot(squares[:, :2], np.array(unit), (1, 1))
     spread = np.multiply.outer(squares[:, 2], late[..., :, None] * late[..., None, :])
     return np.asarray(candidates.covariance + both[..., None, None] * np.eye(2) + spread)

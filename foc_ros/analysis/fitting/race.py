@@ -163,8 +163,9 @@ def _average_by_recording(found: Sequence[Mapping[Key, float]], most: float, nam
 def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> Findings:
     """Return what is new in the best of some settings, of which the first is the given one."""
     finalists, scores, first_scores = race(kind, settings, replays)
-    winners = resample(lambda rows: rank(scores[:, :, rows])[0], scores.shape[2]).astype(int)
-    best = rank(scores)[0]
+    winners, best = list(range(len(finalists))), rank(scores)[0]
+    if scores.shape[2] > 1:  # else any of them may be the best by chance
+        winners = resample(lambda rows: rank(scores[:, :, rows])[0], scores.shape[2]).astype(int).tolist()
     if settings[0] in finalists and not is_better(scores[:, best], scores[:, given := finalists.index(settings[0])]):
         best = given
     found = _describe_choice(finalists[best], settings, [finalists[each] for each in winners])

@@ -120,8 +120,8 @@ class Task(Record):
     hand_radius: float = 0.0
 
 
-def draw_task(operator: str, rng: np.random.Generator) -> Task:
-    """Draw the scene and the intention of an operator other than `HUMAN_PATHS`."""
+def draw_task(operator: str, rng: np.random.Generator, hand_radius: float = 0.0) -> Task:
+    """Draw the scene and the intention of an operator other than `HUMAN_PATHS`, who has a hand of a radius [m]."""
     for _ in range(MOST_DRAWS):
         goals = np.array([[0.30, -0.09], [0.33, 0.0], [0.30, 0.09]]) + rng.normal(0.0, 0.01, (3, 2))
         obstacles, kept = make_obstacles(), np.concatenate([np.zeros((1, 2)), goals])
@@ -133,7 +133,7 @@ def draw_task(operator: str, rng: np.random.Generator) -> Task:
             if distances.min() >= radius + 0.03:
                 obstacles = make_obstacles([*obstacles.centre, centre], [*obstacles.radius, radius], 0.001)
         # the operator sees each obstacle at a place with a standard deviation of 5 mm
-        seen = replace(obstacles, centre=obstacles.centre + rng.normal(0.0, 0.005, obstacles.centre.shape))
+        seen = replace(obstacles, centre=obstacles.centre + rng.normal(0.0, 0.005, obstacles.centre.shape)).grow(hand_radius)
         row = int(rng.integers(len(goals)))
         path = plan_path(rng, np.zeros(2), goals[row], seen)
         if path is not None and operator == CHANGES_WAY:
@@ -144,9 +144,10 @@ def draw_task(operator: str, rng: np.random.Generator) -> Task:
         if path is None:
             continue
         if operator == UNANNOUNCED_GOAL:
-            return Task(ARMS[operator], obstacles, np.delete(goals, row, axis=0), goals[row], -1, path)
-        return Task(ARMS[operator], obstacles, goals, goals[row], row, path)
-    raise FocError(f'no scene in {MOST_DRAWS} draws has a path for the operator {operator}')
+            return Task(ARMS[operator], obstacles, np.delete(goals, row, axis=0), goals[row], -1, path, hand_radius)
+        return Task(ARMS[operator], obstacles, goals, goals[row], row, path, hand_radius)
+    words = f'no scene in {MOST_DRAWS} draws has a path for the operator {operator}, with scene.hand_radius {hand_radius:g} m'
+    raise FocError(words)
 
 
 class SimulatedArm:

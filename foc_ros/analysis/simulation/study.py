@@ -154,7 +154,7 @@ def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
         'path_m': float(np.hypot(*np.diff(trial.position, axis=0).T).sum()),
         'effort': DT * float((trial.effort**2).sum()),
         'opposing_impulse': opposing,
-        'opposing_share': opposing / duration_s / f_max,
+        'opposing_share': opposing / duration_s / f_max if f_max else 0.0,
     }
 
 
@@ -194,7 +194,7 @@ def make_pairs(
 def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
     """Run all rules of a pair."""
     rng = np.random.default_rng([pair.seed, OPERATORS.index(pair.operator), pair.number])
-    task = pair.task or draw_task(pair.operator, rng)
+    task = pair.task or draw_task(pair.operator, rng, config.scene.hand_radius)
     noise = rng.normal(size=(len(task.path) + round(1.5 / DT), 2, 2))  # a trial ends 1.5 s after the intended movement
     trials = {rule: run_trial(task, rules[rule], config, noise) for rule in pair.assistance}
     measures = {rule: measure_trial(trial, task, config.guidance.f_max) for rule, trial in trials.items()}

@@ -51,9 +51,12 @@ class Demonstration(Record):
     states: Array | None = None
 
     def matches(self, frame_id: str, obstacles: Obstacles) -> bool:
-        """Tell whether all obstacles that the path passed are present, by id, within NEAR of where they were."""
+        """Tell whether all obstacles that the path passed are present, by id, within NEAR of where they were.
+
+        An empty frame, as that of a `Predictor` by default, is that of the demonstration.
+        """
         rows = {identity: row for row, identity in enumerate(obstacles.ids)}
-        if frame_id != self.frame_id or not rows.keys() >= set(self.ids):
+        if frame_id not in ('', self.frame_id) or not rows.keys() >= set(self.ids):
             return False
         return _is_near(obstacles.centre[[rows[identity] for identity in self.ids]], self.centre)
 

@@ -40,7 +40,7 @@ from foc_ros.core.hand.duration import is_passing
 from foc_ros.core.solution import Solution
 from foc_ros.core.types import Array, HandState
 
-from .models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
+from .models import PlantModel, make_plant_model
 from .plants import Horizon, apply_impulse_response
 
 
@@ -93,7 +93,7 @@ def compute_onset_delay_covariance(solution: Solution, wait_s: float) -> Array:
     return covariance
 
 
-def compute_duration_sensitivity(solution: Solution, passing: bool, plant: PlantModel = TRIPLE_INTEGRATOR) -> Array:
+def compute_duration_sensitivity(solution: Solution, passing: bool, plant: PlantModel) -> Array:
     """Return the displacement of the states at steps 0..N, (N + 1, n), per relative increase of the duration T."""
     goal_map = plant.compute_goal_map(solution.dt, len(solution.control), passing)
     displacement: Array = goal_map @ (float(solution.times[-1]) * plant.compute_end_rate(solution))
