@@ -10,7 +10,7 @@ from homotopy_scenes import CLEARANCE, GOAL, HAND, find, measure_clear, random_s
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foc_ros.core.classes import Turn, find_path_sides, scene, search
+from foc_ros.core.classes import SearchOrder, find_path_sides, scene, search
 from foc_ros.core.config import HomotopyConfig
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import make_obstacles
@@ -298,8 +298,8 @@ CROWD = np.random.default_rng(2).uniform([0.05, -0.2], [0.35, 0.2], (40, 2))
 
 def search_within(seconds, obstacles, goals=SIX_GOALS, previous=(), first_goal=0, k=6):
     settings = HomotopyConfig(max_candidates=k, clearance=CLEARANCE)
-    turn = Turn(Deadline(seconds), first_goal)
-    return search(np.zeros(6), goals, obstacles, settings, [1.0] * len(goals), 20, previous, turn)
+    order = SearchOrder(Deadline(seconds), first_goal)
+    return search(np.zeros(6), goals, obstacles, settings, [1.0] * len(goals), 20, previous, order)
 
 
 def test_without_time_each_goal_has_a_candidate_at_once_and_one_goal_after_the_other_is_searched_again():

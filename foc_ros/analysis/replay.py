@@ -23,7 +23,7 @@ from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
 from foc_ros.ros.intake import DROPPED, Intake
-from foc_ros.ros.messages.encode_guidance import Place
+from foc_ros.ros.messages.encode_guidance import SampleHeader
 from foc_ros.ros.transforms import Transforms, TransformTree
 
 
@@ -151,7 +151,7 @@ class GuidanceStep:
     """One update: its stamp [ns], where its hand sample was, and its output."""
 
     stamp_ns: int
-    place: Place
+    header: SampleHeader
     output: GuidanceOutput
 
 
@@ -191,7 +191,7 @@ class GuidanceReplay:
             t = (self._next_ns - self._first_ns) / NANOSECONDS
             given = GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages, acceleration=hand.mean[4:6])
             output, self._state = guide(config, self._state, given)
-            yield GuidanceStep(self._next_ns, Place(hand.stamp_ns, hand.frame_id, hand.height, config.plane), output)
+            yield GuidanceStep(self._next_ns, SampleHeader(hand.stamp_ns, hand.frame_id, hand.height, config.plane), output)
             self._next_ns += self._period_ns
             if output.status is GuidanceStatus.STALE and not output.force.any() and not output.authority:
                 self._next_ns = max(self._next_ns, end_ns)

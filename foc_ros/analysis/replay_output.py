@@ -52,7 +52,7 @@ def replay_to(
                     _write_element(updates, encode_guidance(update.stamp_ns, update.output))
                 if writer is not None:
                     for name, (_, encode) in GUIDANCE_OUTPUTS.items():
-                        writer.write(f'{NODE}/{name}', encode(update.output, update.place, types), step.item.log_ns)
+                        writer.write(f'{NODE}/{name}', encode(update.output, update.header, types), step.item.log_ns)
             for consume in consumers:
                 consume(step)
             if writer is not None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .candidates import estimate_unfollowed, estimate_unsolved, is_there, rank_candidates, solve_candidates, split_unknown
-from .classes import Search, Turn, search
+from .classes import Search, SearchOrder, search
 from .classes.library import GuessTiming, recall_demonstrations
 from .config import Config
 from .deadline import NEVER, Deadline
@@ -25,7 +25,7 @@ from .prediction import PredictedCandidate, Prediction
 from .situation import Situation, prepare_situation
 from .solution import Candidate, Status
 from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_rest
-from .types import NANOSECONDS, Array, HandState, Rest
+from .types import NANOSECONDS, Array, HandState, Unassigned
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
 """Shares of the time left after which the search and the solver begin no step. The last step may end later."""
@@ -79,8 +79,8 @@ def predict(
     reserve_s = (RESERVE_S + POOLING_S * bool(knowledge.library.recordings)) * len(candidates)
     solved = _solve(situation, candidates, matched, resting, deadline.take_share(SOLVE_SHARE, reserve_s))
     answered = _answer(situation, solved, matched, absent)
-    shared, rest = _share_likelihood(situation, answered, found.unfollowed, knowledge, hand)
-    limited, rest = known.limit_changes(shared, rest, stamp_ns, absent)
+    shared, unassigned = _share_likelihood(situation, answered, found.unfollowed, knowledge, hand)
+    limited, unassigned = known.limit_changes(shared, unassigned, stamp_ns, absent)
     predicted, best = situation.heights.add_to(limited), known.choose_most_likely(limited)
     notes = {
         'merged': len(answered) - len(predicted),
@@ -103,8 +103,8 @@ def predict(
         obstacles=obstacles,
         goal_positions=goals,
         cleared=tuple(situation.cleared.tolist()),
-        unknown=rest.unknown,
-        other=rest.other,
+        unknown=unassigned.unknown,
+        other=unassigned.other,
     )
     following = Tracks(
         *known.follow(predicted, matched, solved, absent, stamp_ns),
@@ -112,7 +112,7 @@ def predict(
         goals,
         obstacles,
         dict(enumerate(situation.durations_s)),
-        rest,
+        unassigned,
         None if best is None else best.way,
         max([known.next_number, *(each.number + 1 for each in matched)]),
         found.next_goal,
@@ -126,8 +126,8 @@ def _find_candidates(
     """Search for homotopy classes; return what was found, and the candidates with those that a library recalls."""
     hand, goals, near = situation.hand, situation.goals, situation.near
     timing = GuessTiming(situation.durations_s, situation.config.foc.steps)
-    turn = Turn(deadline.take_share(SEARCH_SHARE), known.next_goal, situation.objects)
-    found = search(hand.mean, goals, near, situation.config.homotopy, *timing, known.candidates, turn)
+    order = SearchOrder(deadline.take_share(SEARCH_SHARE), known.next_goal, situation.objects)
+    found = search(hand.mean, goals, near, situation.config.homotopy, *timing, known.candidates, order)
     return found, recall_demonstrations(library.demonstrations, hand, goals, near, timing, found)
 
 
@@ -196,7 +196,7 @@ def _share_likelihood(
     unfollowed: Sequence[Candidate],
     knowledge: Knowledge,
     estimated: HandState,
-) -> tuple[list[PredictedCandidate], Rest]:
+) -> tuple[list[PredictedCandidate], Unassigned]:
     """Return the distinct candidates with their likelihoods, the most likely first, and the shares that no candidate has.
 
     First, candidates and unfollowed classes are compared by their costs, and by the goals of the past. What the classes that are
@@ -212,14 +212,14 @@ def _share_likelihood(
     ranked = rank_candidates(compared, config.likelihood, situation.near, hand, goals, knowledge.planning_spread, weights)
     followed, unknown = split_unknown(ranked, {each.label for each in others})
     pooled = pool_recordings(followed, knowledge.library, estimated, situation.blocking, goals)
-    rest = Rest(unknown)
+    unassigned = Unassigned(unknown)
     if unknown < 1.0:
         led_to = sorted({each.candidate.goal for each in compared if each.has_likelihood})
         times_s = [situation.durations_s[goal] for goal in led_to]
         other = find_other_share(hand, ends[led_to], times_s, config.likelihood.other_goal, config.foc.endpoint_stddev)
-        rest = Rest((1.0 - other) * unknown, other)
-    known_share = 1.0 - sum(rest)
-    return [replace(each, likelihood=known_share * each.likelihood) for each in pooled], rest
+        unassigned = Unassigned((1.0 - other) * unknown, other)
+    known_share = 1.0 - sum(unassigned)
+    return [replace(each, likelihood=known_share * each.likelihood) for each in pooled], unassigned
 
 
 def warm_up(config: Config) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from .candidates import find_all_sides, rank_candidates, solve_candidates
-from .classes import Turn, search
+from .classes import SearchOrder, search
 from .classes.library import GuessTiming
 from .hand.duration import is_passing
 from .ocp.problem import Problem
@@ -47,8 +47,9 @@ def solve_scene(scene: ReachingScene, problems: Sequence[Problem]) -> list[Predi
     if scene.guess is not None:
         candidates: tuple[Candidate, ...] = (_make_guessed_candidate(scene.guess, problems[0]),)
     else:
-        timing, turn = GuessTiming([scene.duration_s] * len(scene.goals), config.foc.steps), Turn(objects=scene.goal_objects)
-        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, *timing, (), turn).candidates
+        timing = GuessTiming([scene.duration_s] * len(scene.goals), config.foc.steps)
+        order = SearchOrder(objects=scene.goal_objects)
+        candidates = search(scene.hand.mean, scene.goals, avoided, config.homotopy, *timing, (), order).candidates
     solved = solve_candidates(candidates, [problems[each.goal] for each in candidates], config.foc)
     ranked = rank_candidates(solved, config.likelihood, avoided, scene.hand, scene.goals)
     return [each.with_goal_name(scene.goal_names[each.candidate.goal]) for each in ranked] if scene.goal_names else ranked

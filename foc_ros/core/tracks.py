@@ -34,7 +34,7 @@ from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
 from .solution import Candidate, Solution, agrees, label_class
-from .types import NANOSECONDS, Array, Record, Rest, as_readonly
+from .types import NANOSECONDS, Array, Record, Unassigned, as_readonly
 
 HOLD_S = 0.2
 """Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten
@@ -85,9 +85,9 @@ class Tracks(Record):
     """What one prediction passes to the next.
 
     followed: the tracks of its candidates; absent: those that were not seen for a short time; stamp_ns: of the prediction, None
-    if there was none; goals (g, 2) [m]; obstacles: where they were; durations_s: time to go to each goal [s]; rest: shares of the
-    likelihood that no candidate had; most_likely: number of the most likely class; next_number: of the next new class; next_goal:
-    row of the goal at which the search begins.
+    if there was none; goals (g, 2) [m]; obstacles: where they were; durations_s: time to go to each goal [s]; unassigned: what
+    no candidate had; most_likely: number of the most likely class; next_number: of the next new class; next_goal: row of the goal
+    at which the search begins.
     """
 
     followed: tuple[Track, ...] = ()
@@ -96,7 +96,7 @@ class Tracks(Record):
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
     obstacles: Obstacles | None = None
     durations_s: dict[int, float] = field(default_factory=dict)
-    rest: Rest = field(default_factory=Rest)
+    unassigned: Unassigned = field(default_factory=Unassigned)
     most_likely: int | None = None
     next_number: int = 0
     next_goal: int = 0
@@ -173,8 +173,8 @@ class Tracks(Record):
         )
 
     def limit_changes(
-        self, predicted: Sequence[PredictedCandidate], rest: Rest, stamp_ns: int, absent: Sequence[Track] = ()
-    ) -> tuple[list[PredictedCandidate], Rest]:
+        self, predicted: Sequence[PredictedCandidate], unassigned: Unassigned, stamp_ns: int, absent: Sequence[Track] = ()
+    ) -> tuple[list[PredictedCandidate], Unassigned]:
         """Return candidates with likelihoods p_i with the likelihoods l_i, ranked, and what no candidate has likewise.
 
         absent: the tracks that are no candidates any more. Their likelihoods do not rise, because their paths do not follow the
@@ -183,8 +183,9 @@ class Tracks(Record):
         taking_part = [each for each in predicted if each.has_likelihood]
         before, lost = self._hand_down(taking_part)
         goals = {each.candidate.goal for each in (*self.followed, *self.absent)}
-        old = np.array([*(before.get(each.way, 0.0) for each in taking_part), self.rest.unknown + lost, self.rest.other])
-        found, numbers = np.array([*(each.likelihood for each in taking_part), *rest]), {each.number for each in absent}
+        unknown, other = self.unassigned
+        old = np.array([*(before.get(each.way, 0.0) for each in taking_part), unknown + lost, other])
+        found, numbers = np.array([*(each.likelihood for each in taking_part), *unassigned]), {each.number for each in absent}
         is_absent = np.array([*(each.way in numbers for each in taking_part), False, False])
         change = _limit_gains(found, old, is_absent) - old
         largest, allowed = float(abs(change).max()), self.measure_time(stamp_ns) / FULL_CHANGE_S
@@ -196,7 +197,7 @@ class Tracks(Record):
         factor = 1.0 / (sum(weights) + unknown + other)
         ranked = [replace(each, likelihood=factor * weight) for each, weight in zip(taking_part, weights, strict=True)]
         ranked.sort(key=lambda each: (-each.likelihood, each.label))
-        return ranked + [each for each in predicted if not each.has_likelihood], Rest(factor * unknown, factor * other)
+        return ranked + [each for each in predicted if not each.has_likelihood], Unassigned(factor * unknown, factor * other)
 
     def _hand_down(self, taking_part: Sequence[PredictedCandidate]) -> tuple[dict[int, float], float]:
         """Return the last likelihood of each track, by its number, and the sum of those that no candidate continues.

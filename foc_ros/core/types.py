@@ -54,7 +54,7 @@ class HandSample(Record):
     frame_id: str = ''
 
 
-class Rest(NamedTuple):
+class Unassigned(NamedTuple):
     """Shares of the likelihood that no candidate has: of classes that are unknown, and of a goal that nobody announced."""
 
     unknown: float = 0.0

@@ -23,13 +23,13 @@ from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND
 from foc_ros.ros.guidance import GuidanceLoop
 from foc_ros.ros.intake import Intake
-from foc_ros.ros.messages.encode_guidance import Place
+from foc_ros.ros.messages.encode_guidance import SampleHeader
 
 from .scene import View, view_prediction
 
 REMEMBERED = 20
 """Number of predictions from which the state is told."""
-Outcome = View | tuple[GuidanceOutput, Place]
+Outcome = View | tuple[GuidanceOutput, SampleHeader]
 """A prediction for the page, or guidance and where it holds."""
 Receive = Callable[[Outcome], None]
 

@@ -29,7 +29,7 @@ from foc_ros.io.outputs import make_folder
 from foc_ros.io.topics import TYPES
 from foc_ros.reporting.page import Table
 from foc_ros.reporting.report import ReportCollector
-from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, Place
+from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, SampleHeader
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import MessageTypes
 from foc_ros.ros.parameters import write_parameter_file
@@ -88,9 +88,9 @@ class Recording:
         # markers and path say nothing more
         self._add_outputs(encode_outputs(prediction, 'xy', self._types, ('prediction', 'likelihoods')))
 
-    def add_guidance(self, output: GuidanceOutput, place: Place) -> None:
+    def add_guidance(self, output: GuidanceOutput, sample: SampleHeader) -> None:
         """Record guidance."""
-        self._add_outputs({name: encode(output, place, self._types) for name, (_, encode) in GUIDANCE_OUTPUTS.items()})
+        self._add_outputs({name: encode(output, sample, self._types) for name, (_, encode) in GUIDANCE_OUTPUTS.items()})
 
     def begin_trial(self) -> None:
         """Record the inputs for a trial from now on."""

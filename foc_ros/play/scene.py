@@ -40,14 +40,14 @@ Size = Annotated[float, Field(ge=0.002, le=0.3)]
 """Radius or full length of an obstacle [m]."""
 
 
-class Place(Fields):
+class PlacedPoint(Fields):
     """A goal [m]."""
 
     x: X
     y: Y
 
 
-class PlacedCircle(Place):
+class PlacedCircle(PlacedPoint):
     """An obstacle [m]."""
 
     kind: Literal['circle'] = 'circle'
@@ -60,7 +60,7 @@ class PlacedCircle(Place):
         return Circle((self.x, self.y), self.radius, RADIUS_STDDEV)
 
 
-class PlacedBox(Place):
+class PlacedBox(PlacedPoint):
     """An obstacle: full lengths [m], and angle [rad] of the first of them."""
 
     kind: Literal['box'] = 'box'
@@ -86,7 +86,7 @@ class PlayScene(Fields):
     """Obstacles, of which each has the number of its row as name, and goals."""
 
     obstacles: Annotated[list[Placed], Field(max_length=MOST_OBSTACLES)]
-    goals: Annotated[list[Place], Field(min_length=1, max_length=MOST_GOALS)]
+    goals: Annotated[list[PlacedPoint], Field(min_length=1, max_length=MOST_GOALS)]
 
     @property
     def points(self) -> list[Point]:
@@ -121,11 +121,11 @@ FIRST_SCENE = PlayScene(
         PlacedCircle(x=0.17, y=-0.085, radius=0.02),
         PlacedBox(x=0.2, y=0.095, size_x=0.02, size_y=0.06, yaw=0.3),
     ],
-    goals=[Place(x=0.3, y=-0.09), Place(x=0.31, y=0.0), Place(x=0.3, y=0.09)],
+    goals=[PlacedPoint(x=0.3, y=-0.09), PlacedPoint(x=0.31, y=0.0), PlacedPoint(x=0.3, y=0.09)],
 )
 
 
-def make_random_scene(random: np.random.Generator, goals: Sequence[Place]) -> PlayScene:
+def make_random_scene(random: np.random.Generator, goals: Sequence[PlacedPoint]) -> PlayScene:
     """Return three to five random circles and boxes between the start and some goals, with gaps of at least 25 mm for a hand."""
     wanted = int(random.integers(3, 5, endpoint=True))
     taken = [(*START, TARGET_RADIUS), *((goal.x, goal.y, TARGET_RADIUS) for goal in goals)]

@@ -37,7 +37,7 @@ class Trial:
     is_guided: bool
 
 
-class Reach:
+class TrialMovement:
     """One movement from the light to the goal, and what it came to.
 
     Attributes: is_guided; touched: how often the hand entered an obstacle; path_m: length of its path; time_s: from the light to
@@ -97,11 +97,11 @@ class Tasks:
                 self.trials.append(Trial(shown_scene, *kinds[row]))
         del self.trials[settings.trials :]
         self.number, self.phase = 0, Phase.RETURN
-        self.scores: list[Reach] = []
+        self.scores: list[TrialMovement] = []
         # times for which the hand rests at the start before a goal is lit [s]
         self._waits = np.random.default_rng([settings.seed, 1]).uniform(0.4, 0.9, len(self.trials))
         self._since_s = 0.0
-        self._reach: Reach | None = None
+        self._reach: TrialMovement | None = None
 
     @property
     def trial(self) -> Trial:
@@ -126,7 +126,7 @@ class Tasks:
         elif before is Phase.RETURN:
             self.phase, self._since_s = Phase.WAIT, t
         elif before is Phase.WAIT and t - self._since_s >= self._waits[self.number]:
-            self.phase, self._reach = Phase.REACH, Reach(self.trial, t, position)
+            self.phase, self._reach = Phase.REACH, TrialMovement(self.trial, t, position)
         return self.phase if self.phase is not before else None
 
     def note_most_likely(self, t: float, way: int) -> None:
@@ -135,7 +135,7 @@ class Tasks:
             self._reach.note_most_likely(t, way)
 
 
-def tabulate_scores(scores: Sequence[Reach]) -> list[tuple[str, ...]]:
+def tabulate_scores(scores: Sequence[TrialMovement]) -> list[tuple[str, ...]]:
     """Return a row of SCORE_COLUMNS for the trials without and with guidance: medians, and the number of touches in all."""
     rows: list[tuple[str, ...]] = []
     for name, is_guided in (('without guidance', False), ('with guidance', True)):

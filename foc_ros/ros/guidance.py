@@ -31,7 +31,7 @@ from .messages.encode_guidance import (
     LIVE_OUTPUTS,
     TWIST,
     TWIST_TYPE,
-    Place,
+    SampleHeader,
     blend_twist,
     encode_guidance_markers,
 )
@@ -59,10 +59,10 @@ class Newest:
     is_released: bool = True
 
     @property
-    def place(self) -> Place | None:
+    def sample_header(self) -> SampleHeader | None:
         """Where the hand is, None without one."""
         hand = self.hand
-        return None if hand is None else Place(hand.stamp_ns, hand.frame_id, hand.height, self.config.plane)
+        return None if hand is None else SampleHeader(hand.stamp_ns, hand.frame_id, hand.height, self.config.plane)
 
 
 class GuidanceLoop:
@@ -76,13 +76,13 @@ class GuidanceLoop:
     def __init__(
         self,
         config: Config,
-        publish: Callable[[GuidanceOutput, Place], None],
+        publish: Callable[[GuidanceOutput, SampleHeader], None],
         report: Callable[[Exception], None],
         warn: Callable[[str], None],
     ) -> None:
         self.newest = Newest(config)
         self.output: GuidanceOutput | None = None
-        self.place: Place | None = None
+        self.sample_header: SampleHeader | None = None
         self._publish, self._report, self._warn = publish, report, warn
         self._priority = self._wanted_priority = 0
         self._has_warned = False
@@ -157,9 +157,9 @@ class GuidanceLoop:
         has_ended = self.output.status is not GuidanceStatus.GUIDING and not self.output.force.any() and not self.output.authority
         self._zeros = self._zeros + 1 if has_ended else 0
         if self._zeros <= ZEROS:
-            self.place = newest.place or self.place
-            if self.place is not None:
-                self._publish(self.output, self.place)
+            self.sample_header = newest.sample_header or self.sample_header
+            if self.sample_header is not None:
+                self._publish(self.output, self.sample_header)
 
     def _run(self) -> None:
         """Update once in a period; a late update shifts the following ones."""
@@ -214,29 +214,29 @@ class GuidanceTopics:
     def encode_markers(self, types: MessageTypes) -> list[Any]:
         """Return the markers of the last output, none if guidance is disabled or has no hand."""
         output, newest = self.loop.output, self.loop.newest
-        if output is None or newest.place is None or not newest.config.guidance.enabled:
+        if output is None or newest.sample_header is None or not newest.config.guidance.enabled:
             return []
-        return encode_guidance_markers(output, newest.place, types)
+        return encode_guidance_markers(output, newest.sample_header, types)
 
     def blend_command(self, command: Any, types: MessageTypes) -> None:
         """Publish the operator's command with the share of guidance in it, or as it is where there is no guidance."""
-        output, place, config = self.loop.output, self.loop.place, self.loop.newest.config
+        output, header, config = self.loop.output, self.loop.sample_header, self.loop.newest.config
         if not config.guidance.enabled:
             return
-        if output is not None and place is not None and monotonic() - output.t <= config.guidance.hold_s:
+        if output is not None and header is not None and monotonic() - output.t <= config.guidance.hold_s:
             frame_id = decode_frame(command.header)
-            if frame_id == place.frame_id:
+            if frame_id == header.frame_id:
                 command = blend_twist(output, command, config.plane, types)
             else:
-                text = f'{COMMAND}: frame {frame_id!r} is not the working frame {place.frame_id!r}: not blended'
+                text = f'{COMMAND}: frame {frame_id!r} is not the working frame {header.frame_id!r}: not blended'
                 self._node.get_logger().warning(text, throttle_duration_sec=THROTTLE_S)
         self._publish(TWIST, command)
 
-    def _publish_output(self, output: GuidanceOutput, place: Place) -> None:
+    def _publish_output(self, output: GuidanceOutput, header: SampleHeader) -> None:
         """Publish an output; this happens in the thread of guidance."""
         for name, (_, encode) in LIVE_OUTPUTS.items():
             if name in self._publishers and self._publishers[name].get_subscription_count():
-                self._publish(name, encode(output, place, self._thread_types))
+                self._publish(name, encode(output, header, self._thread_types))
 
     def _publish(self, name: str, message: Any) -> None:
         if self._node.context.ok():

@@ -16,7 +16,7 @@ from foc_ros.io import topics
 
 from .messages.decode_objects import ObjectTable, decode_detections
 from .messages.decode_point_cloud import DecodedCloud, decode_point_cloud
-from .messages.decode_poses import Place, decode_goal, decode_goals, decode_hand_sample, decode_stamp, stay
+from .messages.decode_poses import FrameLookup, decode_goal, decode_goals, decode_hand_sample, decode_stamp, keep_frame
 
 SOURCES = {role: role for role in (topics.COLLISION, topics.DETECTIONS)} | {topics.CLOUD: 'cloud', topics.MARKERS: 'markers'}
 """Name of the source of obstacles that each input is."""
@@ -34,7 +34,7 @@ class Arrival(NamedTuple):
 
     message: Any
     received_s: float
-    place: Place = stay
+    look_up: FrameLookup = keep_frame
     error: str = ''
     is_inexact: bool = False
 
@@ -55,14 +55,14 @@ class Intake:
         self._tables = {topics.MARKERS: ObjectTable(), topics.COLLISION: ObjectTable()}
         self._expired = dict.fromkeys(self._tables, 0)
         self._counts: Counter[str] = Counter()
-        self._handlers: dict[str, Callable[[Any, Place], SampleStatus]] = {
+        self._handlers: dict[str, Callable[[Any, FrameLookup], SampleStatus]] = {
             topics.HAND: self._take_hand,
             topics.CLOUD: self._take_cloud,
             topics.MARKERS: self._take_markers,
             topics.COLLISION: self._take_collision_object,
             topics.DETECTIONS: self._take_detections,
-            topics.GOALS: lambda message, place: pipeline.set_goals(*decode_goals(message, pipeline.config.plane, place)),
-            topics.GOAL: lambda message, place: pipeline.set_goals(*decode_goal(message, pipeline.config.plane, place)),
+            topics.GOALS: lambda message, look_up: pipeline.set_goals(*decode_goals(message, pipeline.config.plane, look_up)),
+            topics.GOAL: lambda message, look_up: pipeline.set_goals(*decode_goal(message, pipeline.config.plane, look_up)),
         }
 
     @property
@@ -82,7 +82,7 @@ class Intake:
         try:
             if isinstance(arrival.message, MessageError):
                 raise arrival.message
-            status = self._handlers[role](arrival.message, arrival.place)
+            status = self._handlers[role](arrival.message, arrival.look_up)
         except MessageError as error:
             self.refuse(role, error)
             return None
@@ -119,11 +119,11 @@ class Intake:
             if SOURCES[role] == source:
                 self._tables[role], self._expired[role] = ObjectTable(), 0
 
-    def _take_hand(self, message: Any, place: Place) -> SampleStatus:
+    def _take_hand(self, message: Any, look_up: FrameLookup) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
             self._counts['hand_skipped'] += 1
             return SampleStatus.SKIPPED
-        self.sample = sample = decode_hand_sample(message, self.pipeline.config.plane, place)
+        self.sample = sample = decode_hand_sample(message, self.pipeline.config.plane, look_up)
         status = self.pipeline.add_hand_sample(sample)
         if status.is_taken:
             still = self._still
@@ -135,21 +135,21 @@ class Intake:
                     self._set_table(role, table)
         return status
 
-    def _take_cloud(self, message: Any, place: Place) -> SampleStatus:
-        return self._set_obstacles(topics.CLOUD, decode_point_cloud(message, self.pipeline.config.plane, place))
+    def _take_cloud(self, message: Any, look_up: FrameLookup) -> SampleStatus:
+        return self._set_obstacles(topics.CLOUD, decode_point_cloud(message, self.pipeline.config.plane, look_up))
 
-    def _take_detections(self, message: Any, place: Place) -> SampleStatus:
+    def _take_detections(self, message: Any, look_up: FrameLookup) -> SampleStatus:
         config = self.pipeline.config
-        found = decode_detections(message, config.plane, config.scene.marker_radius_stddev, place)
+        found = decode_detections(message, config.plane, config.scene.marker_radius_stddev, look_up)
         return self._set_obstacles(topics.DETECTIONS, found)
 
-    def _take_collision_object(self, message: Any, place: Place) -> SampleStatus:
+    def _take_collision_object(self, message: Any, look_up: FrameLookup) -> SampleStatus:
         plane = self.pipeline.config.plane
-        return self._update(topics.COLLISION, lambda table: table.with_collision_object(message, plane, place))
+        return self._update(topics.COLLISION, lambda table: table.with_collision_object(message, plane, look_up))
 
-    def _take_markers(self, message: Any, place: Place) -> SampleStatus:
+    def _take_markers(self, message: Any, look_up: FrameLookup) -> SampleStatus:
         now_ns, plane = self._now_ns(), self.pipeline.config.plane
-        return self._update(topics.MARKERS, lambda table: table.with_markers(message, now_ns, plane, place))
+        return self._update(topics.MARKERS, lambda table: table.with_markers(message, now_ns, plane, look_up))
 
     def _update(self, role: str, change: Callable[[ObjectTable], ObjectTable]) -> SampleStatus:
         """Change the table of an input.

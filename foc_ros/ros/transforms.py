@@ -26,7 +26,7 @@ from foc_ros.io.topics import HAND, MARKERS
 
 from .intake import Arrival, Intake
 from .messages.decode_objects import ADD
-from .messages.decode_poses import Place, check_hand_pose, decode_frame, decode_stamp, stay
+from .messages.decode_poses import FrameLookup, check_hand_pose, decode_frame, decode_stamp, keep_frame
 from .messages.plane import NO_TRANSFORM, Transform, compute_rotation
 
 KEPT_NS = 10 * NANOSECONDS
@@ -75,8 +75,8 @@ class Transforms:
             # at most 1,000 are held: 1 s of a hand at 1 kHz
             is_overdue = now_s - received_s >= pipeline.config.frames.tolerance_s or len(queue) > 1000
             try:
-                place, is_inexact = self._find_place(role, message, is_overdue)
-                arrival = Arrival(message, received_s, place, is_inexact=is_inexact)
+                look_up, is_inexact = self._find_lookup(role, message, is_overdue)
+                arrival = Arrival(message, received_s, look_up, is_inexact=is_inexact)
             except TransformUnavailableError as error:
                 if not is_overdue:
                     break
@@ -86,12 +86,12 @@ class Transforms:
             queue.popleft()
             yield arrival
 
-    def _find_place(self, role: str, message: Any, is_overdue: bool) -> tuple[Place, bool]:
+    def _find_lookup(self, role: str, message: Any, is_overdue: bool) -> tuple[FrameLookup, bool]:
         """Return the transforms for the headers of a message, and whether the newest one was taken for one of them."""
         frame_id, tolerance_s = self._intake.pipeline.frame_id, self._intake.pipeline.config.frames.tolerance_s
         is_unneeded = role == HAND and self._intake.is_skipped(decode_stamp(message.header))
         if self._source is None or frame_id is None or is_unneeded:
-            return stay, False
+            return keep_frame, False
         if role == HAND:
             check_hand_pose(message.pose)  # one without data does not wait for a transform
         # markers that delete others have no position and often no frame
@@ -112,11 +112,11 @@ class Transforms:
                     far = f'the newest one is {abs(late_s):.3g} s {"older" if late_s > 0.0 else "newer"} than the message'
                     raise TransformUnavailableError(f'{reason}; {far} (frames.tolerance_s is {tolerance_s:g})') from None
 
-        def place(header: Any) -> tuple[str, Transform]:
+        def look_up(header: Any) -> tuple[str, Transform]:
             transform = found.get(_identify(header))
-            return stay(header) if transform is None else (frame_id, transform)
+            return keep_frame(header) if transform is None else (frame_id, transform)
 
-        return place, is_inexact
+        return look_up, is_inexact
 
 
 def _identify(header: Any) -> tuple[str, int]:

@@ -7,12 +7,12 @@ decisions that tell candidates apart.
 May import `foc_ros.core.plant`, `obstacles`, `hand` and the ground modules.
 """
 
-from .search import Search, Turn, search
+from .search import Search, SearchOrder, search
 from .sides import compute_swept_angles, find_path_sides
 
 __all__ = [
     'Search',
-    'Turn',
+    'SearchOrder',
     'compute_swept_angles',
     'find_path_sides',
     'search',

@@ -30,8 +30,8 @@ STAY = 0.95
 """A class of the previous prediction ranks as if it were this times as long: noise does not swap classes of equal length."""
 
 
-class Turn(NamedTuple):
-    """How long a search may take, and the goal (row) at which it begins, so that all goals have their turn if time is short.
+class SearchOrder(NamedTuple):
+    """How long a search may take, and the goal (row) at which it begins: if time is short, another one each time.
 
     objects: for each goal the id of the obstacle that it is, whether it holds the goal or not; None, or no entry, if it is none.
     """
@@ -41,7 +41,7 @@ class Turn(NamedTuple):
     objects: Sequence[str | None] = ()
 
 
-ALL = Turn()
+ALL = SearchOrder()
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def search(
     duration_s: Sequence[float],
     steps: int,
     previous: Sequence[Candidate] = (),
-    turn: Turn = ALL,
+    order: SearchOrder = ALL,
 ) -> Search:
     """Find the best `config.max_candidates` homotopy classes between the hand and the goals.
 
@@ -106,7 +106,7 @@ def search(
     previous : Sequence[Candidate], optional
         Candidates of the previous prediction. They stay unless others are clearly better. Where the deadline leaves no time to
         search, they are returned as they are.
-    turn : Turn, optional
+    order : SearchOrder, optional
         The deadline, and the goal at which the search begins. The first class to this goal, and to each goal without a previous
         candidate, is searched whatever the time. Its objects do not block the ways to their goals.
 
@@ -126,9 +126,9 @@ def search(
         raise SceneError('duration_s', f'one for each of the {len(goals)} goals', len(duration_s))
     if not len(goals):
         return Search(())
-    scene = SearchScene(hand_mean, goals, obstacles, config, duration_s, steps, previous, turn.objects)
-    ranking = _Ranking(scene, previous, config.max_detour, turn.deadline)
-    next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < turn.first_goal, goal)))
+    scene = SearchScene(hand_mean, goals, obstacles, config, duration_s, steps, previous, order.objects)
+    ranking = _Ranking(scene, previous, config.max_detour, order.deadline)
+    next_goal = ranking.find_bests(sorted(range(len(goals)), key=lambda goal: (goal < order.first_goal, goal)))
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
     chosen = ranking.choose(count)
     candidates = scene.make_candidates(chosen)

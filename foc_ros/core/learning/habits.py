@@ -40,16 +40,16 @@ half of its way."""
 
 
 class KnownGoal(NamedTuple):
-    """One goal: id of the obstacle that it is, or none; place (2,) [m]; how often it was reached, and was expected to be."""
+    """One goal: id of the obstacle that it is, or none; position (2,) [m]; how often it was reached, and was expected to be."""
 
     name: str | None
-    place: Array
+    position: Array
     reached: float = 0.0
     expected: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
-class Reach(Record):
+class PresentMovement(Record):
     """The movement of the hand that has not ended yet.
 
     onset_ns, onset (2,): when and where it began [m]; goals (g, 2) [m] with the names that they had then; position (2,): where
@@ -72,7 +72,7 @@ class Habits(Record):
     """
 
     known: tuple[KnownGoal, ...] = ()
-    present: Reach | None = None
+    present: PresentMovement | None = None
     reaches: int = 0
     missed: Array = field(default_factory=lambda: np.zeros(2))
 
@@ -86,7 +86,7 @@ class Habits(Record):
         reach = habits.present
         if reach is None:
             names = name_goals(goals, scene.obstacles(hand.stamp_ns), scene.goal_objects)
-            reach = Reach(hand.onset_ns, hand.onset_position, goals, names, hand.mean[:2])
+            reach = PresentMovement(hand.onset_ns, hand.onset_position, goals, names, hand.mean[:2])
         return replace(habits, present=replace(reach, position=hand.mean[:2]))
 
     def interrupt(self) -> Habits:
@@ -104,7 +104,7 @@ class Habits(Record):
         """Return where reaches to goals (g, 2) [m] are expected to end, (g, 2) [m]."""
         return goals + self.missed / (self.reaches + 3)
 
-    def _end(self, reach: Reach, beta: float) -> Habits:
+    def _end(self, reach: PresentMovement, beta: float) -> Habits:
         """Return the habits after a reach, which counts if it ended at a goal."""
         goal, left = find_goal_at_end(reach.position[None], reach.goals)
         if left > min(MOST_LEFT_M, 0.5 * math.dist(reach.onset, reach.goals[goal])):
@@ -113,19 +113,19 @@ class Habits(Record):
         expected = normalise_logs(-2.0 * beta * np.log(np.maximum(first, 1e-3)))  # a goal at the hand has a finite one
         before = [self._find(*each) for each in zip(reach.names, reach.goals, strict=True)]
         now = [
-            KnownGoal(name, place, each.reached + (row == goal), each.expected + float(expected[row]))
-            for row, (name, place, each) in enumerate(zip(reach.names, reach.goals, before, strict=True))
+            KnownGoal(name, position, each.reached + (row == goal), each.expected + float(expected[row]))
+            for row, (name, position, each) in enumerate(zip(reach.names, reach.goals, before, strict=True))
         ]
         others = [each for each in self.known if all(each is not other for other in before)]
         missed = self.missed + reach.position - reach.goals[goal]
         return Habits(tuple([*others, *now][-64:]), None, self.reaches + 1, missed)
 
-    def _find(self, name: str | None, place: Array) -> KnownGoal:
+    def _find(self, name: str | None, position: Array) -> KnownGoal:
         """Return what is known of a goal, nothing where it is new."""
         same = (each for each in self.known if each.name == name)
         if name is None:
-            same = (each for each in same if math.dist(each.place, place) <= 0.02)
-        return min(same, key=lambda each: math.dist(each.place, place), default=KnownGoal(name, place))
+            same = (each for each in same if math.dist(each.position, position) <= 0.02)
+        return min(same, key=lambda each: math.dist(each.position, position), default=KnownGoal(name, position))
 
 
 def name_goals(goals: Array, obstacles: Obstacles, objects: Sequence[str | None]) -> tuple[str | None, ...]:

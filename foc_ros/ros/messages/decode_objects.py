@@ -26,7 +26,7 @@ from foc_ros.core.obstacles.polygons import FLAT, make_hull_polygon
 from foc_ros.core.types import NANOSECONDS, Array
 
 from .decode_point_cloud import MAX_ROWS, DecodedCloud
-from .decode_poses import MAX_COORDINATE, Place, check_coordinates, decode_frame, decode_stamp, stay
+from .decode_poses import MAX_COORDINATE, FrameLookup, check_coordinates, decode_frame, decode_stamp, keep_frame
 from .plane import NO_TRANSFORM, Transform, compute_rotation, lift, make_heights, project
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
@@ -104,7 +104,7 @@ class ObjectTable:
     stamp_ns: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
 
-    def with_markers(self, message: Any, now_ns: int, plane: str, place: Place = stay) -> ObjectTable:
+    def with_markers(self, message: Any, now_ns: int, plane: str, look_up: FrameLookup = keep_frame) -> ObjectTable:
         """Return the table after a MarkerArray.
 
         now_ns: start of the lifetime of an unstamped marker; 0 if unknown, and the marker does not expire.
@@ -136,7 +136,7 @@ class ObjectTable:
             elif not _is_finite(marker.pose, marker.scale, is_turned=marker.type == BOX):
                 dropped['not_finite'] += 1
             else:
-                given, transform = place(marker.header)
+                given, transform = look_up(marker.header)
                 if held and given != frame_id:
                     raise MessageError(f'{name}.header.frame_id', f"'{frame_id}', as the other markers", f"'{given}'")
                 frame_id = given
@@ -150,7 +150,7 @@ class ObjectTable:
             raise MessageError('markers', f'at most {MAX_ROWS} obstacles held at a time', len(held))
         return ObjectTable(held, frame_id, newest_ns, dropped)
 
-    def with_collision_object(self, message: Any, plane: str, place: Place = stay) -> ObjectTable:
+    def with_collision_object(self, message: Any, plane: str, look_up: FrameLookup = keep_frame) -> ObjectTable:
         """Return the table after a CollisionObject; the name of an obstacle is the id of its object and its number in it.
 
         ADD replaces an object, APPEND adds primitives to it, MOVE changes its pose, REMOVE removes it, or all if the id is empty.
@@ -158,7 +158,7 @@ class ObjectTable:
         nothing is changed, for a wrong operation, number of dimensions or poses, size or coordinate, or another frame.
         """
         stamp_ns, name = decode_stamp(message.header), str(message.id)
-        frame_id, transform = place(message.header)
+        frame_id, transform = look_up(message.header)
         operation = message.operation[0] if isinstance(message.operation, bytes) else int(message.operation)
         held, dropped = dict(self.held), Counter[str]()
         if operation == REMOVE:
@@ -230,7 +230,7 @@ def _read_primitives(message: Any, dropped: Counter[str]) -> list[Solid]:
     return found
 
 
-def decode_detections(message: Any, plane: str, radius_stddev: float, place: Place = stay) -> DecodedCloud:
+def decode_detections(message: Any, plane: str, radius_stddev: float, look_up: FrameLookup = keep_frame) -> DecodedCloud:
     """Decode the boxes of a Detection3DArray, the whole scene; the name of one is its id, or its row if it has none.
 
     A detection with a number that is not finite is dropped and counted; of several with one id the last is used. Raises
@@ -238,7 +238,7 @@ def decode_detections(message: Any, plane: str, radius_stddev: float, place: Pla
     that of the array, or too many detections.
     """
     stamp_ns, given = decode_stamp(message.header), decode_frame(message.header)
-    frame_id, transform = place(message.header)
+    frame_id, transform = look_up(message.header)
     if len(message.detections) > MAX_ROWS:
         raise MessageError('detections', f'at most {MAX_ROWS} obstacles', len(message.detections))
     outlines: dict[str, Outline] = {}

@@ -16,7 +16,7 @@ from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.polygons import tabulate_boxes
 from foc_ros.core.types import Array
 
-from .decode_poses import MAX_COORDINATE, Place, decode_stamp, stay
+from .decode_poses import MAX_COORDINATE, FrameLookup, decode_stamp, keep_frame
 from .plane import NO_TRANSFORM, Transform, lift, make_heights, project
 
 REQUIRED = ('x', 'y', 'z', 'radius')
@@ -40,7 +40,7 @@ class DecodedCloud:
     dropped: Mapping[str, int]
 
 
-def decode_point_cloud(message: Any, plane: str, place: Place = stay) -> DecodedCloud:
+def decode_point_cloud(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> DecodedCloud:
     """Decode the obstacles of a PointCloud2 and project them onto the task plane; a cloud without rows is an empty scene.
 
     An obstacle is a circle, or a box with rounded corners if its `size_x` or `size_y` is larger than 0. `size_z` is its full
@@ -53,7 +53,7 @@ def decode_point_cloud(message: Any, plane: str, place: Place = stay) -> Decoded
     radius, a number is beyond MAX_COORDINATE, or a transform tilts sizes out of the plane, or turns boxes without a yaw.
     """
     stamp_ns = decode_stamp(message.header)
-    frame_id, transform = place(message.header)
+    frame_id, transform = look_up(message.header)
     table = read_table(message)
     given = set(table.dtype.names or ())
     with np.errstate(invalid='ignore'):  # numpy warns of a signalling NaN, whose row is dropped like that of any other NaN

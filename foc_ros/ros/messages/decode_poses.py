@@ -18,16 +18,16 @@ from .plane import NO_TRANSFORM, Transform, project
 MAX_COORDINATE = 1e4
 """Largest coordinate of a hand, a goal or an obstacle [m]; a larger one has a wrong unit."""
 MAX_GOALS = 256
-Place = Callable[[Any], tuple[str, Transform]]
+FrameLookup = Callable[[Any], tuple[str, Transform]]
 """Function from a std_msgs/Header to the frame in which its message is used, and the transform to there."""
 
 
-def stay(header: Any) -> tuple[str, Transform]:
+def keep_frame(header: Any) -> tuple[str, Transform]:
     """Return the frame of a header itself: its message is not transformed."""
     return decode_frame(header), NO_TRANSFORM
 
 
-def decode_hand_sample(message: Any, plane: str, place: Place = stay) -> HandSample:
+def decode_hand_sample(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> HandSample:
     """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
 
     Raises LostHandError for a pose without data, MessageError for a coordinate beyond MAX_COORDINATE and a stamp that is not set.
@@ -36,7 +36,7 @@ def decode_hand_sample(message: Any, plane: str, place: Place = stay) -> HandSam
     stamp_ns = decode_stamp(message.header)
     if stamp_ns == 0:
         raise MessageError('header.stamp', 'a time after 0', '0 s')
-    frame_id, transform = place(message.header)
+    frame_id, transform = look_up(message.header)
     position, height = project(_decode_point(message.pose.position, 'pose.position', transform), plane)
     return HandSample(stamp_ns, as_readonly(position), float(height), frame_id)
 
@@ -65,20 +65,20 @@ class DecodedGoals(NamedTuple):
     heights: Array
 
 
-def decode_goals(message: Any, plane: str, place: Place = stay) -> DecodedGoals:
+def decode_goals(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> DecodedGoals:
     """Decode a geometry_msgs/PoseArray; an array without poses gives no goals."""
     if len(message.poses) > MAX_GOALS:
         raise MessageError('poses', f'at most {MAX_GOALS} goals', len(message.poses))
-    return _decode_goals(message.header, {f'poses[{i}]': pose for i, pose in enumerate(message.poses)}, plane, place)
+    return _decode_goals(message.header, {f'poses[{i}]': pose for i, pose in enumerate(message.poses)}, plane, look_up)
 
 
-def decode_goal(message: Any, plane: str, place: Place = stay) -> DecodedGoals:
+def decode_goal(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> DecodedGoals:
     """Decode a geometry_msgs/PoseStamped as one goal; the stamp is not used."""
-    return _decode_goals(message.header, {'pose': message.pose}, plane, place)
+    return _decode_goals(message.header, {'pose': message.pose}, plane, look_up)
 
 
-def _decode_goals(header: Any, poses: Mapping[str, Any], plane: str, place: Place) -> DecodedGoals:
-    frame_id, transform = place(header)
+def _decode_goals(header: Any, poses: Mapping[str, Any], plane: str, look_up: FrameLookup) -> DecodedGoals:
+    frame_id, transform = look_up(header)
     points = [_decode_point(pose.position, f'{name}.position', transform) for name, pose in poses.items()]
     goals, heights = project(np.array(points, dtype=float).reshape(-1, 3), plane)
     return DecodedGoals(goals, frame_id, heights)

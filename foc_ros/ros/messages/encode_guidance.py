@@ -21,7 +21,7 @@ COLOUR = (0.0, 0.62, 0.45, 0.9)
 
 
 @dataclass(frozen=True)
-class Place:
+class SampleHeader:
     """Where guidance holds: stamp [ns], frame and height [m] of the hand sample, and the task plane."""
 
     stamp_ns: int
@@ -30,25 +30,25 @@ class Place:
     plane: str
 
 
-def encode_wrench(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
+def encode_wrench(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/WrenchStamped without torque."""
-    header = make_header(types, place.stamp_ns, place.frame_id)
-    return types.fill('geometry_msgs/msg/WrenchStamped', (header, encode_force(output, place, types)))
+    header = make_header(types, sample.stamp_ns, sample.frame_id)
+    return types.fill('geometry_msgs/msg/WrenchStamped', (header, encode_force(output, sample, types)))
 
 
-def encode_force(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
+def encode_force(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/Wrench without torque and without a stamp, as drivers of haptic devices take it."""
-    return types.make('geometry_msgs/msg/Wrench', force=lift(output.force, 0.0, place.plane))
+    return types.make('geometry_msgs/msg/Wrench', force=lift(output.force, 0.0, sample.plane))
 
 
-def encode_reference(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
+def encode_reference(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> Any:
     """Encode the reference as a geometry_msgs/PoseStamped, whose orientation means nothing."""
-    return encode_hand_pose(types, place.stamp_ns, place.frame_id, lift(output.reference, place.height, place.plane))
+    return encode_hand_pose(types, sample.stamp_ns, sample.frame_id, lift(output.reference, sample.height, sample.plane))
 
 
-def encode_stiffness(output: GuidanceOutput, place: Place, types: MessageTypes) -> Any:
+def encode_stiffness(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> Any:
     """Encode the stiffness [N/m] as a std_msgs/Float64MultiArray of 3 x 3."""
-    axes = lift(np.eye(2), 0.0, place.plane)
+    axes = lift(np.eye(2), 0.0, sample.plane)
     return encode_array(types, axes.T @ output.stiffness @ axes, (('row', 3, 9), ('column', 3, 3)))
 
 
@@ -60,11 +60,11 @@ def blend_twist(output: GuidanceOutput, command: Any, plane: str, types: Message
     return types.fill('geometry_msgs/msg/TwistStamped', (command.header, (blended, command.twist.angular)))
 
 
-def encode_guidance_markers(output: GuidanceOutput, place: Place, types: MessageTypes) -> list[Any]:
+def encode_guidance_markers(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> list[Any]:
     """Encode the force as an arrow from the hand, of 2 cm for each newton, and the reference as a sphere of 8 mm."""
-    start = lift(output.position, place.height, place.plane)
-    points = np.stack([start, start + 0.02 * lift(output.force, 0.0, place.plane)])
-    reference = encode_reference(output, place, types)
+    start = lift(output.position, sample.height, sample.plane)
+    points = np.stack([start, start + 0.02 * lift(output.force, 0.0, sample.plane)])
+    reference = encode_reference(output, sample, types)
     shared = {'ns': 'guidance', 'header': reference.header, 'lifetime': (1, 0), 'color': COLOUR}
     arrow = {'type': ARROW, 'scale': (0.004, 0.008, 0.0), 'pose': ((0.0, 0.0, 0.0), NO_ROTATION), 'points': points}
     sphere = {'id': 1, 'type': SPHERE, 'scale': (0.008, 0.008, 0.008), 'pose': reference.pose}
@@ -72,7 +72,7 @@ def encode_guidance_markers(output: GuidanceOutput, place: Place, types: Message
 
 
 TWIST, TWIST_TYPE = 'guidance/twist', 'geometry_msgs/msg/TwistStamped'
-GUIDANCE_OUTPUTS: dict[str, tuple[str, Callable[[GuidanceOutput, Place, MessageTypes], Any]]] = {
+GUIDANCE_OUTPUTS: dict[str, tuple[str, Callable[[GuidanceOutput, SampleHeader, MessageTypes], Any]]] = {
     'guidance/wrench': ('geometry_msgs/msg/WrenchStamped', encode_wrench),
     'guidance/reference': ('geometry_msgs/msg/PoseStamped', encode_reference),
     'guidance/stiffness': ('std_msgs/msg/Float64MultiArray', encode_stiffness),
