@@ -92,9 +92,7 @@ class DurationConfig(Group):
 class CovarianceConfig(Group):
     """Factors on the predicted standard deviations."""
 
-    near: float = param(
-        1.0, 'factor on the standard deviations of predicted states, for those at once; at rest its power 2/3', '', 0.01, 100.0
-    )
+    near: float = param(1.0, 'factor on the standard deviations of predicted states, for those at once', '', 0.01, 100.0)
     far: float = param(
         1.0, 'the same at the end of each candidate; in between its logarithm changes evenly with the time', '', 0.01, 100.0
     )

@@ -96,7 +96,7 @@ def predict(
         stamp_ns,
         hand.frame_id,
         hand.height,
-        tuple(scale_covariance(each, config.covariance, at_rest=hand.onset_ns is None) for each in predicted),
+        tuple(scale_covariance(each, config.covariance) for each in predicted),
         None if best is None else best.label,
         notes=dict(found.notes) | {name: count for name, count in notes.items() if count},
         solve_s=time.perf_counter() - began,

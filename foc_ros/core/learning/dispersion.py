@@ -9,8 +9,7 @@ time t ahead, by a factor that leads from `covariance.near` = f now to `covarian
     f(t) = f^(1 - s) f'^s,  s = (t / T)^2.                                                                                  (1)
 
 A hand that is on its way follows a plan closely. How it arrives, when, and what it does then are known less well, however near
-the end is. A hand at rest may begin to move at any time, and what holds for one on its way holds less for it: f counts with the
-power 2/3.
+the end is.
 
 Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reached the times h of `HORIZONS_S`. With its position
 x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
@@ -160,12 +159,10 @@ def interpolate_factors(share: Array, config: CovarianceConfig) -> Array:
     return factors
 
 
-def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig, *, at_rest: bool = False) -> PredictedCandidate:
+def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) -> PredictedCandidate:
     """Return a candidate whose covariance has the factors of config; that of motor noise and that of the height stay."""
     if config.near == config.far == 1.0:
         return candidate
-    if at_rest:
-        config = replace(config, near=config.near ** (2.0 / 3.0))
     solution = candidate.solution
     factors = interpolate_factors(np.linspace(0.0, 1.0, len(solution.mean)) ** 2, config)
     covariance = solution.covariance * factors[:, None, None] ** 2
