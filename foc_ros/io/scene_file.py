@@ -20,6 +20,7 @@ from foc_ros.core.classes.guess import guess_path
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import FocError, ParameterError, SceneError, collect, collect_all, join_errors, warn
 from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.obstacles.geometry import TURN
 from foc_ros.core.obstacles.shapes import Box, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.scene import ReachingScene
 from foc_ros.core.solution import Goal
@@ -31,8 +32,8 @@ from .fields import Fields, describe_errors
 
 MOST_OBSTACLES, MOST_GOALS = 20_000, 256
 """Bounds on the rows of a scene, those of the node's messages."""
-FASTEST, TURN = 10.0, 2.0 * math.pi
-"""Mean speed [m/s] and angle [rad] beyond which a scene is probably not in metres, seconds and radians."""
+FASTEST = 10.0
+"""Mean speed [m/s] beyond which a scene is probably not in metres and seconds."""
 
 PARAMETERS = {
     'duration_s': 'duration.fixed_s',
