@@ -220,11 +220,11 @@ class Counted(Deadline):
         super().__init__()
         self.steps = steps
 
-    def allows(self, seconds=0.0):
+    def allows(self):
         self.steps -= 1
         return self.steps >= 0
 
-    def take_share(self, share, reserve_s=0.0):
+    def take_share(self, share):
         return NEVER if share < 0.5 else self
 
 

@@ -29,8 +29,6 @@ from .types import NANOSECONDS, Array, HandState, Unassigned
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
 """Shares of the time left after which the search and the solver begin no step. The last step may end later."""
-RESERVE_S, POOLING_S = 5e-5, 2e-4
-"""Time besides that for each candidate [s]: to rank it, and to pool its path with recordings where there are some."""
 
 
 def predict(
@@ -76,8 +74,7 @@ def predict(
     found, candidates = _find_candidates(situation, known, knowledge.library, deadline)
     matched = known.match(candidates, stamp_ns)
     absent, resting = known.find_absent(candidates, matched, stamp_ns), known.find_resting(matched, obstacles, stamp_ns)
-    reserve_s = (RESERVE_S + POOLING_S * bool(knowledge.library.recordings)) * len(candidates)
-    solved = _solve(situation, candidates, matched, resting, deadline.take_share(SOLVE_SHARE, reserve_s))
+    solved = _solve(situation, candidates, matched, resting, deadline.take_share(SOLVE_SHARE))
     answered = _answer(situation, solved, matched, absent)
     shared, unassigned = _share_likelihood(situation, answered, found.unfollowed, knowledge, hand)
     limited, unassigned = known.limit_changes(shared, unassigned, stamp_ns, absent)
