@@ -19,7 +19,7 @@ from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.plant.covariance import compute_duration_sensitivity, compute_onset_delay_covariance
-from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, compute_error_map
+from foc_ros.core.plant.models import TripleIntegratorModel, compute_error_map
 from foc_ros.core.plant.plants import build_triple_integrator_horizon, condense, discretise_triple_integrator
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
@@ -206,7 +206,7 @@ def test_the_covariance_agrees_with_a_hand_that_replans_at_each_step():
     plant, noise = discretise_triple_integrator(dt), np.random.default_rng(3)
     root = np.linalg.cholesky(np.kron(compute_gramian(dt), np.eye(2)))
     error = np.zeros((draws, 6))
-    expected = TRIPLE_INTEGRATOR.compute_process_covariance(dt, steps, False)
+    expected = TripleIntegratorModel().compute_process_covariance(dt, steps, False)
     for step in range(steps):
         if steps - step < 3:  # too few steps to bring every state to the goal
             break
@@ -234,9 +234,9 @@ def test_end_points_and_durations_widen_predictions_and_keep_means_and_likelihoo
         added = after.solution.covariance - before.solution.covariance
         assert_allclose(added[-1, :2, :2], 0.006**2 * np.eye(2), atol=1e-9)
         assert_allclose(added, added.swapaxes(1, 2), atol=1e-12)
-        late = compute_duration_sensitivity(before.solution, False, TRIPLE_INTEGRATOR)[STEPS // 2, :2]
+        late = compute_duration_sensitivity(before.solution, False, TripleIntegratorModel())[STEPS // 2, :2]
         across = np.array([-late[1], late[0]]) / np.hypot(*late)
-        half_way = TRIPLE_INTEGRATOR.compute_goal_map(before.solution.dt, STEPS, False)[STEPS // 2, 0, 0]
+        half_way = TripleIntegratorModel().compute_goal_map(before.solution.dt, STEPS, False)[STEPS // 2, 0, 0]
         assert across @ added[STEPS // 2, :2, :2] @ across == pytest.approx((0.006 * half_way) ** 2)
         assert np.trace(added[STEPS // 2, :2, :2]) == pytest.approx(2 * (0.006 * half_way) ** 2 + 0.3**2 * late @ late)
 

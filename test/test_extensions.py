@@ -17,7 +17,7 @@ from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import k_of_eta
 from foc_ros.core.ocp.backend import DenseQP, solve_piqp
 from foc_ros.core.ocp.strategies import Strategy, solve_fixed
-from foc_ros.core.plant.models import TRIPLE_INTEGRATOR, PlantModel, make_plant_model
+from foc_ros.core.plant.models import PlantModel, TripleIntegratorModel, make_plant_model
 from foc_ros.core.plant.plants import Plant, discretise_damped_mass, discretise_triple_integrator
 from foc_ros.core.predict import predict
 from foc_ros.core.registry import QP_BACKENDS, STRATEGIES
@@ -144,7 +144,7 @@ def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does():
         exact = one.covariance[:, :2, :2]
         assert_allclose(other.covariance[:, :2, :2], exact, atol=0.03 * np.abs(exact).max())
         assert other.likelihood == pytest.approx(one.likelihood, rel=1e-6)
-    models = make_plant_model(config.foc), TRIPLE_INTEGRATOR
+    models = make_plant_model(config.foc), TripleIntegratorModel()
     noise, exact = (model.compute_process_covariance(0.02, STEPS, False)[:, 0, 0] for model in models)
     assert_allclose(noise, exact, atol=0.02 * exact.max())
 

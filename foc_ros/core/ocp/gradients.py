@@ -20,8 +20,8 @@ DIFFERENCE = 5e-3
 """Time on both sides of a contact by whose gradients its sliding is found [steps]."""
 LEAST_BEND = 3e-2
 """Least second derivative of a margin in time, relative to scene and whole time: along a flat side the contact is anywhere."""
-FACTORS, GRADIENT = 5, 1
-"""Vectors of which the second derivatives of a margin consist, besides a diagonal, and which of them is its gradient."""
+FACTORS = 5
+"""Vectors of which the second derivatives of a margin consist, besides a diagonal."""
 
 
 class Turning(NamedTuple):

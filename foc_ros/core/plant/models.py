@@ -214,9 +214,6 @@ class TripleIntegratorModel(PlantModel):
         return np.concatenate([solution.mean[-1, 2:6], jerk])
 
 
-TRIPLE_INTEGRATOR = TripleIntegratorModel()
-
-
 def make_damped_mass(settings: FocConfig) -> PlantModel:
     """Return the paper's second-order hand: a mass with viscous damping, driven by force."""
     return PlantModel(lambda dt: discretise_damped_mass(dt, settings.plant_mass, settings.plant_damping))
