@@ -237,6 +237,12 @@ def test_a_wrong_stamp_is_refused(types, sec, nanosec, words):
         decode_hand_sample(message, 'xy')
 
 
+def test_a_number_that_is_not_finite_is_named_as_it_was_sent_whatever_a_transform_makes_of_it():
+    turned = Transform(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
+    with pytest.raises(MessageError, match=r'poses\[1\]\.position\.y: expected a finite number'):
+        decode_goals(pose_array(BAGS, [(0, 0, 0), (0.1, math.nan, 0)]), 'xy', lambda _: ('base', turned))
+
+
 @both_kinds
 def test_goals_keep_their_order_and_need_no_stamp(types):
     goals, frame_id, heights = decode_goal(pose_stamped(types, (1.0, 2.0, 3.0), 0, 'base'), 'yz')

@@ -94,7 +94,7 @@ class CovarianceConfig(Group):
 
     near: float = param(1.0, 'factor on the standard deviations of predicted states, for those at once', '', 0.01, 100.0)
     far: float = param(
-        1.0, 'the same at the end of each candidate; in between its logarithm changes evenly with the time', '', 0.01, 100.0
+        1.0, 'the same at the end of each candidate; its logarithm changes with the square of the time', '', 0.01, 100.0
     )
     adaptation: str = param(
         'online', 'whether both factors are multiplied by factors that are learnt from earlier errors', choices=ADAPTATIONS

@@ -44,9 +44,9 @@ class PredictedCandidate:
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
     by id. cost: effort to go times the length of a step [m^2/s^5], comparable between goals; likelihood in [0, 1]: 0 unless
-    solved, compromised or estimated. age_s: 0, or how long ago the solution was found, of which this is the rest, if it failed
-    [s]. way: a number that stays the same for as long as the class is followed, whatever its label and its rank are. height: the
-    movement along the normal of the plane, None where it is not predicted: the hand then stays at its height.
+    solved, compromised or estimated. age_s: 0, or how long ago the solution was found [s], of which this is the rest, if it was
+    not solved now. way: a number that stays the same for as long as the class is followed, whatever its label and its rank are.
+    height: the movement along the normal of the plane, None where it is not predicted: the hand then stays at its height.
     """
 
     candidate: Candidate

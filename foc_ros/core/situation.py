@@ -32,9 +32,9 @@ class Situation(Record):
 
     config: all parameters; hand: the state that they start from; goals (g, 2) [m]; durations_s: time to go to each [s]; objects:
     the id of the obstacle that each goal is; obstacles: all n, as they were given; blocking: those that the hand does not clear
-    by its height, grown by its radius; near: those of them that are not culled; in_the_way: those of them that do not hold the
-    goal, for each goal; cleared (n,): whether the hand clears each obstacle by its height; heights: the prediction of the height;
-    covariances: what all candidates share of theirs.
+    by its height, grown by its radius; near: those of them that are not culled; in_the_way: those of them that neither hold the
+    goal nor are its object, for each goal; cleared (n,): whether the hand clears each obstacle by its height; heights: the
+    prediction of the height; covariances: what all candidates share of theirs.
     """
 
     config: Config
@@ -72,7 +72,8 @@ def prepare_situation(
 ) -> Situation:
     """Return the situation of a prediction from an estimated state of the hand; the other arguments are those of `predict`.
 
-    The start is without noise, and the times to go change only gradually from those of the known tracks.
+    Speed and acceleration of a hand at rest are left out, because they are noise. Times to go change only gradually from those of
+    the known tracks.
     """
     hand = _simplify_start(estimated, config.estimator)
     durations_s = _find_durations(hand, goals, known, config)
@@ -83,8 +84,8 @@ def prepare_situation(
     blocking = grown.take(np.flatnonzero(~cleared)) if cleared.any() else grown
     near = cull_obstacles(blocking, hand.mean[:2], goals, max(durations_s), config.scene.max_obstacles)
     in_the_way = take_in_the_way(near, goals, durations_s, objects)
-    around = obstacles, blocking, near, in_the_way
-    return Situation(config, hand, goals, durations_s, objects, *around, cleared, heights, covariances)
+    tables = obstacles, blocking, near, in_the_way
+    return Situation(config, hand, goals, durations_s, objects, *tables, cleared, heights, covariances)
 
 
 def _find_durations(hand: HandState, goals: Array, known: Tracks, config: Config) -> list[float]:
@@ -127,12 +128,12 @@ def _simplify_start(hand: HandState, config: EstimatorConfig) -> HandState:
     """Return the state that a prediction starts from.
 
     Speed and acceleration of a hand that has not begun to move, those of its height too, are set to zero, because they are noise:
-    with 1 mm of it at 100 Hz, the efforts of a hand at rest would differ by a factor of three from one sample to the next, and
-    the classes of a symmetric obstacle would swap their ranks 24 times a second. The covariance is that of a hand that moves with
-    about `estimator.onset_speed` at most.
+    with 1 mm of noise of the position at 100 Hz, the efforts of a hand at rest would differ by a factor of three from one sample
+    to the next, and the classes of a symmetric obstacle would swap their ranks 24 times a second. The covariance is that of a
+    hand that moves with about `estimator.onset_speed` at most.
 
-    An acceleration a that decays as exp(-t / tau) leads from the speed v to v + tau a. Where the operator commands speed, as with
-    a thumb stick, tau is short, and a plan that starts from v + tau a without acceleration is nearer to what follows.
+    An acceleration a that decays as exp(-t / theta) leads from the speed v to v + theta a. Where the operator commands speed, as
+    with a thumb stick, theta is short, and a plan that starts from v + theta a without acceleration is nearer to what follows.
     """
     if hand.onset_ns is None:
         height_at_rest, mean = np.array([hand.height_mean[0], 0.0, 0.0]), np.concatenate([hand.mean[:2], np.zeros(4)])

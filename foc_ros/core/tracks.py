@@ -17,8 +17,8 @@ prediction, l_i before (0 for a new class), and the time h between both,
 
     l_i <- ((1 - g) l_i + g p_i) / sum,   g = min(1, h / (`FULL_CHANGE_S` max_i |p_i - l_i|)).
 
-Small changes are not delayed. With a new goal all likelihoods are those of this prediction, because a goal of which nothing was
-known is not unlikely. The likelihood of a class that no candidate continues counts as unknown in l_i.
+Small changes are not delayed. With a new goal, and where no class goes on, all likelihoods are those of this prediction, because
+what nothing was known of is not unlikely. The likelihood of a class that no candidate continues counts as unknown in l_i.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from .types import NANOSECONDS, Array, Record, Unassigned, as_readonly
 
 HOLD_S = 0.2
 """Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten
-predictions, within which a solver or a search that missed a class finds it again."""
+predictions at 50 Hz, within which a solver or a search that missed a class finds it again."""
 SELDOM, TURNS, REST_S = 0.02, 5, 0.1
 """A class is solved in one of TURNS predictions if its likelihood is less than the part SELDOM of the largest one. No class waits
 for more than REST_S [s]."""
@@ -56,7 +56,7 @@ class Track(Record):
 
     number: stays for as long as the class is followed; candidate: as it was last, at the stamp seen_ns; likelihood: its last one;
     solution: the last one, found at solved_ns, None if there is none, and the sides on which it passes obstacles, by id;
-    has_failed: whether the class could not be solved since.
+    has_failed: whether the last prediction could not solve the class.
     """
 
     number: int
@@ -84,10 +84,10 @@ class Track(Record):
 class Tracks(Record):
     """What one prediction passes to the next.
 
-    followed: the tracks of its candidates; absent: those that were not seen for a short time; stamp_ns: of the prediction, None
-    if there was none; goals (g, 2) [m]; obstacles: where they were; durations_s: time to go to each goal [s]; unassigned: what
-    no candidate had; most_likely: number of the most likely class; next_number: of the next new class; next_goal: row of the goal
-    at which the search begins.
+    followed: the tracks of its candidates; absent: those that the search no longer finds, for `HOLD_S`; stamp_ns: of the
+    prediction, None if there was none; goals (g, 2) [m]; obstacles: where they were; durations_s: time to go to each goal [s];
+    unassigned: what no candidate had; most_likely: number of the most likely class; next_number: of the next new class;
+    next_goal: row of the goal at which the search begins.
     """
 
     followed: tuple[Track, ...] = ()
@@ -259,14 +259,14 @@ NO_TRACKS = Tracks()
 
 
 def count_shared(before: Candidate, now: Candidate) -> int | None:
-    """Return how many sides two candidates share, None if they are different classes: no name is the other with less in it."""
+    """Return how many sides two candidates share, None if they are different classes: neither name contains the other."""
     if before.goal != now.goal or not agrees(frozenset(before.sides), frozenset(now.sides)):
         return None
     return min(len(before.sides), len(now.sides))
 
 
 def _limit_gains(shares: Array, old: Array, limited: NDArray[np.bool_]) -> Array:
-    """Return shares (s,) that sum to one. The limited ones are not larger than the old ones; the others share the rest."""
+    """Return shares (s,) that sum to one. The limited ones are not larger than the old ones, unless there are no others."""
     others = float(shares[~limited].sum())
     if not others:
         return shares
@@ -288,8 +288,8 @@ def _inherits(candidate: PredictedCandidate, before: Candidate) -> bool:
 def take_rest(solution: Solution, age_s: float, position: Array, reason: str) -> Solution | None:
     """Return the rest of a solution from an age [s] on, at as many steps, that begins at a position (2,) [m].
 
-    None if nothing remains. reason: why it is used, in words. The distance of the hand from the solution now falls to zero at its
-    end as a minimum-jerk movement does, with its derivatives.
+    None if no more than a step remains. reason: why it is used, in words. The distance of the hand from the solution now falls to
+    zero at its end as a minimum-jerk movement does, with its derivatives.
     """
     steps, left_s = len(solution.control), float(solution.times[-1]) - age_s
     if left_s <= solution.dt:

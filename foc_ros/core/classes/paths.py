@@ -70,7 +70,8 @@ class PathQuery:
 def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[Arrival]]:
     """Yield the shortest path of each class, in the order of their keys, equally long ones together.
 
-    notes: `search_cut` is increased if states are left at the largest number, `search_late` if the deadline ends the search.
+    notes: `search_cut` is increased if the search ends at the largest number of states, `search_late` if the deadline ends the
+    search.
     """
     graph, goal, named, centre = query.graph, query.goal, query.named, query.graph.nodes.outlines.centre
     lines, ends = _list_lines(graph, named.tobytes()), len(query.rest)
@@ -85,7 +86,7 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
             heappush(frontier, (key + rest[node], entries, key, node, NEUTRAL * ones + code, -1))
             entries += 1
     seen, node_of, before, tied, found = set[tuple[int, int]](), list[int](), list[int](), list[Arrival](), 0
-    # each named obstacle is passed on two sides
+    # each named obstacle has two sides, so that there are at most 2^k classes
     while frontier and len(node_of) < query.max_states and found < 1 << len(named):
         if tied and frontier[0][0] > tied[0].key + TIE:
             yield tied

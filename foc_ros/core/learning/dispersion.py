@@ -15,11 +15,11 @@ Predictions of a moving hand, `SAMPLE_S` apart, are kept until the hand has reac
 x there and the mixture of normal distributions (p_i, m_i, S_i) that was predicted without the factors, each pair of factors has
 the log-posterior
 
-    log w(f, f') = -(log^2 f + log^2 f') / 2 + sum_h sum_predictions c log sum_i p_i N(x; m_i, f(h)^2 S_i).
+    log w(f, f') = -(log^2 f + log^2 f') / 2 + sum_h sum_predictions c log sum_i p_i N(x; m_i, f_i(h)^2 S_i).
 
-The errors within one second, which depend on each other, count as one: c is the time since the prediction before over 1 s, at
-most 1, or `SAMPLE_S` over 1 s for the first one of a movement. The factors in use are the posterior means, of the logarithms.
-They change little from one prediction to the next, as stiffness needs it.
+The errors at one time ahead within one second, which depend on each other, count as one: c is the time since the prediction
+before over 1 s, at most 1, or `SAMPLE_S` over 1 s for the first one of a movement. The factors in use are the posterior means, of
+the logarithms. They change little from one prediction to the next, so that the stiffness of guidance does not jump.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Dispersion(Record):
     """The errors of the predictions so far.
 
     errors: how many were judged; posterior: of both factors; factors: for now and for the end, exactly 1 before the first
-    error; hand: its last state; taken_ns: stamp of the last prediction that was taken;
+    error; hand: the last state of the hand; taken_ns: stamp of the last prediction that was taken;
     forecasts: that the hand has not reached yet.
     """
 
@@ -93,7 +93,7 @@ class Dispersion(Record):
     forecasts: tuple[Forecast, ...] = ()
 
     def adapt(self, config: CovarianceConfig) -> CovarianceConfig:
-        """Return the factors of this operator."""
+        """Return the parameters with the factors of this operator."""
         if not self.errors:
             return config
         near, far = self.factors

@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which goals an operator prefers, and where reaches end: hands stop at the near side of objects, and tools have a length.
 
-A hand that begins to move at the distance d_i from goal i is expected to go there with the probability q_i, which is proportional
-to d_i^(-2 beta). With the number n_i of reaches that ended at the goal, and the sum e_i of its q_i over all reaches, the
-likelihoods of its candidates get the weight
+A hand that begins to move at the distance d_i from where reaches to goal i end is expected to go there with the probability q_i,
+which is proportional to d_i^(-2 beta). With the number n_i of reaches that ended at the goal, and the sum e_i of its q_i over the
+reaches that ended at one, the likelihoods of its candidates get the weight
 
     w_i = (1 + c n_i) / (1 + c e_i),   c = `likelihood.past_goals`.
 
 If reaches to a goal are Poisson events, w_i is the posterior mean of their rate relative to the expected one. The prior of this
 ratio is a gamma distribution with the mean 1 and the variance c.
 
-Two goals are the same if each is the only goal in the obstacle with the same id. Goals outside of obstacles are the same if they
-lie within 20 mm of each other.
+Two goals are the same if each is the only goal in the obstacle with the same id. Goals without such an obstacle are the same if
+they lie within 20 mm of each other.
 
 Reaches are expected to end at the mean displacement from their goal of the n earlier ones, times n / (n + 3).
 """

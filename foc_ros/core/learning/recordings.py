@@ -107,7 +107,8 @@ class Library(Record):
 
     def find_here(self, frame_id: str, obstacles: Obstacles) -> NDArray[np.bool_]:
         """Tell which recordings (r,) are of this scene: their obstacles are where they were."""
-        is_here = {scene: each.matches(frame_id, obstacles) for scene, each in zip(self.scene, self.recordings, strict=True)}
+        one_of_each = dict(zip(self.scene, self.recordings, strict=True))
+        is_here = {scene: each.matches(frame_id, obstacles) for scene, each in one_of_each.items()}
         return np.array([is_here[scene] for scene in self.scene], dtype=np.bool_)
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where safety factors are least in time: the contacts at which the solver keeps margins, and the factor that a solution reports.
 
-A factor is looked at on the grid of the margins, sampled in brackets around its lowest points there, and measured where found.
+Factors are computed on the grid of the margins, sampled finely around their lowest points there, and measured at the minima.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .margin import Contacts, Indices, Margin, Margins, Motion
 BRACKET, NARROW = np.linspace(-1.0, 1.0, 9), np.linspace(-0.25, 0.25, 33)
 """Times, relative to the distance of points on the grid, at which safety factors are sampled: first to tell minima apart, then
 around each. The last ones are 4e-3 steps apart, and a parabola or two lines pass through them."""
-BOLD = 1.5
-"""Between two points of the grid a safety factor may change by this much more than from one point to the next."""
+CHANGE_RATIO = 1.5
+"""Between two points of the grid a safety factor may change by this factor more than from one point to the next."""
 
 
 def find_minima(
     margins: Margins, rows: Indices, motion: Motion, k: Array, grid: Margin, is_wanted: NDArray[np.bool_]
 ) -> tuple[Contacts, Array]:
-    """Return the local minima in time of the safety factors, and these.
+    """Return the local minima in time of the safety factors, and the factors there.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def find_minima(
 
 
 def find_least_factors(margins: Margins, control: Array, factors: Array | None = None) -> tuple[Array, Indices, Array]:
-    """Return the least safety factors of controls (b, 2N) over all obstacles and times, and where they are.
+    """Return the least safety factors of controls (b, 2N) over all obstacles and times after the recovery, and where they are.
 
     Wherever a factor that changes from one point of the grid to the next as it does there may fall below the least one, it is
     sampled between them, and the minima are refined.
@@ -71,19 +71,19 @@ def find_least_factors(margins: Margins, control: Array, factors: Array | None =
     k, row, moment = np.full(len(rows), CERTAIN_K), np.zeros(len(rows), dtype=np.intp), np.zeros(len(rows))
     if not margins.count:
         return k, row, moment
-    motion, none = margins.move(rows, control), np.zeros(len(rows))
+    motion, zero_k = margins.move(rows, control), np.zeros(len(rows))
     if factors is None:
-        factors = margins.measure_grid(rows, motion, none).factor
-    counts = margins.counts[..., None] & (margins.times >= margins.recovery_steps[..., None])
-    factors = np.where(counts, factors, np.inf)
+        factors = margins.measure_grid(rows, motion, zero_k).factor
+    is_counted = margins.counts[..., None] & (margins.times >= margins.recovery_steps[..., None])
+    factors = np.where(is_counted, factors, np.inf)
     least = factors.min(axis=(1, 2))
-    may_be_least = np.isfinite(factors) & (factors - BOLD * _vary(factors) <= least[:, None, None])
+    may_be_least = np.isfinite(factors) & (factors - CHANGE_RATIO * _vary(factors) <= least[:, None, None])
     at, obstacle, place = np.nonzero(may_be_least)
     times = np.maximum(margins.times[place], margins.recovery_steps[at, obstacle])
-    places, _ = _refine(margins, motion, none, at, Contacts(at, obstacle, times), least)
+    places, _ = _refine(margins, motion, zero_k, at, Contacts(at, obstacle, times), least)
     places = places._replace(time=np.maximum(places.time, margins.recovery_steps[places.problem, places.obstacle]))
     found = _measure_exactly(margins, places, control)
-    for which in np.argsort(-found, kind='stable').tolist():
+    for which in np.argsort(-found, kind='stable').tolist():  # the least one is written last
         problem = places.problem[which]
         k[problem], row[problem], moment[problem] = found[which], places.obstacle[which], places.time[which]
     return k, row, moment
@@ -102,7 +102,7 @@ def _refine(
     if bound is not None:
         bound = bound.copy()
         np.minimum.at(bound, at, factors.min(axis=0))
-        is_lowest &= factors.T - BOLD * _vary(factors.T) <= bound[at, None]
+        is_lowest &= factors.T - CHANGE_RATIO * _vary(factors.T) <= bound[at, None]
     which, column = np.nonzero(is_lowest)
     at, places = at[which], Contacts(places.problem[which], places.obstacle[which], times[column, which])
     times, factors, is_on_edge = times[:, which], factors[:, which], is_on_edge[:, which]
@@ -161,7 +161,7 @@ def _vary(values: Array) -> Array:
 
 
 def _find_lowest(values: Array, is_kink: NDArray[np.bool_]) -> Array:
-    """Return where the least of five even values (5, q) is, counted from the middle, (q,).
+    """Return where the least of five evenly spaced values (5, q) is, counted from the middle, (q,).
 
     It is the vertex of a parabola, or where the lines through the first two and the last two values meet.
     """

@@ -26,7 +26,7 @@ from foc_ros.core.obstacles.polygons import FLAT, make_hull_polygon
 from foc_ros.core.types import NANOSECONDS, Array
 
 from .decode_point_cloud import MAX_ROWS, DecodedCloud
-from .decode_poses import MAX_COORDINATE, FrameLookup, check_coordinates, decode_frame, decode_stamp, keep_frame
+from .decode_poses import MAX_COORDINATE, FrameLookup, check_coordinates, decode_frame, decode_point, decode_stamp, keep_frame
 from .plane import NO_TRANSFORM, Transform, compute_rotation, lift, make_heights, project
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
@@ -203,8 +203,7 @@ def _read_marker(marker: Any, name: str, plane: str, transform: Transform) -> So
     x, y, z = size = _read_sizes(f'{name}.scale', _read(marker.scale))
     if marker.type == BOX:
         return BOX, size, _read_pose(f'{name}.pose', marker.pose, transform)
-    position = transform.apply(_read(marker.pose.position))
-    check_coordinates(f'{name}.pose.position', position.tolist())
+    position = decode_point(marker.pose.position, f'{name}.pose.position', transform)
     size = (max(size) / 2.0,) if marker.type == SPHERE else (z, max(x, y) / 2.0)
     return marker.type, size, Transform(UPRIGHT[plane], position)
 
@@ -277,9 +276,8 @@ def _is_finite(pose: Any, size: Any, *, is_turned: bool) -> bool:
 def _read_pose(name: str, pose: Any, transform: Transform = NO_TRANSFORM) -> Transform:
     """Return a pose after a transform, if its numbers are within their bounds."""
     check_coordinates(f'{name}.orientation', [*_read(pose.orientation), pose.orientation.w])
-    found = transform.compose(Transform(compute_rotation(pose.orientation), np.array(_read(pose.position), dtype=float)))
-    check_coordinates(f'{name}.position', found.translation.tolist())
-    return found
+    position = decode_point(pose.position, f'{name}.position', transform)
+    return Transform(transform.rotation @ compute_rotation(pose.orientation), position)
 
 
 def _read_sizes(name: str, lengths: Iterable[float], parts: Iterable[str] = ('.x', '.y', '.z')) -> tuple[float, ...]:

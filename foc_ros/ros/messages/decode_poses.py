@@ -28,16 +28,17 @@ def keep_frame(header: Any) -> tuple[str, Transform]:
 
 
 def decode_hand_sample(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> HandSample:
-    """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation is not used.
+    """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation only tells a lost hand.
 
-    Raises LostHandError for a pose without data, MessageError for a coordinate beyond MAX_COORDINATE and a stamp that is not set.
+    Raises LostHandError for a pose without data, MessageError for a coordinate beyond MAX_COORDINATE and a stamp that is not set
+    or not valid.
     """
     check_hand_pose(message.pose)
     stamp_ns = decode_stamp(message.header)
     if stamp_ns == 0:
         raise MessageError('header.stamp', 'a time after 0', '0 s')
     frame_id, transform = look_up(message.header)
-    position, height = project(_decode_point(message.pose.position, 'pose.position', transform), plane)
+    position, height = project(decode_point(message.pose.position, 'pose.position', transform), plane)
     return HandSample(stamp_ns, as_readonly(position), float(height), frame_id)
 
 
@@ -73,13 +74,13 @@ def decode_goals(message: Any, plane: str, look_up: FrameLookup = keep_frame) ->
 
 
 def decode_goal(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> DecodedGoals:
-    """Decode a geometry_msgs/PoseStamped as one goal; the stamp is not used."""
+    """Decode a geometry_msgs/PoseStamped as one goal; the stamp serves only to find the transform."""
     return _decode_goals(message.header, {'pose': message.pose}, plane, look_up)
 
 
 def _decode_goals(header: Any, poses: Mapping[str, Any], plane: str, look_up: FrameLookup) -> DecodedGoals:
     frame_id, transform = look_up(header)
-    points = [_decode_point(pose.position, f'{name}.position', transform) for name, pose in poses.items()]
+    points = [decode_point(pose.position, f'{name}.position', transform) for name, pose in poses.items()]
     goals, heights = project(np.array(points, dtype=float).reshape(-1, 3), plane)
     return DecodedGoals(goals, frame_id, heights)
 
@@ -99,10 +100,12 @@ def decode_frame(header: Any) -> str:
     return str(header.frame_id).lstrip('/')
 
 
-def _decode_point(point: Any, field: str, transform: Transform) -> list[float]:
-    coordinates: list[float] = transform.apply([point.x, point.y, point.z]).tolist()
-    check_coordinates(field, coordinates)
-    return coordinates
+def decode_point(point: Any, field: str, transform: Transform) -> Array:
+    """Decode a geometry_msgs/Point, (3,) [m], within its bounds before and after a transform; field: its name in errors."""
+    check_coordinates(field, (point.x, point.y, point.z))
+    position = transform.apply([point.x, point.y, point.z])
+    check_coordinates(field, position.tolist())
+    return position
 
 
 def check_coordinates(field: str, values: Iterable[float]) -> None:
