@@ -9,9 +9,9 @@ from evaluation_samples import reach, write_tables
 
 from foc_ros.analysis.evaluation import observations
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
-from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles, observe
+from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, WIDENINGS, ask, find_relevant_obstacles, observe
 from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth
-from foc_ros.analysis.fitting.one_replay import NO_WIDENING, widen_covariances
+from foc_ros.analysis.fitting.one_replay import widen_covariances
 from foc_ros.analysis.recordings import EPOCH_NS, find_recordings
 from foc_ros.core import tracks
 from foc_ros.core.classes.rows import find_rows
@@ -53,13 +53,14 @@ def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_
 
 @pytest.mark.parametrize('plant', ['triple_integrator', 'damped_mass'])
 def test_other_widenings_of_observations_give_the_covariances_of_a_replay_with_them(data, plant):
-    own = {'foc.plant': plant, 'foc.steps': 100, 'duration.adaptation': 'none', 'covariance.adaptation': 'none'}
-    known = replace_values(PLAIN, own)
-    wide = {'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.02, 'duration.spread': 0.3}
-    replays = (observe_one(data, replace_values(known, each)).observations for each in (NO_WIDENING, wide))
-    for narrow, widened in zip(*replays, strict=True):
-        tried = widen_covariances(narrow, [tuple(wide.values())], known)[0]
-        np.testing.assert_allclose(tried, widened.candidates.covariance, rtol=0.01, atol=1e-5)
+    known = replace_values(PLAIN, {'foc.plant': plant, 'duration.adaptation': 'none', 'covariance.adaptation': 'none'})
+    settings = (0.0, 0.0, 0.0), (0.5, 0.02, 0.3)
+    given = [replace_values(known, dict(zip(WIDENINGS, each, strict=True))) for each in settings]
+    replays = [observe_one(data, each).observations for each in given]
+    for both in zip(*replays, strict=True):
+        for given, setting, other in zip(both, settings[::-1], both[::-1], strict=True):
+            tried = widen_covariances(given, [setting])[0]
+            np.testing.assert_allclose(tried, other.candidates.covariance, rtol=1e-9, atol=1e-12)
 
 
 def test_the_ground_truth_is_that_of_the_path(data):

@@ -12,6 +12,8 @@ from evaluation_samples import TWO_CLASSES, H, observation, recorded
 from evaluation_samples import reach as resting_reach
 from fit_recordings import GOALS, reach, recorded_hand, write_tables
 
+from foc_ros.analysis.evaluation.observations import observe
+from foc_ros.analysis.evaluation.positions import compute_log_densities
 from foc_ros.analysis.evaluation.truth import HORIZONS, TIMES_S
 from foc_ros.analysis.fitting import SettingTable, race
 from foc_ros.analysis.fitting.direct import FADING, fit_duration, fit_estimator, fit_fading, fit_wait
@@ -223,6 +225,22 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
     assert np.array_equal(replays.score([SEARCH_CONFIG, hopeless], names, 'again'), scores[:, ::-1])
 
 
+def test_settings_are_compared_by_what_the_predictor_answers_with_them(tmp_path, monkeypatch):
+    """It learns the pace, for which the spread of durations is the prior, and expects other goals by the scatter of ends."""
+    recording = find_recordings(write_tables(tmp_path / 'data', count=1, hz=30.0))['r0']
+    given = {'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.02, 'duration.spread': 0.3}
+    config = replace_values(SEARCH_CONFIG, {**given, 'covariance.adaptation': 'none'})
+    observed = observe(recording, config).observations
+    expected = {}
+    for each in observed:
+        densities = compute_log_densities(each, each.candidates.mixture, each.candidates.covariance)
+        if each.movement_age_s > 0.0 and np.isfinite(densities[0]):
+            expected['r0', each.stamp_ns] = pytest.approx([np.nanmean(np.maximum(densities, -30.0))], abs=1e-6)
+    monkeypatch.setattr(race, 'FEW_WIDENINGS', [tuple(given.values())])
+    _, found = race._score_replay((0, recording, config, {}))
+    assert found.positions == expected
+
+
 def test_eta_is_lowered_only_if_that_is_allowed():
     assert {each.foc.eta for each in make_eta_settings(SEARCH_CONFIG, may_be_lower=False)} == {0.9, 0.95}
     assert {each.foc.eta for each in make_eta_settings(SEARCH_CONFIG, may_be_lower=True)} == {0.9, 0.95, 0.7, 0.5}
@@ -278,9 +296,10 @@ def test_a_lower_coverage_is_told_in_one_sentence(held_out, before, after, words
 S = np.array(TIMES_S)
 TO_GOAL = 10 * S**3 - 15 * S**4 + 6 * S**5
 LATE = 9.0 * (S**3 * (1 - S) ** 2)[:, None] * [1.0, 0.0]
-CANDIDATES = replace(
-    TWO_CLASSES, covariance=np.tile(1e-8 * np.eye(2), (2, 3, 1, 1)), duration_sensitivity=np.stack([LATE, LATE])[:, HORIZONS]
-)
+KNOWN = np.tile(1e-8 * np.eye(2), (2, 3, 1, 1))
+SCATTERED = (TO_GOAL**2)[HORIZONS, None, None] * np.eye(2)
+ADDED = S[HORIZONS, None, None] * np.eye(2), SCATTERED, (LATE[:, :, None] * LATE[:, None])[HORIZONS]
+CANDIDATES = replace(TWO_CLASSES, covariance=KNOWN, unwidened=KNOWN, widening=np.stack([ADDED, ADDED], axis=1))
 
 
 def _make_recordings(endpoint, spread):

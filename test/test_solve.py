@@ -158,3 +158,19 @@ def test_json_of_an_unsolved_candidate_holds_what_was_reached(tmp_path, capsys):
     assert solve(tmp_path, {**demanding, 'shortfall': math.inf}) == 3
     error = capsys.readouterr().err
     assert error.startswith('foc_ros solve: no candidate could be solved: goal0:') and error.count('\n') == 1
+
+
+@pytest.mark.parametrize('shortfall', [6.0, math.inf])
+@pytest.mark.parametrize('noise', [0.0, 1e-6, 1e-4])
+@pytest.mark.parametrize('eta', [0.0, 0.9])
+def test_a_hand_without_noise_passes_beside_an_obstacle_on_both_sides(eta, noise, shortfall):
+    """The cost is that of the shortest paths, whatever eta is, and rounding does not decide whether eta is kept."""
+    values = {'foc.eta': eta, 'foc.noise_x': noise, 'foc.noise_y': noise, 'likelihood.shortfall': shortfall}
+    found = foc_ros.solve_classes(
+        (0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), 0.03)], config=foc_ros.Config().with_values(values)
+    )
+    assert [(each.label, each.status.value) for each in found] == [('goal0:-0', 'solved'), ('goal0:+0', 'solved')]
+    assert [each.solution.safety_shortfall for each in found] == [0.0, 0.0]
+    assert min(each.solution.eta for each in found) >= eta
+    assert [each.cost for each in found] == pytest.approx([73.4506, 98.3174], rel=3e-4)
+    assert found[0].likelihood == pytest.approx(0.6298, abs=1e-3)

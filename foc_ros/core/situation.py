@@ -75,7 +75,7 @@ def prepare_situation(
     Speed and acceleration of a hand at rest are left out, because they are noise. Times to go change only gradually from those of
     the known tracks.
     """
-    hand = _simplify_start(estimated, config.estimator)
+    hand = simplify_start(estimated, config.estimator)
     durations_s = _find_durations(hand, goals, known, config)
     grown = obstacles.grow(config.scene.hand_radius)
     covariances = SharedCovariances(hand, config)
@@ -124,7 +124,7 @@ def build_problem(config: Config, hand: HandState, obstacles: Obstacles, goal: A
     )
 
 
-def _simplify_start(hand: HandState, config: EstimatorConfig) -> HandState:
+def simplify_start(hand: HandState, config: EstimatorConfig) -> HandState:
     """Return the state that a prediction starts from.
 
     Speed and acceleration of a hand that has not begun to move, those of its height too, are set to zero, because they are noise:

@@ -30,13 +30,12 @@ from foc_ros.analysis.recordings import Recording, group_by_operator
 from foc_ros.analysis.replay import Replay, Step
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows, tabulate_sides
 from foc_ros.core.classes.sides import BranchTimes, compute_branch_times, measure_passages
-from foc_ros.core.config import Config
+from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import FocError, RecordingError, warn
-from foc_ros.core.hand.duration import is_passing
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.plant.covariance import compute_duration_sensitivity
-from foc_ros.core.plant.models import make_plant_model
-from foc_ros.core.prediction import Prediction
+from foc_ros.core.plant.covariance import SharedCovariances, widen_covariance
+from foc_ros.core.prediction import PredictedCandidate, Prediction
+from foc_ros.core.situation import simplify_start
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record
 
 from .truth import HORIZONS_S, TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
@@ -45,6 +44,8 @@ EXACT = 1e-18
 """Variance that is added to that of a position, which may be known [m^2]: that of a nanometre."""
 
 PATH_CLASS, GAP, GOAL = 'way', 'gap', 'goal'
+WIDENINGS = 'foc.process_noise', 'foc.endpoint_stddev', 'duration.spread'
+"""Standard deviations whose squares the covariances contain, and which no plan depends on."""
 Answer = tuple[int, ...]
 """Sides of the obstacles in question, LEFT or RIGHT, in their order; or the row of a goal."""
 Questions = list[tuple['Observation', 'Question']]
@@ -59,9 +60,8 @@ class CandidateTable(Record):
     likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; named:
     obstacles in any label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
     (k, h, 2) [m]: the positions at `TIMES_S`; covariance (k, 3, 2, 2) [m^2], positive definite: of those at `HORIZONS_S`;
-    duration_sensitivity (k, 3, 2) [m]: by how much these lag behind for each share of the time to go that the movement takes
-    longer; branch_times: when the candidates
-    part; decisions: of those that take part.
+    unwidened (k, 3, 2, 2) [m^2]: what that of the plan is without `WIDENINGS`; widening (3, k, 3, 2, 2): what each of them adds
+    where it is 1; branch_times: when the candidates part; decisions: of those that take part.
     """
 
     labels: tuple[str, ...]
@@ -76,7 +76,8 @@ class CandidateTable(Record):
     sides: Sides
     mean: Array
     covariance: Array
-    duration_sensitivity: Array
+    unwidened: Array
+    widening: Array
     branch_times: BranchTimes
     decisions: Decisions
 
@@ -218,8 +219,10 @@ def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Co
 def _tabulate_candidates(
     prediction: Prediction, obstacles: Obstacles, hand: HandState, goals: Array, config: Config
 ) -> CandidateTable:
-    predicted, passing, plant = prediction.candidates, is_passing(config.duration), make_plant_model(config.foc)
-    solutions = [each.solution for each in predicted]
+    predicted = prediction.candidates
+    solutions, narrow = [each.solution for each in predicted], replace_values(config, dict.fromkeys(WIDENINGS, 0.0))
+    unwidened = _tabulate_plans(predicted, hand, narrow)
+    widening = [_tabulate_plans(predicted, hand, replace_values(narrow, {each: 1.0})) - unwidened for each in WIDENINGS]
     has_likelihood = np.array([each.has_likelihood for each in predicted])
     passages = measure_passages(solutions, obstacles)
     sides = tabulate_sides(passages)
@@ -246,12 +249,21 @@ def _tabulate_candidates(
             ]
         ),
         covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]) + EXACT * np.eye(2),
-        duration_sensitivity=np.array(
-            [interpolate_steps(compute_duration_sensitivity(each, passing, plant)[:, :2], each.dt) for each in solutions]
-        ),
+        unwidened=unwidened + EXACT * np.eye(2),
+        widening=np.array(widening),
         branch_times=compute_branch_times(passages),
         decisions=find_decisions(sides[has_likelihood], goal[has_likelihood], grown, hand, goals),
     )
+
+
+def _tabulate_plans(predicted: Sequence[PredictedCandidate], hand: HandState, config: Config) -> Array:
+    """Return the covariance (k, 3, 2, 2) [m^2] of the positions at `HORIZONS_S` that the plans of k candidates have."""
+    shared, found = SharedCovariances(simplify_start(hand, config.estimator), config), []
+    for each in predicted:
+        planned = each.solution.with_covariance(each.motor_covariance)
+        covariance = widen_covariance(planned, shared[planned.dt], hand.onset_ns is None, config)
+        found.append(interpolate_steps(covariance[:, :2, :2], planned.dt))
+    return np.array(found)
 
 
 def interpolate_steps(values: Array, dt: float) -> Array:

@@ -28,7 +28,7 @@ from foc_ros.core.errors import RecordingError
 
 from . import Findings, clip_to_bounds, is_cross_validated
 from .direct import fit_duration, fit_estimator, fit_fading, fit_wait
-from .one_replay import NO_WIDENING, fit_likelihood, fit_widening
+from .one_replay import fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
 
 PREDICTIONS = 10
@@ -116,8 +116,8 @@ def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower
 
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
-    by_motor_noise = replace_values(fit.config, {**thinned, **NO_WIDENING})
-    observed, failed = collect(partial(observe, config=by_motor_noise), list(recordings.items()), 'replay')
+    config = replace_values(fit.config, thinned)
+    observed, failed = collect(partial(observe, config=config), list(recordings.items()), 'replay')
     fit.failed.update(failed)
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')

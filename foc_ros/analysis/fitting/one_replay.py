@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters for which one replay of the recordings is enough: of the likelihood, and those that widen the covariance.
 
-The latter, process noise, scatter of the end point and spread of the duration, change nothing but covariances, so that all of
-them are tried on observations with motor noise alone, by the density of the true positions under the mixture of the candidates.
+The latter, process noise, scatter of the end point and spread of the duration, change no plan. In the covariances they can be
+exchanged, so that all of them are tried on observations with the given ones, by the density of the true positions under the
+mixture of the candidates.
 """
 
 from __future__ import annotations
@@ -16,15 +17,13 @@ from itertools import product
 import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, power_rule_shares
-from foc_ros.analysis.evaluation.observations import Observation, ObservedRecording, ask_main, interpolate_steps
+from foc_ros.analysis.evaluation.observations import WIDENINGS, Observation, ObservedRecording, ask_main
 from foc_ros.analysis.evaluation.positions import choose_row, compute_log_densities, measure_inside
 from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS
 from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, flatten, replace_values
-from foc_ros.core.hand.duration import is_passing
-from foc_ros.core.plant.models import make_plant_model
 from foc_ros.core.types import Array
 
 from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
@@ -45,14 +44,13 @@ LIKELIHOODS = {
 }
 """Values that are tried, and the given ones; of the exponent also without a planning horizon."""
 PROCESS_NOISES = (0.0, *np.geomspace(0.01, 100.0, 33).tolist())
-WIDENINGS = {
+TRIED_WIDENINGS = {
     'foc.process_noise': PROCESS_NOISES,
     'foc.endpoint_stddev': (0.0, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3, 12e-3, 16e-3, 24e-3, 32e-3, 48e-3, 72e-3, 0.11, 0.16),
     'duration.spread': (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.9),
 }
 """Values that are tried, and the given ones: process noises [m/s^2.5] from far below the jerk density of the filter to that of a
 hand in free motion; scatter of the end [m], of which Fitts' law expects 48 mm for a target of 0.2 m."""
-NO_WIDENING: Setting = dict.fromkeys(WIDENINGS, 0.0)
 FEW_WIDENINGS = tuple(product((0.0, *PROCESS_NOISES[1::4]), (0.0, 3e-3, 8e-3, 24e-3, 72e-3), (0.0, 0.2, 0.4)))
 """Widenings whose best is good enough to compare predictions that differ in other parameters."""
 
@@ -99,24 +97,24 @@ def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
 
 
 def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
-    """Return the parameters that widen the covariance, from a replay with motor noise alone.
+    """Return the parameters that widen the covariance.
 
     Scores: mean log-densities and coverage by how the widening was chosen, with at least three recordings also held out.
     """
     before = flatten(config)
     given = {name: float(before[name]) for name in WIDENINGS}
-    settings = list_settings({name: (0.0, given[name], *tried) for name, tried in WIDENINGS.items()})
+    settings = list_settings({name: (0.0, given[name], *TRIED_WIDENINGS[name]) for name in WIDENINGS})
     widenings, rows = [tuple(each.values()) for each in settings], []
     for recording in recordings:
         densities = (
-            compute_mean_densities(each, power_rule_shares(each, config.likelihood), config, widenings)
-            for each in recording.observations
+            compute_mean_densities(each, power_rule_shares(each, config.likelihood), widenings) for each in recording.observations
         )
         known = [each for each in densities if each is not None]
         rows.append(np.mean(known, axis=0) if known else np.full(len(settings), np.nan))
     table = SettingTable(np.array(rows), settings)
     found, left = table.estimate(given, 'density of true positions')
-    chosen = {'motor noise alone': [NO_WIDENING] * len(recordings)}
+    none: Setting = dict.fromkeys(WIDENINGS, 0.0)
+    chosen = {'motor noise alone': [none] * len(recordings)}
     chosen |= left.list_choices(given, [each.name for each in recordings])
     found.scores = {'positions': {name: table.score(each) for name, each in chosen.items()}, 'inside_90': {}, 'inside_all_90': {}}
     for name, each in chosen.items():
@@ -125,33 +123,22 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Fin
     return found
 
 
-def compute_mean_densities(
-    observation: Observation, shares: Array, config: Config, widenings: Iterable[Sequence[float]]
-) -> Array | None:
+def compute_mean_densities(observation: Observation, shares: Array, widenings: Iterable[Sequence[float]]) -> Array | None:
     """Return the log-density of the true positions, the mean over the horizons, under each widening, (q,) [nat, metres].
 
-    shares (k,): of the candidates; config: of the replay; widenings: values of `WIDENINGS`. None where the movement ends before
-    the first horizon or has not begun, because a hand at rest shows how long it waits, not how it moves.
+    shares (k,): of the candidates; widenings: values of `WIDENINGS`. None where the movement ends before the first horizon
+    or has not begun, because a hand at rest shows how long it waits, not how it moves.
     """
     if observation.movement_age_s == 0.0 or not shares.any() or np.isnan(observation.truth.positions[HORIZONS[0], 0]):
         return None
-    densities = compute_log_densities(observation, shares, widen_covariances(observation, widenings, config))
+    densities = compute_log_densities(observation, shares, widen_covariances(observation, widenings))
     return np.asarray(np.nanmean(np.maximum(densities, -30.0), axis=1))  # one unexpected position does not rule the rest
 
 
-def widen_covariances(observation: Observation, widenings: Iterable[Sequence[float]], config: Config) -> Array:
+def widen_covariances(observation: Observation, widenings: Iterable[Sequence[float]]) -> Array:
     """Return the covariance (q, k, 3, 2, 2) [m^2] of the candidates' positions at `HORIZONS_S` with each widening."""
-    candidates, late, squares = observation.candidates, observation.candidates.duration_sensitivity, np.array(widenings) ** 2
-    plant = make_plant_model(config.foc)
-    unit = []  # variances by process noise and by scatter of the end, of 1 each, (k, 2, 3)
-    for time_s in candidates.time_s.tolist():
-        kind = time_s / config.foc.steps, config.foc.steps, is_passing(config.duration)
-        process = plant.compute_process_covariance(*kind)
-        end = plant.compute_goal_map(*kind) ** 2
-        unit.append([interpolate_steps(each[:, 0, 0], kind[0]) for each in (process, end)])
-    both = np.tensordot(squares[:, :2], np.array(unit), (1, 1))
-    spread = np.multiply.outer(squares[:, 2], late[..., :, None] * late[..., None, :])
-    return np.asarray(candidates.covariance + both[..., None, None] * np.eye(2) + spread)
+    added = np.tensordot(np.array(widenings) ** 2, observation.candidates.widening, 1)
+    return np.asarray(observation.candidates.unwidened + added)
 
 
 def compute_coverage(
@@ -166,7 +153,7 @@ def compute_coverage(
     for recording, setting in zip(recordings, chosen, strict=True):
         for each in recording.observations:
             if each.movement_age_s > 0.0:
-                widened = widen_covariances(each, [tuple(setting.values())], config)[0]
+                widened = widen_covariances(each, [tuple(setting.values())])[0]
                 moving.append(replace(each, candidates=replace(each.candidates, covariance=widened)))
     if not moving:
         return {'inside_90': None, 'inside_all_90': None}

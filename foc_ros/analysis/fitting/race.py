@@ -34,7 +34,7 @@ from foc_ros.core.types import Array
 
 from . import Estimate, Findings, clip_to_bounds
 from .direct import CONSTANTS, fit_duration
-from .one_replay import FEW_WIDENINGS, NO_WIDENING, RULES, compute_mean_densities
+from .one_replay import FEW_WIDENINGS, RULES, compute_mean_densities
 
 NOISES, DURATIONS = (0.06, 0.25, 2.0), (0.7, 1.4, 2.0)
 """Factors tried beside 1."""
@@ -135,7 +135,7 @@ def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> 
     """Score the predictions of one setting in a recording; return its number and the scores."""
     number, given, config, thinned = item
     config = replace_values(config, thinned)
-    recording, found = observe(given, replace_values(config, NO_WIDENING)), ReplayScores({}, {})
+    recording, found = observe(given, config), ReplayScores({}, {})
     gaps = {observation.stamp_ns: question for observation, question in ask_all(recording, GAP)}
     for observation, question in ask_main(recording):
         shares, logs = [power_rule_shares(observation, rule) for rule in RULES], np.zeros(len(RULES))
@@ -144,7 +144,7 @@ def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> 
             logs += np.log(np.multiply(probabilities, asked.possible))
         found.classes[recording.name, observation.stamp_ns] = logs
     for observation in recording.observations:
-        densities = compute_mean_densities(observation, observation.candidates.mixture, config, FEW_WIDENINGS)
+        densities = compute_mean_densities(observation, observation.candidates.mixture, FEW_WIDENINGS)
         if densities is not None:
             found.positions[recording.name, observation.stamp_ns] = densities
     return number, found

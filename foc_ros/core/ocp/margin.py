@@ -33,6 +33,8 @@ Indices = NDArray[np.intp]
 
 LEAST_STDDEV = 1e-6
 """Standard deviation, relative to the scene, that is added to every other one: without any, k has no effect on the margin."""
+EXCESS = 1e-9
+"""Distance, relative to the scene, that is kept beyond what is asked for: with hardly any deviation, rounding decides about k."""
 LEAST_REACH = 1e-6
 """Least distance to keep from a polygon, relative to the scene: where none is asked for, a sharp corner has no normal."""
 ELASTIC_STDDEV = 1e-2
@@ -271,7 +273,7 @@ class Margins:
         root = np.sqrt(held * held + reach)
         is_outside, beyond = distance > radius, distance - radius
         factor = np.where(is_outside, beyond * (distance + radius) / (2.0 * np.where(is_outside, distance, 1.0)), beyond) / stddev
-        value = distance - held - root
+        value = distance - held - root - EXCESS * self.extent[where[0]]
         return Margin(value, distance, nx, ny, stddev, root, variance_x, variance_y, xx + yy, found.is_on_edge, factor)
 
     @staticmethod
