@@ -45,7 +45,7 @@ EXACT = 1e-18
 
 PATH_CLASS, GAP, GOAL = 'way', 'gap', 'goal'
 WIDENINGS = 'foc.process_noise', 'foc.endpoint_stddev', 'duration.spread'
-"""Standard deviations whose squares the covariances contain, and which no plan depends on."""
+"""Standard deviations that no plan depends on. The covariances are linear in their squares."""
 Answer = tuple[int, ...]
 """Sides of the obstacles in question, LEFT or RIGHT, in their order; or the row of a goal."""
 Questions = list[tuple['Observation', 'Question']]

@@ -31,7 +31,7 @@ STAY = 0.95
 
 
 class SearchOrder(NamedTuple):
-    """How long a search may take, and the goal (row) at which it begins: if time is short, another one each time.
+    """How long a search may take, and the goal (row) at which it begins: another one each time if time is short.
 
     objects: for each goal the id of the obstacle that it is, whether it holds the goal or not; None, or no entry, if it is none.
     """

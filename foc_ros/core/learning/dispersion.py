@@ -138,19 +138,25 @@ def make_forecast(
     stamp_ns: int, ahead_s: float, count: float, candidates: Sequence[PredictedCandidate], config: CovarianceConfig
 ) -> Forecast:
     """Return where candidates, published with the factors of config, expect the hand some time ahead, at their end after it."""
-    shares, means, covariances = [], [], []
+    times, means, covariances = [], [], []
     for solution in (each.solution for each in candidates):
         at = min(ahead_s / solution.dt, len(solution.control))
         row = min(int(at), len(solution.control) - 1)
         after = at - row
-        shares.append((at / len(solution.control)) ** 2)
+        times.append(at / len(solution.control))
         means.append((1.0 - after) * solution.mean[row, :2] + after * solution.mean[row + 1, :2])
         covariances.append((1.0 - after) * solution.covariance[row, :2, :2] + after * solution.covariance[row + 1, :2, :2])
-    share = np.array(shares)
+    share = compute_shares(np.array(times))
     covariance = np.array(covariances) / interpolate_factors(share, config)[:, None, None] ** 2
     covariance += 1e-12 * np.eye(2)  # so that the density of a known position is finite
     due_ns, weight = stamp_ns + round(ahead_s * NANOSECONDS), np.array([each.likelihood for each in candidates])
     return Forecast(due_ns, count, share, weight, np.array(means), covariance)
+
+
+def compute_shares(times: Array) -> Array:
+    """Return the shares s of equation 1 at times relative to the duration, t / T, any shape."""
+    shares: Array = times**2
+    return shares
 
 
 def interpolate_factors(share: Array, config: CovarianceConfig) -> Array:
@@ -164,6 +170,6 @@ def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) ->
     if config.near == config.far == 1.0:
         return candidate
     solution = candidate.solution
-    factors = interpolate_factors(np.linspace(0.0, 1.0, len(solution.mean)) ** 2, config)
+    factors = interpolate_factors(compute_shares(np.linspace(0.0, 1.0, len(solution.mean))), config)
     covariance = solution.covariance * factors[:, None, None] ** 2
     return replace(candidate, solution=solution.with_covariance(covariance))

@@ -34,7 +34,7 @@ Indices = NDArray[np.intp]
 LEAST_STDDEV = 1e-6
 """Standard deviation, relative to the scene, that is added to every other one: without any, k has no effect on the margin."""
 EXCESS = 1e-9
-"""Distance, relative to the scene, that is kept beyond what is asked for: with hardly any deviation, rounding decides about k."""
+"""Distance, relative to the scene, that is kept beyond what is asked for: without noise, rounding would decide about k."""
 LEAST_REACH = 1e-6
 """Least distance to keep from a polygon, relative to the scene: where none is asked for, a sharp corner has no normal."""
 ELASTIC_STDDEV = 1e-2

@@ -22,7 +22,7 @@ COLOUR = (0.0, 0.62, 0.45, 0.9)
 
 @dataclass(frozen=True)
 class SampleHeader:
-    """Where guidance holds: stamp [ns], frame and height [m] of the hand sample, and the task plane."""
+    """What guidance refers to: stamp [ns], frame and height [m] of the hand sample, and the task plane."""
 
     stamp_ns: int
     frame_id: str
