@@ -16,9 +16,18 @@ from pathlib import Path
 
 import numpy as np
 from page import ROOT, SHARED, format_table, write_blocks
+from scipy.special import softmax
 
-from foc_ros.analysis.evaluation.baselines import Baseline, forecast_published
-from foc_ros.analysis.evaluation.observations import GOAL, PATH_CLASS, ObservedRecording, ask_all, observe_in_order
+from foc_ros.analysis.evaluation.baselines import UNCERTAINTY, Forecast, ForecastFunction, forecast_published
+from foc_ros.analysis.evaluation.observations import (
+    GOAL,
+    PATH_CLASS,
+    Observation,
+    ObservedRecording,
+    Question,
+    ask_all,
+    observe_in_order,
+)
 from foc_ros.analysis.evaluation.positions import compute_position_scores
 from foc_ros.analysis.evaluation.scores import Scores, leave_goals_out, score_forecasts, score_other_goal, summarise
 from foc_ros.analysis.evaluation.truth import HORIZONS_S
@@ -45,9 +54,11 @@ SETTINGS = {
 PICK = Config().with_values({'rate_hz': 10.0})
 OTHER_SCORES = {'area_under_curve_half_way': 2, 'calibration_error': 3, 'loss': 3}
 """Scores of the share of another goal, with their digits."""
-POINTS = np.arange(1, 10)
-"""Tenths of the way at which goals are asked for."""
-PUBLISHED = Baseline('published', forecast_published, (None,))
+POINTS = np.linspace(0.1, 0.9, 9)
+"""Shares of the way at which goals are asked for."""
+ROUNDING = 1e-9
+AHEAD_S, DISTANCE_M = 0.25, 0.05
+"""Time ahead [s] and scale of the distance of the simple rule for goals [m], which is the best one for the other persons."""
 
 
 def is_held_out(name: str) -> bool:
@@ -69,10 +80,17 @@ def find_persons(data: Path) -> dict[str, list[Recording]]:
     return {person: found[person] for person in sorted(found)[1::2]}
 
 
-def score(recordings: Sequence[ObservedRecording], name: str) -> Scores:
-    """Return the scores of the published forecasts that answer a question."""
+def score(recordings: Sequence[ObservedRecording], name: str, forecast: ForecastFunction = forecast_published) -> Scores:
+    """Return the scores of the forecasts that answer a question."""
     asked = [(n, each, question) for n, seen in enumerate(recordings) for each, question in ask_all(seen, name)]
-    return score_forecasts((n, each, question, PUBLISHED.forecast(each, question, None)) for n, each, question in asked)
+    return score_forecasts((n, each, question, forecast(each, question, None)) for n, each, question in asked)
+
+
+def forecast_by_distance(observation: Observation, question: Question, _: None) -> Forecast:
+    """Forecast the goal by its distance from where the hand would be at its velocity."""
+    ahead = observation.hand[:2] + AHEAD_S * observation.hand[2:4]
+    shares = softmax(-np.hypot(*(observation.goals - ahead).T) / DISTANCE_M)
+    return Forecast.from_answer_shares(shares, question, UNCERTAINTY)
 
 
 def format_ways(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
@@ -83,18 +101,23 @@ def format_ways(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
     return tuple(f'{value:.{digits}f}' for value, digits in zip(values, (3, 1, 3, 2), strict=True))
 
 
-def format_goals(recordings: Sequence[ObservedRecording]) -> tuple[str, ...]:
-    """Return scores of the goals at the nearest of `POINTS`, each of which counts the same.
+def take_before(scores: Scores, share: float) -> Scores:
+    """Return the scores of the last prediction of each recording before the hand had covered a share of its way."""
+    before = np.flatnonzero(scores.progress <= share + ROUNDING)
+    is_last = np.diff(scores.recording[before], append=-1) != 0
+    return scores.take(before[is_last])
+
+
+def format_goals(recordings: Sequence[ObservedRecording], forecast: ForecastFunction = forecast_published) -> tuple[str, ...]:
+    """Return scores of the goals at `POINTS`, each of which counts the same, as does each recording.
 
     These are gain, the least gain, shares correct of all and half way, and calibration error.
     """
-    scores = score(recordings, GOAL)
-    point = np.round(scores.progress * 10.0)
-    found = summarise(scores.take(np.isin(point, POINTS)))
-    gain, right = (
-        np.array([values[point == each].mean() for each in POINTS])
-        for values in (scores.log_likelihood + np.log(scores.possible), scores.correct)
-    )
+    scores = score(recordings, GOAL, forecast)
+    points = [take_before(scores, share) for share in POINTS]
+    gain = np.array([summarise(each)['gain'] for each in points])
+    right = np.array([each.correct.mean() for each in points])
+    found = summarise(Scores(*map(np.concatenate, zip(*points, strict=True))))
     values = gain.mean(), gain.min(), 100 * right.mean(), 100 * right[4], found['expected_calibration_error']
     return tuple(f'{value:.{digits}f}' for value, digits in zip(values, (3, 2, 1, 1, 3), strict=True))
 
@@ -139,16 +162,19 @@ def main() -> None:
             positions.append((data, setting, *format_positions(recordings)))
         items = {person: found[:: arguments.every] for person, found in find_persons(SHARED / PICKS).items()}
         recordings = observe_persons(items, PICK, f'{PICKS}: defaults')
-        goals = format_goals(recordings)
+        goals = [
+            ('defaults', *format_goals(recordings)),
+            ('distance 0.25 s ahead', *format_goals(recordings, forecast_by_distance)),
+        ]
         without = {person: [*leave_goals_out({each.name: each for each in found}).values()] for person, found in items.items()}
         left_out = observe_persons(without, PICK, f'{PICKS}: without the goals that were reached')
         others = format_other(recordings, left_out, PICK.likelihood.other_goal)
     heads = 'gain [nat]', 'right [%]', 'ECE', 'worst tenth [nat]'
     measures = 'error [mm]', 'NLPD', 'NLPD, Singer', 'in 50 % region [%]', 'in 90 % region [%]'
-    asked = 'gain [nat]', 'worst point [nat]', 'right [%]', 'right half way [%]', 'ECE'
+    asked = 'rule', 'gain [nat]', 'worst point [nat]', 'right [%]', 'right half way [%]', 'ECE'
     tables = {
         'ways': (('data', 'parameters', *heads), ways),
-        'goals': (asked, [goals]),
+        'goals': (asked, goals),
         'other': (('area half way', 'calibration error', 'loss [nat]'), [others]),
         'positions': (('data', 'parameters', *measures), positions),
     }
