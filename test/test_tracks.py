@@ -10,6 +10,7 @@ import pytest
 from reach_helpers import bowed, one_obstacle
 
 import foc_ros
+from foc_ros.core.candidates import solve_candidates
 from foc_ros.core.classes import search
 from foc_ros.core.config import Config, FocConfig, HomotopyConfig, replace_values
 from foc_ros.core.deadline import NEVER, Deadline
@@ -19,6 +20,7 @@ from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import predict
+from foc_ros.core.situation import prepare_situation
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Status
 from foc_ros.core.tracks import FULL_CHANGE_S, NO_TRACKS, REST_S, TURNS, Track, Tracks
 from foc_ros.core.types import NANOSECONDS, HandSample, HandState
@@ -281,6 +283,36 @@ def test_what_is_not_settled_goes_on_in_the_next_prediction():
     assert unfinished[0] > 0, 'the scene is no test'
     assert not unfinished[-1]
     assert find_shares(prediction).keys() == find_shares(predicted(tick, NO_TRACKS)[0]).keys()
+
+
+@pytest.mark.parametrize(
+    ('position', 'velocity', 'acceleration', 'duration_s'),
+    [
+        pytest.param((0.094, 0.054), (0.13, 0.38), (0.0, -0.2), 1.38, id='beside the obstacle'),
+        pytest.param((0.064, 0.026), (0.18, 0.38), (-1.3, 0.0), 1.52, id='away from it'),
+        pytest.param((0.113, -0.013), (0.21, 0.13), (-1.0, 0.5), 1.1, id='close before it'),
+    ],
+)
+def test_a_class_waits_for_the_next_prediction_only_if_it_is_unlikely(position, velocity, acceleration, duration_s):
+    """A hand that is suddenly faster makes bad starts of the solutions of before: their QPs promise too little."""
+    obstacles, goals = make_obstacles([[0.15, 0.0], [0.25, -0.07], [0.25, 0.07]], 0.02, 0.001), np.array([[0.4, 0.0]])
+
+    def prepare(time_s, *state):
+        config = replace_values(Config(), {'duration.model': 'fixed', 'duration.fixed_s': time_s})
+        hand = HandState(1_000_000_000, np.ravel(state), np.zeros((6, 6)), onset_ns=900_000_000, onset_position=np.zeros(2))
+        return prepare_situation(config, hand, obstacles, goals, (), None, NO_TRACKS)
+
+    before, now = prepare(2.5, position, velocity, (0, 0)), prepare(duration_s, position, velocity, acceleration)
+    candidates = search(before.hand.mean, goals, obstacles, before.config.homotopy, [2.5], 30).candidates
+    problems = [[each.build_problem(0)] * len(candidates) for each in (before, now)]
+    earlier = [each.solution for each in solve_candidates(candidates, problems[0], before.config.foc)]
+    whole, brief = (
+        solve_candidates(candidates, problems[1], now.config.foc, earlier, Deadline(goes_on=goes_on)) for goes_on in (False, True)
+    )
+    waiting = [row for row, each in enumerate(brief) if each.status is Status.ESTIMATED]
+    assert waiting, 'the scene is no test'
+    behind = np.log([each.cost for each in whole]) - np.log(min(each.cost for each in whole))
+    assert (now.config.likelihood.beta * behind[waiting] > 4.0).all()
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])

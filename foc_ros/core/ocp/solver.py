@@ -48,6 +48,8 @@ UNLIKELY, SMALL_PART = 4.0, 0.04
 """A class can wait for the next prediction if it stays less likely than the best one to its goal by more than the first number,
 as a logarithm, with all that its QP promises. At a guess QPs promise too little: there it waits only if that is less than the
 second number as a part of what it is behind."""
+TRUSTED = 3.0
+"""Largest gain, as a logarithm of likelihood, up to which a class waits: from a bad start, QPs promise too little."""
 LARGEST_TOLERANCE = 5e-3
 """Gain of its last whole step up to which a class without the wanted eta counts as settled."""
 MOST_TRIALS, SHORTER = 5, 0.35
@@ -148,7 +150,7 @@ class Solver:
         Where the wanted eta is a condition, every class is solved to its end: whether it meets eta decides, not what it costs.
         """
         behind = self.objective.compare(now.at.loss)
-        enough = np.where(now.is_exact, SMALL_PART * behind, behind - UNLIKELY)
+        enough = np.minimum(np.where(now.is_exact, SMALL_PART * behind, behind - UNLIKELY), TRUSTED)
         is_enough = (behind > UNLIKELY) & (self.objective.beta * now.gain < enough) & (now.at.loss < now.bound)
         now.is_waiting |= ~now.is_done & is_enough & ~self._is_condition
         now.is_done |= now.is_waiting
