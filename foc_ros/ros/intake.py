@@ -179,7 +179,7 @@ class Intake:
         return status
 
     def _find_conditions(self, table: ObjectTable) -> tuple[int, float]:
-        """Return what changes the obstacles of a table without a message: how many have expired, and the deviation of radii [m]."""
+        """Return what changes the obstacles of a table without a message: the number of expired ones, the deviation [m]."""
         return table.count_expired(self._now_ns()), self.pipeline.config.scene.marker_radius_stddev
 
     def _set_obstacles(self, role: str, decoded: DecodedCloud) -> SampleStatus:
