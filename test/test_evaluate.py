@@ -262,6 +262,15 @@ def test_the_share_of_another_goal_is_judged_with_the_goal_left_out(picks):
     assert 0.0 <= found['calibration_error'] < 1.0 and answer['verdict'][-1].startswith('Another goal: ')
 
 
+def test_the_goal_that_is_left_out_was_reached_in_the_task_plane(tmp_path):
+    t, positions = reach(0.05, (0.3, 0.1))
+    rows = ''.join(f'a,{when:.4f},{x:.6f},0.0,{z:.6f}\n' for when, (x, z) in zip(t, positions, strict=True))
+    (tmp_path / 'recordings.csv').write_text('recording,t_s,x_m,y_m,z_m\n' + rows)
+    (tmp_path / 'goals.csv').write_text('x_m,y_m,z_m\n0.3,0.0,-0.1\n0.3,0.0,0.1\n')
+    (left,) = leave_goals_out(find_recordings(tmp_path), 'xz').values()
+    assert left.scene.goals.tolist() == [[0.3, 0.0, -0.1]]
+
+
 THUMB_STICK = Path(__file__).parents[1] / 'doc' / 'examples' / 'thumb_stick.yaml'
 
 

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observations hold what the predictor publishes and what really came, against values computed by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from bag_helpers import TYPES
@@ -49,6 +51,15 @@ def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_
         tried = dict(zip(plain.candidates.labels, power_rule_shares(plain, AHEAD.likelihood), strict=True))
         published = dict(zip(ahead.candidates.labels, ahead.candidates.likelihood, strict=True))
         assert tried == pytest.approx(published)
+
+
+def test_of_a_recording_that_begins_anew_the_last_run_is_observed(data):
+    once = find_recordings(data)['one']
+    twice = SimpleNamespace(name='twice', goal=None, items=lambda: [*once.items()] * 2)
+    given, found = (observe(each, PLAIN) for each in (once, twice))
+    np.testing.assert_array_equal(found.path.stamps_ns, given.path.stamps_ns)
+    ours, expected = ([(each.stamp_ns, each.truth.progress) for each in one.observations] for one in (found, given))
+    assert ours == expected
 
 
 @pytest.mark.parametrize('plant', ['triple_integrator', 'damped_mass'])

@@ -138,6 +138,12 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros):
     goals, _ = bench.wait_for('likelihoods_by_name', count + 1)[-1].status
     assert len(list_goal_topics(bench)) == MOST_GOAL_TOPICS
     assert len({each.key for each in goals.values} - {'unknown', 'other'}) == MOST_GOAL_TOPICS + 2
+    bench.deliver('goals', pose_array(TYPES, []))
+    bench.health()
+    assert not list_goal_topics(bench), 'no prediction says that the last goals are gone'
+    bench.deliver('goals', pose_array(TYPES, GOALS))
+    bench.move([next(poses) for _ in range(4)])
+    assert list_goal_topics(bench) == ['goal0']
     bench.change('deactivate', 'cleanup')
     assert not list_goal_topics(bench)
 

@@ -200,9 +200,19 @@ def messages_in_space():
     return found
 
 
+def messages_with_a_refused_pose():
+    """Return a reach whose goals arrive after some poses, and before one that is sent again."""
+    found = [each for each in messages(SECONDS) if each[0] != '/goals']
+    row = [topic for topic, *_ in found].index('/hand_pose') + 2
+    topic, stamp_ns, pose = found[row]
+    goals = pose_array(BAG_TYPES, GOALS)
+    return [*found[: row + 1], ('/goals', stamp_ns + 1, goals), (topic, stamp_ns + 2, pose), *found[row + 1 :]]
+
+
 REPLAY_CASES = {
     'lv': (LV, lambda: messages(SECONDS)),
     'heights': (CONFIG, messages_in_space),
+    'refused pose': (CONFIG, messages_with_a_refused_pose),
     '1 kHz': (CONFIG, lambda: messages(0.1, rate_hz=1000.0)),
     'learning': (replace_values(Config(), LEARNING), lambda: messages(1.0)),
 }

@@ -119,6 +119,14 @@ def test_markers_of_publishers_with_different_delays_are_all_used(intake):
     assert intake.pipeline.scene.sources['markers'].stamp_ns == NANOSECONDS
 
 
+def test_markers_that_are_held_have_the_deviation_of_the_present_parameters(intake):
+    move(intake, 1.0)
+    show(intake, marker(TYPES))
+    intake.pipeline.reconfigure(replace_values(intake.pipeline.config, {'scene.marker_radius_stddev': 0.01}))
+    move(intake, 1.1)
+    assert intake.pipeline.scene.obstacles(NANOSECONDS).radius_stddev.tolist() == [0.01]
+
+
 def test_a_table_that_never_held_a_marker_is_no_source(intake):
     """One that did, and holds none any more, is an empty scene."""
     move(intake, 1.0)

@@ -255,6 +255,22 @@ def test_the_transforms_of_a_recording_are_applied(tmp_path, capsys):
     assert 'transform_newest' not in capsys.readouterr().out
 
 
+def test_a_hand_that_waits_for_a_transform_meets_the_scene_that_waits_with_it(tmp_path):
+    """Obstacles and hand are seen by one camera, the hand first; each transform is logged after both."""
+
+    def see_hand(seconds):
+        return '/hand_pose', ns(seconds), encode_hand_pose(TYPES, ns(seconds), 'camera', np.zeros(3))
+
+    goals, places = encode_goals(TYPES, ns(0.0), FRAME, np.array([[0.3, 0.0, 0.0]])), {0.02: 0.15, 0.04: 0.16, 0.06: 0.17}
+    items = [('/goals', ns(0.0), goals), see_hand(0.0)]
+    for now, x in places.items():
+        seen = encode_obstacles(TYPES, ns(now), 'camera', [(-0.1, -x, 0.0, 0.03, 0.002, 7)])
+        items += [('/obstacles', ns(now), seen), see_hand(now + 0.001), camera_at(0.0, now + 0.002, 0.003)]
+    bag = write_bag(tmp_path / 'both', [camera_at(0.0, 0.0, -0.01), *items])
+    made = list(foc_ros.replay(bag, replace_values(CONFIG, {'frame_id': FRAME})))
+    np.testing.assert_allclose([each.obstacles.centre[0] for each in made], [[x, -0.1] for x in places.values()], atol=1e-9)
+
+
 def test_what_was_refused_is_named(tmp_path, capsys):
     count = sum(topic == '/obstacles' for topic, _, _ in messages(0.24))
     bag = write_bag(tmp_path / 'blind', seen_by_camera(messages(0.24)))

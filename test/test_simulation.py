@@ -114,6 +114,20 @@ def test_recorded_paths_are_intended_paths(tmp_path, capsys):
     assert cell['min_clearance_m'] == pytest.approx(0.03, abs=0.01)
 
 
+def test_a_movement_that_comes_back_arrives_at_its_end(tmp_path, capsys):
+    """Among no obstacles, which have no clearance."""
+    t, there = reach(0.05, (0.3, 0.0))
+    back = np.concatenate([t, t + t[-1] + t[1]]), np.concatenate([there, there[::-1]])
+    write_tables(tmp_path, {'a': back}, [(0.3, 0.0), (0.0, 0.0)])
+    options = ['--operators', 'human_paths', '--trials', '1', '--workers', '1', '--recordings', str(tmp_path)]
+    main(['simulate', *options, '--params', str(tmp_path / 'parameters.yaml'), '--json'])
+    captured = capsys.readouterr()
+    for cell in json.loads(captured.out)['cells']:
+        assert cell['completion_s'] > 2.0 and cell['path_m'] > 0.6
+        assert cell['min_clearance_m'] is None
+    assert 'invalid value' not in captured.err
+
+
 STUDY = Path(__file__).parents[1] / 'benchmarks' / 'assistance.py'
 
 

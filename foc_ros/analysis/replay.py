@@ -89,7 +89,7 @@ class Replay:
     def steps(self, items: Iterable[Item]) -> Iterator[Step]:
         """Process the messages in their order and yield the effect of each."""
         for item, sample in self.take(items):
-            prediction = self.pipeline.predict() if item.role == HAND and self.pipeline.is_due else None
+            prediction = self.pipeline.predict() if sample is not None and self.pipeline.is_due else None
             yield Step(item, sample, prediction, self.pipeline.scene)
 
     def forget_scene(self) -> None:

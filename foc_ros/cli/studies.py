@@ -111,7 +111,8 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
             return 3
         answer = report.evaluate(observed, study.params)
         if unannounced:
-            left_out, _ = observations.observe_all(scores.leave_goals_out(recordings), study.params, in_order)
+            without = scores.leave_goals_out(recordings, study.params.plane)
+            left_out, _ = observations.observe_all(without, study.params, in_order)
             answer['other_goal'] = scores.score_other_goal(observed, left_out, study.params.likelihood.other_goal)
             if answer['other_goal'] is None:
                 warn_all('evaluate', ['no recording has several goals of which one could be left out'])

@@ -19,6 +19,7 @@ from rclpy.time import Time
 
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import name_goal
+from foc_ros.core.types import Array
 from foc_ros.io.topics import CLOUD, COLLISION, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, OPTIONAL, TYPES
 
 from .health import THROTTLE_S
@@ -186,29 +187,24 @@ class GoalTopics:
     """
 
     def __init__(self, node: Node) -> None:
-        self._node, self._goals = node, 0
+        self._node = node
         self.publishers: list[Any] = []
 
     def publish(self, prediction: Prediction, types: MessageTypes) -> None:
         """Publish the likelihood of each goal of which something is known; there is no message for another."""
-        self._goals = min(len(prediction.goal_positions), MOST_GOAL_TOPICS)
-        for row in range(len(self.publishers), self._goals):
+        goals = min(len(prediction.goal_positions), MOST_GOAL_TOPICS)
+        for row in range(len(self.publishers), goals):
             self.publishers.append(create_publisher(self._node, f'goal_likelihood/{name_goal(row)}', GOAL_LIKELIHOOD_TYPE))
-        heard = [row for row in range(self._goals) if self.publishers[row].get_subscription_count()]
+        heard = [row for row in range(goals) if self.publishers[row].get_subscription_count()]
         messages = encode_goal_likelihoods(prediction, types) if heard else {}
         for row in heard:
             if row in messages:
                 publish(self._node, self.publishers[row], messages[row])
 
-    def remove_absent(self) -> None:
-        """Remove the topics of goals that the last prediction did not have."""
-        while len(self.publishers) > self._goals:
+    def remove_absent(self, goals: Array | None) -> None:
+        """Remove the topics of goals that are gone; goals (g, 2): those that there are now, None if none was received."""
+        while len(self.publishers) > (0 if goals is None else len(goals)):
             self._node.destroy_publisher(self.publishers.pop())
-
-    def destroy(self) -> None:
-        """Remove all topics."""
-        self._goals = 0
-        self.remove_absent()
 
 
 class TfListener:

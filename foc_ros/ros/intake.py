@@ -53,7 +53,7 @@ class Intake:
         self._still: HandSample | None = None  # the first of those that were used with the same position as the last one
         self.last_refusal: str | None = None
         self._tables = {topics.MARKERS: ObjectTable(), topics.COLLISION: ObjectTable()}
-        self._expired = dict.fromkeys(self._tables, 0)
+        self._shown = dict.fromkeys(self._tables, (0, 0.0))  # the conditions under which each table is in the scene
         self._counts: Counter[str] = Counter()
         self._handlers: dict[str, Callable[[Any, FrameLookup], SampleStatus]] = {
             topics.HAND: self._take_hand,
@@ -117,7 +117,7 @@ class Intake:
         self.pipeline.remove_source(source)
         for role in self._tables:
             if SOURCES[role] == source:
-                self._tables[role], self._expired[role] = ObjectTable(), 0
+                self._tables[role], self._shown[role] = ObjectTable(), (0, 0.0)
 
     def _take_hand(self, message: Any, look_up: FrameLookup) -> SampleStatus:
         if self.is_skipped(decode_stamp(message.header)):
@@ -131,7 +131,7 @@ class Intake:
             if not is_same or status.is_restart:
                 self._still = sample
             for role, table in self._tables.items():
-                if table.count_expired(sample.stamp_ns) != self._expired[role]:
+                if self._find_conditions(table) != self._shown[role]:
                     self._set_table(role, table)
         return status
 
@@ -175,8 +175,12 @@ class Intake:
             obstacles = table.obstacles(self._now_ns(), self.pipeline.config.scene.marker_radius_stddev)
             status = self.pipeline.set_obstacles(source, obstacles, table.stamp_ns or None, frame_id)
         if status.is_taken:
-            self._tables[role], self._expired[role] = table, table.count_expired(self._now_ns())
+            self._tables[role], self._shown[role] = table, self._find_conditions(table)
         return status
+
+    def _find_conditions(self, table: ObjectTable) -> tuple[int, float]:
+        """Return what changes the obstacles of a table without a message: the number of expired ones, the deviation [m]."""
+        return table.count_expired(self._now_ns()), self.pipeline.config.scene.marker_radius_stddev
 
     def _set_obstacles(self, role: str, decoded: DecodedCloud) -> SampleStatus:
         status = self.pipeline.set_obstacles(SOURCES[role], decoded.obstacles, decoded.stamp_ns or None, decoded.frame_id)

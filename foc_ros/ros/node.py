@@ -186,7 +186,7 @@ class FocNode(LifecycleNode):
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
-        self._goal_topics.destroy()
+        self._goal_topics.remove_absent(None)
         self._inputs.clear()
         self._outputs.clear()
 
@@ -322,7 +322,7 @@ class FocNode(LifecycleNode):
 
     def _publish_health(self) -> None:
         self._receive(HAND)  # a hand whose poses wait here is not silent
-        self._goal_topics.remove_absent()
+        self._goal_topics.remove_absent(self.pipeline.scene.goals)
         now_s = monotonic()
         busy_s = 0.0 if self._computation is None else now_s - self._computation.start_s
         unheard = endpoints.report_unconnected(self, self._inputs, self._outputs.values(), self._loggers)

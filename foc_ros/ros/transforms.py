@@ -56,8 +56,8 @@ class Transforms:
 
     @property
     def roles(self) -> list[str]:
-        """The inputs of which messages are held."""
-        return [role for role, queue in self._held.items() if queue]
+        """The inputs of which messages are held, the hand last: it is predicted from the scene that waits with it."""
+        return sorted((role for role, queue in self._held.items() if queue), key=lambda role: role == HAND)
 
     def add(self, role: str, message: Any, now_s: float) -> None:
         """Append a message of an input that arrives at a time [s]."""

@@ -143,6 +143,9 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
     made: list[tuple[Step, HandState, Config]] = []
     for step in replayed.steps(recording.items()):
         if step.sample is not None:
+            if samples and step.sample.stamp_ns <= samples[-1].stamp_ns:  # the recording begins anew
+                samples.clear()
+                made.clear()
             samples.append(step.sample)
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None

@@ -28,6 +28,7 @@ from foc_ros.analysis.recordings import Recording, TableRecording
 from foc_ros.analysis.scenes import NO_GOAL
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.types import Array
+from foc_ros.ros.messages.plane import project
 
 from .baselines import Baseline, Forecast
 from .observations import GAP, Observation, ObservedRecording, Question, Questions
@@ -181,15 +182,18 @@ def find_mean(values: Array) -> float | None:
     return float(values.mean()) if len(values) else None
 
 
-def leave_goals_out(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
-    """Return the recordings of tables that have several goals without the goal that was reached; the others are left away."""
+def leave_goals_out(recordings: Mapping[str, Recording], plane: str = 'xy') -> dict[str, Recording]:
+    """Return the recordings of tables that have several goals without the goal that was reached; the others are left away.
+
+    plane: the task plane, in which the goal reached is found where no table says it.
+    """
     found: dict[str, Recording] = {}
     for name, each in recordings.items():
         if not isinstance(each, TableRecording) or each.scene.goals is None or len(each.scene.goals) < 2:
             continue
         goal = each.goal
         if goal is None:
-            goal = find_reached_goal(each.positions[:, :2], each.scene.goals[:, :2])[0]
+            goal = find_reached_goal(*(project(points, plane)[0] for points in (each.positions, each.scene.goals)))[0]
         if goal is not None:
             found[name] = replace(each, scene=replace(each.scene, goals=np.delete(each.scene.goals, goal, axis=0), goal=NO_GOAL))
     return found

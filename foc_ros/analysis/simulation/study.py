@@ -126,11 +126,14 @@ class Trial(Record):
 def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: Array) -> Trial:
     """Run a trial. noise (n, 2, 2): standard normal numbers for arm and measurement, the same ones for each rule of a pair."""
     arm, rule, rows = SimulatedArm(task.arm, task.path), assistance(task, config), []
+    was_away = False  # a movement that comes back to where it begins has not arrived there at its start
     for step, (shaken, measured) in enumerate(noise):
         force = rule.update(step, arm.position + 3e-4 * measured)  # the standard deviation of a tracker [m]
         arm.move(force, shaken)
         rows.append((*arm.position, *force, *arm.force, float(rule.is_wrong)))
-        if np.hypot(*(arm.position - task.goal)) < 0.01 and np.hypot(*arm.velocity) < 0.05:  # [m], [m/s]
+        is_away = np.hypot(*(arm.position - task.goal)) >= 0.01  # [m]
+        was_away = was_away or is_away
+        if was_away and not is_away and np.hypot(*arm.velocity) < 0.05:  # [m/s]
             break
     table = np.array(rows)
     return Trial(table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6])
@@ -150,7 +153,7 @@ def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
     return {
         'collision_rate': float(clearance < 0.0),
         'completion_s': duration_s,
-        'min_clearance_m': clearance,
+        'min_clearance_m': clearance if len(task.obstacles) else np.nan,
         'path_m': float(np.hypot(*np.diff(trial.position, axis=0).T).sum()),
         'effort': DT * float((trial.effort**2).sum()),
         'opposing_impulse': opposing,
