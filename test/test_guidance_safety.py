@@ -85,54 +85,23 @@ DEAD_MAN = {
 
 @pytest.mark.parametrize('case', DEAD_MAN)
 @pytest.mark.parametrize('settings', [GuidanceConfig(), GuidanceConfig(f_max=20.0), GuidanceConfig(ramp_s=0.5)])
-def test_every_dead_man_condition_releases_the_hand_within_the_ramp(case, settings):
-    config = Config(guidance=settings)
+def test_every_dead_man_condition_releases_the_hand_within_the_ramp_and_a_blended_command_does_not_jump(case, settings):
+    config, command = Config(guidance=settings), np.array([0.1, 0.0])
     state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0)))
     changes, status = DEAD_MAN[case]
     begin, sizes = given.t, [float(np.hypot(*state.force))]
+    blended = [guide(config, state, given)[0].blend_command(command)]
+    assert np.hypot(*(blended[0] - command)) > 0.01, 'guidance has no share'
     while given.t < begin + settings.ramp_s - 1e-9:
         given = replace(given, t=given.t + PERIOD, **changes)
         output, state = guide(config, state, given)
         sizes.append(float(np.hypot(*output.force)))
+        blended.append(output.blend_command(command))
     assert output.status is status
     assert output.force.tolist() == [0.0, 0.0]
     assert (np.diff(sizes) <= 0.0).all() and np.abs(np.diff(sizes)).max() <= settings.slew * PERIOD * (1 + 1e-9)
-    assert output.authority == 0.0
-
-
-def check_blended_commands(settings, state, given, before, changes):
-    """Update until the share of guidance has changed, check that the command does not jump, and return the last one."""
-    for _ in range(round(2.0 * settings.ramp_s / PERIOD) + 1):
-        given = replace(given, t=given.t + PERIOD, **changes)
-        output, state = guide(Config(guidance=settings), state, given)
-        blended = output.blend_command(COMMAND)
-        assert np.hypot(*(blended - before)) <= np.hypot(*COMMAND) * PERIOD / settings.ramp_s * (1 + 1e-9)
-        before = blended
-    return before
-
-
-COMMAND = np.array([0.1, 0.0])
-
-
-@pytest.mark.parametrize('case', DEAD_MAN)
-def test_a_blended_command_does_not_jump_when_the_hand_is_released(case):
-    settings = GuidanceConfig()
-    state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0)))
-    before = guide(Config(guidance=settings), state, given)[0].blend_command(COMMAND)
-    assert np.hypot(*(before - COMMAND)) > 0.01, 'guidance has no share'
-    after = check_blended_commands(settings, state, given, before, DEAD_MAN[case][0])
-    assert after.tolist() == COMMAND.tolist()
-
-
-def test_a_blended_command_does_not_jump_when_the_path_turns_round():
-    settings = GuidanceConfig()
-    state, given = build_guiding_state(Config(guidance=replace(settings, k_max=5000.0, tank=10.0, clearance=0.0)))
-    before = guide(Config(guidance=settings), state, given)[0].blend_command(COMMAND)
-    candidate = given.prediction.candidates[0]
-    mean = candidate.mean * np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
-    turned = replace(given.prediction, candidates=(replace(candidate, solution=replace(candidate.solution, mean=mean)),))
-    after = check_blended_commands(settings, state, given, before, {'prediction': turned})
-    assert before + after == pytest.approx(COMMAND, abs=1e-3) and np.hypot(*(after - before)) > 0.08
+    assert output.authority == 0.0 and blended[-1].tolist() == command.tolist()
+    assert np.hypot(*np.diff(blended, axis=0).T).max() <= 0.1 * PERIOD / settings.ramp_s * (1 + 1e-9)
 
 
 SAMPLES, PERIOD = 12, 0.005
