@@ -108,24 +108,6 @@ def test_the_shares_of_goals_change_no_faster():
     assert turn_to(1, -0.1, tracks)[0] == pytest.approx((1.0 - gain) * left + gain * right, abs=5e-3)
 
 
-def test_what_a_class_had_that_is_gone_is_unknown_until_the_others_have_won_it():
-    """A wall is found about the goal that the hand goes to: the other goal is not certain from one prediction to the next."""
-    goals, tracks = np.array([[0.3, 0.0], [0.25, 0.2]]), NO_TRACKS
-    corners = np.array([[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]])
-    sides = [np.array([corners[row - 1], corners[row]]) for row in range(4)]
-    walls = make_obstacles([[0.3, 0.0]] * 4, 0.005, ids=tuple('abcd'), polygons=sides)
-    before, part = None, STEP_NS / NANOSECONDS / FULL_CHANGE_S
-    for tick in range(25):
-        mean, stamp_ns = np.array([0.1 + 0.002 * tick, 0.0, 0.1, 0.0, 0.0, 0.0]), STEP_NS * tick
-        hand = HandState(stamp_ns, mean, np.zeros((6, 6)), onset_ns=-STEP_NS, onset_position=np.zeros(2))
-        prediction, tracks = predict(CONFIG, hand, walls if tick > 2 else make_obstacles(), goals, tracks)
-        shares = np.array([each.likelihood or 0.0 for each in prediction.goals])
-        assert shares.sum() + prediction.unknown + prediction.other == pytest.approx(1.0)
-        assert before is None or shares[1] - before[1] <= part * (1.0 + 1e-9)
-        before = shares
-    assert before[0] == 0.0 and prediction.unknown < 0.05
-
-
 def reaching(x, tracks):
     """Predict for a hand at (x, 0) that moves, among two obstacles of which it passes the first at x = 0.1."""
     obstacles, state = make_obstacles([[0.1, 0.04], [0.2, -0.01]], 0.02, 0.001), None
