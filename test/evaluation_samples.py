@@ -1,16 +1,18 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""ObservedRecording and recordings made by hand, for the tests of the evaluation."""
+"""Recordings made by hand, and those of a simulated operator, for the tests of the evaluation and of `fit`."""
 
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
-from foc_ros.analysis.evaluation.truth import HORIZONS_S, TIMES_S, GroundTruth, RecordedPath, find_open_gaps
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, TIMES_S, GroundTruth, RecordedHand, RecordedPath, find_open_gaps
+from foc_ros.analysis.fitting import fit, race
 from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.classes.sides import BranchTimes
-from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT
 
 H = len(TIMES_S)
@@ -110,3 +112,36 @@ def write_tables(folder: Path, reaches, goals, obstacles=None) -> Path:
         (folder / 'obstacles.csv').write_text('x_m,y_m,radius_m\n' + ''.join(f'{x},{y},{r}\n' for x, y, r in obstacles))
     (folder / 'parameters.yaml').write_text(PARAMETERS)
     return folder
+
+
+FIT_OBSTACLE = (0.15, 0.0, 0.03)
+FIT_GOALS = np.array([[0.3, -0.1], [0.3, 0.0], [0.3, 0.1]])
+
+
+def bowed_reach(goal: np.ndarray, bow: float, duration_s: float, hz: float, rng: np.random.Generator, noise: float) -> np.ndarray:
+    """Return a minimum-jerk reach from the origin, bowed to the left, with rests of 0.1 s: rows of time and noisy position."""
+    times, path = reach(bow, tuple(goal), duration_s, rest=0.1, rate=hz)
+    return np.column_stack([times, path + rng.normal(0.0, noise, path.shape)])
+
+
+def write_fit_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float = 50.0, noise: float = 5e-4) -> Path:
+    """Write recordings past one obstacle, left and right in turn; or to three goals in turn, without any."""
+    rng, reaches = np.random.default_rng(7), {}
+    for number in range(count):
+        goal = FIT_GOALS[1] if obstacle else FIT_GOALS[number % 3]
+        bow = (0.06 if number % 2 else -0.06) if obstacle else 0.01 * rng.standard_normal()
+        rows = bowed_reach(goal, bow, 1.2 + 0.1 * rng.standard_normal(), hz, rng, noise)
+        reaches[f'r{number}'] = rows[:, 0], rows[:, 1:]
+    used, obstacles = (FIT_GOALS[1:2], [FIT_OBSTACLE]) if obstacle else (FIT_GOALS, None)
+    return write_tables(folder, reaches, used, obstacles)
+
+
+def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> RecordedHand:
+    return RecordedHand(name, RecordedPath(np.round(times * 1e9).astype(np.int64), positions, goals), obstacles)
+
+
+def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a fit in this process predict seldom and try few settings."""
+    monkeypatch.setattr(fit, 'PREDICTIONS', 3)
+    for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
+        monkeypatch.setattr(race, name, few)

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from fit_recordings import use_few_predictions
+from evaluation_samples import use_few_predictions
 from report_samples import predictions, samples
 from session_helpers import SCENE, TASKS, Page, Silent, reach, wait_until
 
