@@ -149,21 +149,11 @@ def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does():
     assert_allclose(noise, exact, atol=0.02 * exact.max())
 
 
-@pytest.mark.parametrize(
-    ('A', 'B', 'dt'),
-    [
-        (np.eye(3), np.ones((3, 2)), 0.1),
-        (np.eye(4), np.ones((4, 1)), 0.1),
-        (np.eye(4), np.full((4, 2), np.nan), 0.1),
-        (np.eye(4), np.ones((4, 2)), 0.0),
-    ],
-)
-def test_what_is_no_plant_is_refused(A, B, dt):
-    with pytest.raises(InputError, match='plant'):
-        Plant(A, B, dt)
-
-
-def test_what_is_no_plant_model_is_refused():
+def test_what_is_no_plant_is_refused():
+    force = np.ones((4, 2))
+    for states, B, dt in ((3, force[:3], 0.1), (4, force[:, :1], 0.1), (4, np.nan * force, 0.1), (4, force, 0.0)):
+        with pytest.raises(InputError, match='plant'):
+            Plant(np.eye(states), B, dt)
     foc_ros.register_plant('wrong', lambda settings: discretise_triple_integrator(0.02))
     with pytest.raises(InputError, match='plant wrong: expected a factory that returns a PlantModel'):
         build_problem(Config().with_values({'foc.plant': 'wrong'}), MOVING, make_obstacles(), GOAL[0], 1.0)
