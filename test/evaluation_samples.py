@@ -42,37 +42,27 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None) -> Candi
 
 
 def observation(
-    candidates: CandidateTable,
-    centre=((1.0, 0.0),),
-    row=(0,),
-    true_sides=(LEFT,),
-    is_ahead=None,
-    goals=((2.0, 0.0),),
-    goal=0,
-    hand=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
-    movement_age_s=1.0,
-    progress=0.0,
-    approach=0.0,
-    positions=None,
+    candidates: CandidateTable, centre=((1.0, 0.0),), row=(0,), true_sides=(LEFT,), goals=((2.0, 0.0),), goal=0, **changes
 ) -> Observation:
-    centre = np.array(centre, dtype=float).reshape(-1, 2)
+    """Return an observation of a hand at the origin; changes: hand, and positions, progress and approach of the truth."""
+    centre, row = np.array(centre, dtype=float).reshape(-1, 2), np.array(row, dtype=int)
     truth = GroundTruth(
         sides=np.array(true_sides, dtype=np.int8),
-        is_ahead=np.ones(len(centre), dtype=bool) if is_ahead is None else np.array(is_ahead),
+        is_ahead=np.ones(len(centre), dtype=bool),
         goal=goal,
-        positions=np.zeros((H, 2)) if positions is None else np.array(positions, dtype=float),
-        progress=progress,
-        approach=approach,
+        positions=np.array(changes.pop('positions', np.zeros((H, 2))), dtype=float),
+        progress=changes.pop('progress', 0.0),
+        approach=changes.pop('approach', 0.0),
         left_s=0.5,
     )
     return Observation(
         stamp_ns=0,
-        hand=np.array(hand, dtype=float),
-        movement_age_s=movement_age_s,
+        hand=np.array(changes.pop('hand', (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)), dtype=float),
+        movement_age_s=1.0,
         ids=tuple(str(i) for i in range(len(centre))),
         centre=centre,
-        row=np.array(row, dtype=int),
-        gaps=find_open_gaps(make_obstacles(centre, 0.01), np.array(row, dtype=int), np.array([1.0, 0.0]), 0.0),
+        row=row,
+        gaps=find_open_gaps(make_obstacles(centre, 0.01), row, np.array([1.0, 0.0]), 0.0),
         direction=np.array([1.0, 0.0]),
         goals=np.array(goals, dtype=float),
         candidates=candidates,

@@ -60,16 +60,13 @@ def test_a_strategy_is_solved_by_its_name():
     assert solution.qp_solves >= 1
 
 
-def test_a_name_that_is_not_registered_is_refused():
-    with pytest.raises(InputError, match='lv, hc, optimal, algorithm1, fixed, margin'):
-        solved(one_obstacle(), BOWED, 'nothing')
-
-
 @pytest.mark.parametrize('given', [None, [], [None]])
-def test_a_strategy_without_results_is_named(given):
+def test_a_strategy_without_results_is_named_and_one_that_is_not_registered_is_refused(given):
     STRATEGIES.register('forgetful', lambda problems, starts, settings, deadline: given)
     with pytest.raises(InputError, match='strategy forgetful: expected a list of StrategyResult'):
         solved(one_obstacle(), BOWED, 'forgetful')
+    with pytest.raises(InputError, match='lv, hc, optimal, algorithm1, fixed, margin'):
+        solved(one_obstacle(), BOWED, 'nothing')
 
 
 def test_a_likelihood_rule_weighs_the_classes():

@@ -213,7 +213,6 @@ CONFIG = Config().with_values(
 BETA = CONFIG.likelihood.beta
 EXPECTED = 1.0 / (1.0 + ((0.25**2 + 0.15**2) / (0.2**2 + 0.1**2)) ** BETA)
 """Probability of the far goal by the distances from `HOME`."""
-HABIT_BOX = np.array([[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]])
 
 
 class Session:
@@ -225,7 +224,7 @@ class Session:
         self.move(HOME)
 
     def announce(self, goals, names=()):
-        boxes = {'ids': names, 'polygons': [HABIT_BOX] * len(names)}
+        boxes = {'ids': names, 'polygons': [BOX] * len(names)}
         obstacles = make_obstacles(np.array(goals), 1e-3, **boxes) if names else make_obstacles()
         self.pipeline.set_obstacles('cloud', obstacles, None, 'world')
         self.pipeline.set_goals(np.array(goals), 'world')
