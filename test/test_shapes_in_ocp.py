@@ -55,7 +55,8 @@ def count_clear(problem, solution, shape):
     Position, velocity and acceleration are stepped on with a jerk whose noise is normal, with the deviation c |U|.
     """
     generator, dt, least = np.random.default_rng(7), problem.horizon.dt, SAMPLES
-    x, v, a = (np.tile(problem.initial_mean[i : i + 2], (SAMPLES, 1)) for i in (0, 2, 4))
+    begun = generator.multivariate_normal(problem.initial_mean, problem.initial_covariance, SAMPLES)
+    x, v, a = begun[:, :2], begun[:, 2:4], begun[:, 4:]
     radius = np.abs(generator.normal(shape.radius, shape.radius_stddev, SAMPLES))
     centre = np.asarray(shape.centre) + shape.centre_stddev * generator.standard_normal((SAMPLES, 2))
     for step, wanted in enumerate(solution.control, start=1):
@@ -66,9 +67,12 @@ def count_clear(problem, solution, shape):
     return least
 
 
+@pytest.mark.parametrize('is_certain', [True, False], ids=['certain start', 'uncertain start'])
 @pytest.mark.parametrize(('name', 'strategy'), [*zip(SHAPES, itertools.cycle(['optimal', 'lv']), strict=False)])
-def test_noisy_movements_stay_clear_of_the_true_shape_as_often_as_promised(name, strategy):
-    problem = make_reach(SHAPES[name])
+def test_noisy_movements_stay_clear_of_the_true_shape_as_often_as_promised(name, strategy, is_certain):
+    start = np.diag(np.repeat([0.002, 0.005, 0.02], 2) ** 2)
+    options = {} if is_certain else {'initial_covariance': start, 'eta': 0.8}
+    problem = make_reach(SHAPES[name], **options)
     solution = solved(problem, GUESS, strategy)
     assert solution.status is Status.SOLVED, solution.message
     assert solution.eta >= problem.eta - 1e-6
