@@ -1,16 +1,18 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""ObservedRecording and recordings made by hand, for the tests of the evaluation."""
+"""Recordings made by hand, and those of a simulated operator, for the tests of the evaluation and of `fit`."""
 
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from foc_ros.analysis.evaluation.observations import CandidateTable, Observation, ObservedRecording
-from foc_ros.analysis.evaluation.truth import HORIZONS_S, TIMES_S, GroundTruth, RecordedPath, find_open_gaps
+from foc_ros.analysis.evaluation.truth import HORIZONS_S, TIMES_S, GroundTruth, RecordedHand, RecordedPath, find_open_gaps
+from foc_ros.analysis.fitting import fit, race
 from foc_ros.core.classes.rows import Decisions
 from foc_ros.core.classes.sides import BranchTimes
-from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT
 
 H = len(TIMES_S)
@@ -40,37 +42,27 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None) -> Candi
 
 
 def observation(
-    candidates: CandidateTable,
-    centre=((1.0, 0.0),),
-    row=(0,),
-    true_sides=(LEFT,),
-    is_ahead=None,
-    goals=((2.0, 0.0),),
-    goal=0,
-    hand=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
-    movement_age_s=1.0,
-    progress=0.0,
-    approach=0.0,
-    positions=None,
+    candidates: CandidateTable, centre=((1.0, 0.0),), row=(0,), true_sides=(LEFT,), goals=((2.0, 0.0),), goal=0, **changes
 ) -> Observation:
-    centre = np.array(centre, dtype=float).reshape(-1, 2)
+    """Return an observation of a hand at the origin; changes: hand, and positions, progress and approach of the truth."""
+    centre, row = np.array(centre, dtype=float).reshape(-1, 2), np.array(row, dtype=int)
     truth = GroundTruth(
         sides=np.array(true_sides, dtype=np.int8),
-        is_ahead=np.ones(len(centre), dtype=bool) if is_ahead is None else np.array(is_ahead),
+        is_ahead=np.ones(len(centre), dtype=bool),
         goal=goal,
-        positions=np.zeros((H, 2)) if positions is None else np.array(positions, dtype=float),
-        progress=progress,
-        approach=approach,
+        positions=np.array(changes.pop('positions', np.zeros((H, 2))), dtype=float),
+        progress=changes.pop('progress', 0.0),
+        approach=changes.pop('approach', 0.0),
         left_s=0.5,
     )
     return Observation(
         stamp_ns=0,
-        hand=np.array(hand, dtype=float),
-        movement_age_s=movement_age_s,
+        hand=np.array(changes.pop('hand', (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)), dtype=float),
+        movement_age_s=1.0,
         ids=tuple(str(i) for i in range(len(centre))),
         centre=centre,
-        row=np.array(row, dtype=int),
-        gaps=find_open_gaps(make_obstacles(centre, 0.01), np.array(row, dtype=int), np.array([1.0, 0.0]), 0.0),
+        row=row,
+        gaps=find_open_gaps(make_obstacles(centre, 0.01), row, np.array([1.0, 0.0]), 0.0),
         direction=np.array([1.0, 0.0]),
         goals=np.array(goals, dtype=float),
         candidates=candidates,
@@ -110,3 +102,36 @@ def write_tables(folder: Path, reaches, goals, obstacles=None) -> Path:
         (folder / 'obstacles.csv').write_text('x_m,y_m,radius_m\n' + ''.join(f'{x},{y},{r}\n' for x, y, r in obstacles))
     (folder / 'parameters.yaml').write_text(PARAMETERS)
     return folder
+
+
+FIT_OBSTACLE = (0.15, 0.0, 0.03)
+FIT_GOALS = np.array([[0.3, -0.1], [0.3, 0.0], [0.3, 0.1]])
+
+
+def bowed_reach(goal: np.ndarray, bow: float, duration_s: float, hz: float, rng: np.random.Generator, noise: float) -> np.ndarray:
+    """Return a minimum-jerk reach from the origin, bowed to the left, with rests of 0.1 s: rows of time and noisy position."""
+    times, path = reach(bow, tuple(goal), duration_s, rest=0.1, rate=hz)
+    return np.column_stack([times, path + rng.normal(0.0, noise, path.shape)])
+
+
+def write_fit_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float = 50.0, noise: float = 5e-4) -> Path:
+    """Write recordings past one obstacle, left and right in turn; or to three goals in turn, without any."""
+    rng, reaches = np.random.default_rng(7), {}
+    for number in range(count):
+        goal = FIT_GOALS[1] if obstacle else FIT_GOALS[number % 3]
+        bow = (0.06 if number % 2 else -0.06) if obstacle else 0.01 * rng.standard_normal()
+        rows = bowed_reach(goal, bow, 1.2 + 0.1 * rng.standard_normal(), hz, rng, noise)
+        reaches[f'r{number}'] = rows[:, 0], rows[:, 1:]
+    used, obstacles = (FIT_GOALS[1:2], [FIT_OBSTACLE]) if obstacle else (FIT_GOALS, None)
+    return write_tables(folder, reaches, used, obstacles)
+
+
+def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles: Obstacles, goals: np.ndarray) -> RecordedHand:
+    return RecordedHand(name, RecordedPath(np.round(times * 1e9).astype(np.int64), positions, goals), obstacles)
+
+
+def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a fit in this process predict seldom and try few settings."""
+    monkeypatch.setattr(fit, 'PREDICTIONS', 3)
+    for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
+        monkeypatch.setattr(race, name, few)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Predictions made by hand, for tests of what is done with them."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,22 +24,9 @@ def outcome(
     mean[:, 2], mean[:, 3] = 1.5, bend * np.cos(np.linspace(0, np.pi, STEPS + 1))
     covariance = np.zeros((STEPS + 1, 6, 6))
     covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1], covariance[:, 1, 0] = 4e-6, 9e-6, 1e-6, 1e-6
-    values = {
-        'status': Status.SOLVED,
-        'message': 'as wanted',
-        'dt': DT,
-        'mean': mean,
-        'covariance': covariance,
-        'control': np.ones((STEPS, 2)),
-        'effort': 20.0,
-        'costs': {'effort': 20.0},
-        'tau': 0.0,
-        'lam': 1.0,
-        'eta': 0.93,
-        'qp_solves': 5,
-        'solve_s': 0.002,
-    }
-    solution = Solution(**(values | changes))
+    numbers = {'control': np.ones((STEPS, 2)), 'effort': 20.0, 'costs': {'effort': 20.0}, 'tau': 0.0, 'lam': 1.0, 'eta': 0.93}
+    arrays, cost_of_it = {'mean': mean, 'covariance': covariance}, {'qp_solves': 5, 'solve_s': 0.002}
+    solution = replace(Solution(Status.SOLVED, 'as wanted', DT, **arrays, **numbers, **cost_of_it), **changes)
     side = 1 if bend > 0 else -1
     candidate = Candidate(label, 0, (('1', side),), mean[:, :2].copy(), 0.31)
     return PredictedCandidate(

@@ -71,20 +71,12 @@ def test_a_predictor_follows_a_movement_and_forgets_it():
     assert predictor.update(0.0, (0.0, 0.0)).t == 0.0
 
 
+NO_TIMES = [1.0, 0.5, -9.0, float('nan'), '2']
+NO_POSITIONS = [(0.0, float('nan')), (0.0, 0.0, 0.0), 'here', ('0', '0.1'), (0.0, 0.1j)]
+
+
 @pytest.mark.parametrize(
-    ('t', 'position', 'field'),
-    [
-        (1.0, (0.0, 0.0), 't'),
-        (0.5, (0.0, 0.0), 't'),
-        (-9.0, (0.0, 0.0), 't'),
-        (float('nan'), (0.0, 0.0), 't'),
-        ('2', (0.0, 0.0), 't'),
-        (2.0, (0.0, float('nan')), 'position'),
-        (2.0, (0.0, 0.0, 0.0), 'position'),
-        (2.0, 'here', 'position'),
-        (2.0, ('0', '0.1'), 'position'),
-        (2.0, (0.0, 0.1j), 'position'),
-    ],
+    ('t', 'position', 'field'), [*((t, (0.0, 0.0), 't') for t in NO_TIMES), *((2.0, each, 'position') for each in NO_POSITIONS)]
 )
 def test_a_sample_that_cannot_be_used_is_refused_and_changes_nothing(t, position, field):
     predictor = predictor_of_one_cup()
@@ -130,12 +122,7 @@ def test_the_solution_of_solve_is_the_most_likely_of_all_classes():
 
 
 def test_monte_carlo_confirms_eta():
-    solution = foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST)
-    assert foc_ros.monte_carlo(solution, 2000, seed=1).step[2] >= 0.9
-    with pytest.raises(foc_ros.InputError, match='samples'):
-        foc_ros.monte_carlo(solution, 0)
-    with pytest.raises(foc_ros.InputError, match='solution'):
-        foc_ros.monte_carlo(predictor_of_one_cup().update(0.0, (0.0, 0.0)).candidates[0].solution)
+    assert foc_ros.monte_carlo(foc_ros.solve((0, 0), (0.3, 0), [CUP], config=FAST), 2000, seed=1).step[2] >= 0.9
 
 
 def test_predictions_and_solutions_are_drawn():
@@ -285,6 +272,8 @@ NO_SCENES = [
         *((lambda changed=changed: solve_with(**changed), f'^{field}: expected .*, got') for changed, field in NO_SCENES),
         (lambda: solve_with(guess=np.linspace((0.3, 0), (0, 0), 31)), r'31 points, the first within 0\.03 m of the start'),
         (lambda: solve_with(guess=np.linspace((0, 0), (0, 0.3), 31)), r'31 points, the last within 0\.03 m of the goal'),
+        (lambda: foc_ros.monte_carlo(solve_with(), 0), 'samples'),
+        (lambda: foc_ros.monte_carlo(predictor_of_one_cup().update(0.0, (0.0, 0.0)).candidates[0].solution), 'solution'),
         (lambda: foc_ros.monte_carlo(solve_with(), seed=-1), r'seed: expected a number in \[0, 4\.29497e\+09\], got -1'),
         (lambda: foc_ros.monte_carlo(solve_with(), seed=0.5), 'seed: expected a whole number, got 0.5'),
         (lambda: foc_ros.Predictor(library=5), 'library: expected a file, or demonstrations, got 5'),

@@ -116,13 +116,13 @@ def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path, 
         list(BagRecording('killed', path).items())
 
 
-@pytest.mark.parametrize(('share', 'single'), [(0.02, True), (0.6, False)])
-def test_a_file_without_a_whole_chunk_is_refused(tmp_path, share, single):
+@pytest.mark.parametrize(('share', 'as_folder'), [(0.02, False), (0.6, True)])
+def test_a_file_without_a_whole_chunk_is_refused(tmp_path, share, as_folder):
     bag = write_bag(tmp_path / 'cut')
     whole = mcap(bag).read_bytes()
     mcap(bag).write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(RecordingError, match='damaged or cut short: no whole chunk'):
-        read(mcap(bag) if single else bag)
+        read(bag if as_folder else mcap(bag))
 
 
 @pytest.fixture(scope='module')

@@ -27,6 +27,12 @@ def convert(folder, recordings=RECORDINGS, obstacles=OBSTACLES, goals=GOALS):
     return main(arguments)
 
 
+def read(folder, name):
+    """Return the newest message of each input in a bag that was made."""
+    with BagReader(folder / 'bags' / name) as reader:
+        return {item.role: item.message for item in reader}
+
+
 def rows(message):
     return np.column_stack([*read_columns(message).values()])
 
@@ -53,8 +59,7 @@ def test_every_number_arrives(tmp_path, capsys):
 def test_optional_columns(tmp_path):
     obstacles = 'id,x_m,y_m,radius_m,radius_stddev_m,z_m\n7,0.5,-0.1,0.03,0.002,0.1\n-2,0,0,0,0,0\n'
     assert convert(tmp_path, 'recording,t_s,x_m,y_m,z_m\n1,0,0.1,0.2,0.3\n', obstacles, 'x_m,y_m,z_m\n0.1,0.2,0.4\n') == 0
-    with BagReader(tmp_path / 'bags' / '1') as reader:
-        items = {item.role: item.message for item in reader}
+    items = read(tmp_path, '1')
     assert (items['hand_pose'].pose.position.z, items['goals'].poses[0].position.z) == (0.3, 0.4)
     assert np.allclose(rows(items['obstacles']), [(0.5, -0.1, 0.1, 0.03, 0.002, 7), (0.0, 0.0, 0.0, 0.0, 0.0, -2)])
 
@@ -62,8 +67,7 @@ def test_optional_columns(tmp_path):
 def test_boxes_and_circles_share_a_table(tmp_path):
     obstacles = 'x_m,y_m,radius_m,size_x_m,size_y_m,yaw_rad\n0.5,-0.1,0,0.2,0.1,0.3\n0.6,0.1,0.02,0,0,0\n'
     assert convert(tmp_path, obstacles=obstacles) == 0
-    with BagReader(tmp_path / 'bags' / 'a') as reader:
-        message = next(item.message for item in reader if item.role == 'obstacles')
+    message = read(tmp_path, 'a')['obstacles']
     assert np.allclose(rows(message), [(0.5, -0.1, 0, 0, 0, 0, 0.2, 0.1, 0.3), (0.6, 0.1, 0, 0.02, 0, 1, 0, 0, 0)])
     assert decode_point_cloud(message, 'xy').obstacles.corners.tolist() == [4, 1]
 
@@ -73,8 +77,7 @@ def test_each_recording_has_its_own_scene(tmp_path, capsys):
     assert convert(tmp_path, obstacles=obstacles, goals='recording,x_m,y_m\nb,1,0\na,2,0\na,3,0\n') == 0
     assert '2 bags with 4 hand poses and 1 to 2 obstacles written' in capsys.readouterr().out
     for name, expected, goals in (('a', [(0.03, 0), (0.02, 1)], [2, 3]), ('b', [(0.01, 0)], [1])):
-        with BagReader(tmp_path / 'bags' / name) as reader:
-            items = {item.role: item.message for item in reader}
+        items = read(tmp_path, name)
         assert np.allclose(rows(items['obstacles'])[:, [3, 5]], expected)
         assert [pose.position.x for pose in items['goals'].poses] == goals
 

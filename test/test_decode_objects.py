@@ -10,8 +10,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bag_helpers import CONFIG, messages, ns, write_by_rosbags
-from message_helpers import SECOND, both_kinds, message_types, pose, pose_array, pose_stamped
-from object_messages import OBJECT_TYPES, STORE, collision_object, detection, detections
+from message_helpers import (
+    BAGS,
+    SECOND,
+    STORE,
+    both_kinds,
+    collision_object,
+    detection,
+    detections,
+    pose,
+    pose_array,
+    pose_stamped,
+)
 from rosbags.rosbag2 import StoragePlugin
 
 from foc_ros.analysis.replay import replay
@@ -69,7 +79,7 @@ def test_objects_are_added_appended_moved_and_removed():
 
 
 def test_what_is_no_shape_is_counted():
-    mesh = OBJECT_TYPES.make('shape_msgs/msg/Mesh')
+    mesh = BAGS.make('shape_msgs/msg/Mesh')
     table = after(collision_object((CONE, (0.1, 0.1), (0, 0, 0)), (SPHERE, (0.1,), (0, 0, 0)), meshes=[mesh]))
     assert dict(table.dropped) == {'not_a_shape': 2} and table.obstacles(0, 0.0).ids == ('table/0',)
 
@@ -172,9 +182,6 @@ def test_the_node_receives_them_or_names_the_package_that_is_missing_for_a_publi
         node.create_publisher(String, role, 1)
         node._publish_health()
         assert said == [f'{role} is published, but cannot be received: the package {package} is not installed']
-
-
-BAGS = message_types('rosbags')
 
 
 @both_kinds

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from message_helpers import SECOND, both_kinds, cloud, marker, marker_array, message_types, obstacle_table
+from message_helpers import BAGS, SECOND, both_kinds, cloud, marker, marker_array, obstacle_table
 from scipy.spatial.transform import Rotation
 
 from foc_ros.core.errors import MessageError
@@ -21,7 +21,6 @@ from foc_ros.ros.messages.decode_objects import ObjectTable
 from foc_ros.ros.messages.decode_point_cloud import MAX_ROWS, decode_point_cloud
 from foc_ros.ros.messages.plane import project
 
-BAGS = message_types('rosbags')
 FULL = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'radius_stddev', 'vx', 'vy', 'vz')] + [('id', '<u4')]
 BOX = [(name, '<f4') for name in ('x', 'y', 'z', 'radius', 'size_x', 'size_y', 'yaw')]
 
@@ -298,7 +297,10 @@ def test_a_marker_that_is_not_finite_does_not_replace_the_old_one(types, value, 
 
 
 def test_another_type_replaces_an_obstacle_and_is_counted():
-    scene = after(marker_array(BAGS, marker(BAGS, id=1), marker(BAGS, id=2)), marker_array(BAGS, marker(BAGS, id=1, type=0)))
+    scene = after(
+        marker_array(BAGS, marker(BAGS, id=1), marker(BAGS, id=2)),
+        marker_array(BAGS, marker(BAGS, id=1, type=0)),
+    )
     assert ids(scene) == ('a/2',)
     assert scene.dropped == {'not_a_shape': 1}
 

@@ -259,25 +259,21 @@ def write_reaches(folder, ends):
     write_tables(folder, {f'r{k}': (share, path) for k, path in enumerate(paths)}, [(0.3, 0.0)], [(0.15, 0.0, 0.015)])
 
 
-def test_learn_writes_a_library_of_recordings(tmp_path):
+def test_learn_writes_a_library_that_a_predictor_uses_in_its_frame_or_without_one(tmp_path):
     write_reaches(tmp_path, [0.3, 0.3])
-    assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 0
-    recordings = load_library(str(tmp_path / 'ways.json'))
+    file, shares = tmp_path / 'ways.json', []
+    assert main(['learn', str(tmp_path), '--output', str(file)]) == 0
+    recordings = load_library(str(file))
     assert len(recordings) == 2
     for each in recordings:
         assert 0.5 < STEP_S * len(each.states) < 1.5
         assert np.diff(each.states[:, 0]).min() > -1e-3
         assert each.states[-1, :2] == pytest.approx([0.3, 0.0], abs=0.02)
-
-
-def test_a_predictor_without_a_frame_uses_a_library(tmp_path):
-    write_reaches(tmp_path, [0.3, 0.3])
-    assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 0
-    file, shares = tmp_path / 'ways.json', []
+    obstacle = foc_ros.Circle((0.15, 0.0), 0.015, name='0')
     for frame, library in (('', ()), ('', file), ('world', file), ('arm', file)):
         predictor = foc_ros.Predictor(Config(budget_s=0.0, frame_id=frame), library=library)
         predictor.set_goals([(0.3, 0.0)])
-        predictor.set_obstacles([foc_ros.Circle((0.15, 0.0), 0.015, name='0')])
+        predictor.set_obstacles([obstacle])
         for share in np.linspace(0.0, 0.2, 11):
             prediction = predictor.update(share, (0.3 * share, 0.0))
         shares.append({each.label: each.likelihood for each in prediction}['goal0:+0'])

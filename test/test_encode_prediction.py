@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from message_helpers import both_kinds, message_types, read_columns
+from message_helpers import BAGS, both_kinds, read_columns
 from prediction_samples import DT, OBSTACLES, STEPS, outcome, prediction, three_ways
 from scipy.spatial.transform import Rotation
 
@@ -19,7 +19,6 @@ from foc_ros.core.solution import Candidate, Status
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, encode_goal_likelihoods, encode_outputs
 from foc_ros.ros.messages.plane import lift, project
 
-BAGS = message_types('rosbags')
 NAMES = ['x', 'y', 'z', 't', 'vx', 'vy', 'vz', 'xx', 'xy', 'xz', 'yy', 'yz', 'zz', 'candidate', 'likelihood']
 PAIRS = NAMES[7:13]
 NAMES += ['compromised', *(f'motor_{pair}' for pair in PAIRS), 'goal', 'way', 'status']

@@ -145,19 +145,15 @@ def test_the_goal_reached_is_the_last_one_that_the_path_came_near(path, expected
     assert find_reached_goal(np.array(path), TRUE_GOALS) == expected
 
 
-def test_progress_is_the_share_of_distance_and_noise_at_rest_adds_none():
+def test_progress_is_the_share_of_distance_and_positions_are_unknown_beyond_the_end():
+    """Noise at rest adds nothing to the progress."""
     rest = np.array([[0.0, 0.0], [0.001, 0.0], [-0.001, 0.0], [0.001, 0.001]])
     positions = np.vstack([rest, [[0.25, 0.0], [0.5, 0.0], [1.0, 0.0]], [[1.0, 0.1]]])
     path = RecordedPath(np.arange(8) * 100_000_000, positions, TRUE_GOALS)
     assert path.goal == 0 and path.end_ns == 600_000_000
     np.testing.assert_allclose(path.progress, [0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 1.0, 1.0])
-
-
-def test_true_positions_are_interpolated_and_unknown_beyond_the_end():
-    path = RecordedPath(np.array([0, 500_000_000, 1_000_000_000]), np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]), TRUE_GOALS)
-    np.testing.assert_allclose(
-        path.interpolate(250_000_000, np.array([0.25, 0.5, 1.0])), [[0.5, 0.0], [0.75, 0.0], [np.nan, np.nan]]
-    )
+    ahead = path.interpolate(350_000_000, np.array([0.1, 0.2, 0.4]))
+    np.testing.assert_allclose(ahead, [[0.375, 0.0], [0.75, 0.0], [np.nan, np.nan]])
 
 
 def test_a_hand_that_passes_a_row_and_comes_back_to_a_goal_before_it_has_a_truth():

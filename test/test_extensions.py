@@ -60,16 +60,13 @@ def test_a_strategy_is_solved_by_its_name():
     assert solution.qp_solves >= 1
 
 
-def test_a_name_that_is_not_registered_is_refused():
-    with pytest.raises(InputError, match='lv, hc, optimal, algorithm1, fixed, margin'):
-        solved(one_obstacle(), BOWED, 'nothing')
-
-
 @pytest.mark.parametrize('given', [None, [], [None]])
-def test_a_strategy_without_results_is_named(given):
+def test_a_strategy_without_results_is_named_and_one_that_is_not_registered_is_refused(given):
     STRATEGIES.register('forgetful', lambda problems, starts, settings, deadline: given)
     with pytest.raises(InputError, match='strategy forgetful: expected a list of StrategyResult'):
         solved(one_obstacle(), BOWED, 'forgetful')
+    with pytest.raises(InputError, match='lv, hc, optimal, algorithm1, fixed, margin'):
+        solved(one_obstacle(), BOWED, 'nothing')
 
 
 def test_a_likelihood_rule_weighs_the_classes():
@@ -149,21 +146,11 @@ def test_a_triple_integrator_from_outside_predicts_what_the_built_in_one_does():
     assert_allclose(noise, exact, atol=0.02 * exact.max())
 
 
-@pytest.mark.parametrize(
-    ('A', 'B', 'dt'),
-    [
-        (np.eye(3), np.ones((3, 2)), 0.1),
-        (np.eye(4), np.ones((4, 1)), 0.1),
-        (np.eye(4), np.full((4, 2), np.nan), 0.1),
-        (np.eye(4), np.ones((4, 2)), 0.0),
-    ],
-)
-def test_what_is_no_plant_is_refused(A, B, dt):
-    with pytest.raises(InputError, match='plant'):
-        Plant(A, B, dt)
-
-
-def test_what_is_no_plant_model_is_refused():
+def test_what_is_no_plant_is_refused():
+    force = np.ones((4, 2))
+    for states, B, dt in ((3, force[:3], 0.1), (4, force[:, :1], 0.1), (4, np.nan * force, 0.1), (4, force, 0.0)):
+        with pytest.raises(InputError, match='plant'):
+            Plant(np.eye(states), B, dt)
     foc_ros.register_plant('wrong', lambda settings: discretise_triple_integrator(0.02))
     with pytest.raises(InputError, match='plant wrong: expected a factory that returns a PlantModel'):
         build_problem(Config().with_values({'foc.plant': 'wrong'}), MOVING, make_obstacles(), GOAL[0], 1.0)

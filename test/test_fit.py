@@ -6,7 +6,7 @@ import json
 
 import pytest
 from bag_helpers import write_bag
-from fit_recordings import use_few_predictions, write_tables
+from evaluation_samples import use_few_predictions, write_fit_tables
 
 from foc_ros.analysis.fitting import fit as fitting
 from foc_ros.cli.main import main
@@ -33,7 +33,7 @@ def _fit(folder, capsys, *arguments, **parameters):
 
 @pytest.fixture(scope='module')
 def past_an_obstacle(tmp_path_factory):
-    return write_tables(tmp_path_factory.mktemp('fit') / 'data')
+    return write_fit_tables(tmp_path_factory.mktemp('fit') / 'data')
 
 
 def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle, capsys):
@@ -68,7 +68,7 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle, capsys)
 
 
 def test_without_obstacles_goals_are_distinguished_and_margins_are_kept(tmp_path, capsys):
-    answer, config = _fit(write_tables(tmp_path / 'data', obstacle=False), capsys, **{'homotopy.max_candidates': 3})
+    answer, config = _fit(write_fit_tables(tmp_path / 'data', obstacle=False), capsys, **{'homotopy.max_candidates': 3})
     assert not {'foc.eta', 'foc.noise_x', 'foc.noise_y'} & set(answer['parameters'])
     assert (config.foc.eta, config.foc.noise_x) == (Config().foc.eta, Config().foc.noise_x)
     why = [answer['undetermined'][name]['why'] for name in ('foc.eta', 'foc.noise_x', 'foc.noise_y')]
@@ -77,7 +77,7 @@ def test_without_obstacles_goals_are_distinguished_and_margins_are_kept(tmp_path
 
 
 def test_two_recordings_do_not_determine_the_likelihood(tmp_path, capsys):
-    answer, config = _fit(write_tables(tmp_path / 'data', count=2), capsys)
+    answer, config = _fit(write_fit_tables(tmp_path / 'data', count=2), capsys)
     kept = {f'likelihood.{name}' for name in ('beta', 'planning_horizon_s', 'lookahead_s', 'weaving')} | {'duration.arrival'}
     assert kept <= set(answer['undetermined'])
     given = flatten(Config())

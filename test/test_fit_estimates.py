@@ -8,9 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evaluation_samples import TWO_CLASSES, H, observation, recorded
-from evaluation_samples import reach as resting_reach
-from fit_recordings import GOALS, reach, recorded_hand, write_tables
+from evaluation_samples import (
+    FIT_GOALS,
+    TWO_CLASSES,
+    H,
+    bowed_reach,
+    observation,
+    reach,
+    recorded,
+    recorded_hand,
+    write_fit_tables,
+)
 
 from foc_ros.analysis.evaluation.observations import observe
 from foc_ros.analysis.evaluation.positions import compute_log_densities
@@ -78,7 +86,7 @@ def _drifting(stddev, density):
             driven = np.linalg.cholesky(compute_gramian(dt)) @ rng.standard_normal((3, 2))
             state = compute_transition(dt) @ state + density * driven
             path.append(state[0] + rng.normal(0.0, stddev, 2))
-        found.append(recorded_hand(f'{number}', times, np.array(path), make_obstacles(), GOALS))
+        found.append(recorded_hand(f'{number}', times, np.array(path), make_obstacles(), FIT_GOALS))
     return found
 
 
@@ -105,7 +113,7 @@ def _fit_reaches(durations, distances):
     rng, hands = np.random.default_rng(4), []
     for seconds, distance in zip(durations, distances, strict=True):
         goal = np.array([distance, 0.0])
-        rows = reach(goal, 0.0, seconds, 100.0, rng, 2e-4)
+        rows = bowed_reach(goal, 0.0, seconds, 100.0, rng, 2e-4)
         hands.append(recorded_hand(str(len(hands)), rows[:, 0], rows[:, 1:], make_obstacles(), goal[None]))
     return fit_duration(hands, PRECISE)
 
@@ -151,7 +159,7 @@ def test_the_time_in_which_accelerations_fade_is_found(fading_s):
 
 
 def test_half_of_the_wait_is_left_on_average_and_the_stay_at_the_goal_does_not_count():
-    hands = [recorded_hand('one', *resting_reach(0.0, (0.3, 0.0), rest=rest), make_obstacles(), GOAL) for rest in (0.6, 1.0)]
+    hands = [recorded_hand('one', *reach(0.0, (0.3, 0.0), rest=rest), make_obstacles(), GOAL) for rest in (0.6, 1.0)]
     found = fit_wait(hands, Config()).estimates['duration.wait_s']
     # the wait includes the first 0.15 s of a movement, until its onset is detected
     assert found.value == pytest.approx(0.4, abs=0.1)
@@ -215,7 +223,7 @@ def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_record
 
 
 def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(tmp_path, monkeypatch):
-    recordings = find_recordings(write_tables(tmp_path / 'data', count=2, hz=30.0))
+    recordings = find_recordings(write_fit_tables(tmp_path / 'data', count=2, hz=30.0))
     names = list(recordings)
     hopeless = replace_values(SEARCH_CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': math.inf})
     replays = Replays(recordings, {})
@@ -227,7 +235,7 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
 
 def test_settings_are_compared_by_what_the_predictor_answers_with_them(tmp_path, monkeypatch):
     """It learns the pace, for which the spread of durations is the prior, and expects other goals by the scatter of ends."""
-    recording = find_recordings(write_tables(tmp_path / 'data', count=1, hz=30.0))['r0']
+    recording = find_recordings(write_fit_tables(tmp_path / 'data', count=1, hz=30.0))['r0']
     given = {'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.02, 'duration.spread': 0.3}
     config = replace_values(SEARCH_CONFIG, {**given, 'covariance.adaptation': 'none'})
     observed = observe(recording, config).observations
@@ -267,7 +275,7 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
     for stream in (sys.stdin, sys.stdout):
         monkeypatch.setattr(stream, 'isatty', lambda: answer is not None)
     monkeypatch.setattr('builtins.input', ask)
-    data = write_tables(tmp_path / 'data', count=1)
+    data = write_fit_tables(tmp_path / 'data', count=1)
     assert main(['fit', str(data), '--output', str(output), '--workers', '1', *options]) == (0 if is_written else 2)
     assert output.exists() == is_written
     assert asked == ([] if answer is None else [f'Write {output} all the same? [y/N] '])

@@ -19,7 +19,7 @@ from bag_helpers import messages, write_mcap, write_parameters
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType
-from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
+from message_helpers import BAGS, SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped
 from message_helpers import read_columns as columns
 from test_unusual_recordings import WHOLE, write_metadata, write_sqlite
 
@@ -33,7 +33,6 @@ from foc_ros.ros.messages.encode_prediction import encode_outputs
 
 COUNT = int(os.environ.get('FOC_ROS_FUZZ', '1000'))
 LENGTH = 20
-TYPES = message_types('rosbags')
 CONFIG = replace_values(Config(), {'foc.steps': 10, 'homotopy.max_candidates': 2, 'rate_hz': 1000.0})
 THOROUGH = settings(
     max_examples=max(COUNT // LENGTH, 1), suppress_health_check=list(HealthCheck), deadline=None, derandomize=True, database=None
@@ -44,8 +43,8 @@ def intake_of(known):
     """Return a new intake, without a scene or with a scene and a goal, so that poses lead to predictions."""
     intake = Intake(Pipeline(CONFIG))
     if known:
-        intake.take(topics.CLOUD, cloud(TYPES, obstacle_table([(0.1, 0.05, 0.0, 0.02)]), 11 * SECOND))
-        intake.take(topics.GOALS, pose_array(TYPES, [(0.3, 0.0, 0.0)]))
+        intake.take(topics.CLOUD, cloud(BAGS, obstacle_table([(0.1, 0.05, 0.0, 0.02)]), 11 * SECOND))
+        intake.take(topics.GOALS, pose_array(BAGS, [(0.3, 0.0, 0.0)]))
     return intake
 
 
@@ -63,7 +62,7 @@ def test_any_messages_in_any_order():
     seen = {'predicted': 0, 'refused': 0}
 
     @THOROUGH
-    @given(st.sampled_from([True, True, True, False]), st.lists(inputs(TYPES), min_size=LENGTH, max_size=LENGTH))
+    @given(st.sampled_from([True, True, True, False]), st.lists(inputs(BAGS), min_size=LENGTH, max_size=LENGTH))
     def play(known, messages):
         intake = intake_of(known)
         pipeline = intake.pipeline
@@ -78,7 +77,7 @@ def test_any_messages_in_any_order():
             seen['predicted'] += 1
             stamp = message.header.stamp
             assert prediction.stamp_ns == stamp.sec * 1_000_000_000 + stamp.nanosec
-            check_finite(encode_outputs(prediction, 'xy', TYPES))
+            check_finite(encode_outputs(prediction, 'xy', BAGS))
             assert pipeline.predict() is None, 'predicted twice from one pose'
 
     play()

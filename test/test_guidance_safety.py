@@ -20,13 +20,13 @@ FEW, BATCH, BATCHES = 200, 2500, 4
 
 
 def check_bounds(run):
-    forces, settings = run.forces, run.config
+    forces, settings, times = run.forces, run.config, np.array([each.t for each in run.outputs])
     assert np.isfinite(forces).all()
     assert np.hypot(*forces.T).max() <= settings.f_max * (1 + 1e-9)
-    slews = np.hypot(*np.diff(forces, axis=0).T) / np.diff(run.times)
+    slews = np.hypot(*np.diff(forces, axis=0).T) / np.diff(times)
     assert slews.max() <= settings.slew * (1 + 1e-6)
     shares = np.array([each.authority * each.heading for each in run.outputs])
-    rates = np.hypot(*np.diff(shares, axis=0).T) / np.diff(run.times)
+    rates = np.hypot(*np.diff(shares, axis=0).T) / np.diff(times)
     assert rates.max() <= settings.authority / settings.ramp_s * (1 + 1e-6)
     for output in run.outputs:
         values, asymmetry = np.linalg.eigvalsh(output.stiffness), output.stiffness - output.stiffness.T
@@ -42,9 +42,10 @@ def check_many(seeds):
         run = run_hostile(np.random.default_rng(seed), has_jumps=has_jumps)
         check_bounds(run)
         if not has_jumps:
-            assert run.measure_extracted_energy().max() <= run.config.tank + 1e-12
-            assert run.measure_force_into_margins().max() <= 1e-9
-            extracted += run.measure_extracted_energy().max() > 0.1 * run.config.tank
+            energy = run.measure_extracted_energy()
+            assert energy <= run.config.tank + 1e-12
+            assert run.measure_force_into_margins() <= 1e-9
+            extracted += energy > 0.1 * run.config.tank
             near += bool(run.forces.any())
     assert extracted > len(seeds) / 100, 'hardly any hand extracts energy: the test is too kind'
     # an eighth of all; by chance, one batch has fewer than others
@@ -85,54 +86,23 @@ DEAD_MAN = {
 
 @pytest.mark.parametrize('case', DEAD_MAN)
 @pytest.mark.parametrize('settings', [GuidanceConfig(), GuidanceConfig(f_max=20.0), GuidanceConfig(ramp_s=0.5)])
-def test_every_dead_man_condition_releases_the_hand_within_the_ramp(case, settings):
-    config = Config(guidance=settings)
+def test_every_dead_man_condition_releases_the_hand_within_the_ramp_and_a_blended_command_does_not_jump(case, settings):
+    config, command = Config(guidance=settings), np.array([0.1, 0.0])
     state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0)))
     changes, status = DEAD_MAN[case]
     begin, sizes = given.t, [float(np.hypot(*state.force))]
+    blended = [guide(config, state, given)[0].blend_command(command)]
+    assert np.hypot(*(blended[0] - command)) > 0.01, 'guidance has no share'
     while given.t < begin + settings.ramp_s - 1e-9:
         given = replace(given, t=given.t + PERIOD, **changes)
         output, state = guide(config, state, given)
         sizes.append(float(np.hypot(*output.force)))
+        blended.append(output.blend_command(command))
     assert output.status is status
     assert output.force.tolist() == [0.0, 0.0]
     assert (np.diff(sizes) <= 0.0).all() and np.abs(np.diff(sizes)).max() <= settings.slew * PERIOD * (1 + 1e-9)
-    assert output.authority == 0.0
-
-
-def check_blended_commands(settings, state, given, before, changes):
-    """Update until the share of guidance has changed, check that the command does not jump, and return the last one."""
-    for _ in range(round(2.0 * settings.ramp_s / PERIOD) + 1):
-        given = replace(given, t=given.t + PERIOD, **changes)
-        output, state = guide(Config(guidance=settings), state, given)
-        blended = output.blend_command(COMMAND)
-        assert np.hypot(*(blended - before)) <= np.hypot(*COMMAND) * PERIOD / settings.ramp_s * (1 + 1e-9)
-        before = blended
-    return before
-
-
-COMMAND = np.array([0.1, 0.0])
-
-
-@pytest.mark.parametrize('case', DEAD_MAN)
-def test_a_blended_command_does_not_jump_when_the_hand_is_released(case):
-    settings = GuidanceConfig()
-    state, given = build_guiding_state(Config(guidance=replace(settings, hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0)))
-    before = guide(Config(guidance=settings), state, given)[0].blend_command(COMMAND)
-    assert np.hypot(*(before - COMMAND)) > 0.01, 'guidance has no share'
-    after = check_blended_commands(settings, state, given, before, DEAD_MAN[case][0])
-    assert after.tolist() == COMMAND.tolist()
-
-
-def test_a_blended_command_does_not_jump_when_the_path_turns_round():
-    settings = GuidanceConfig()
-    state, given = build_guiding_state(Config(guidance=replace(settings, k_max=5000.0, tank=10.0, clearance=0.0)))
-    before = guide(Config(guidance=settings), state, given)[0].blend_command(COMMAND)
-    candidate = given.prediction.candidates[0]
-    mean = candidate.mean * np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
-    turned = replace(given.prediction, candidates=(replace(candidate, solution=replace(candidate.solution, mean=mean)),))
-    after = check_blended_commands(settings, state, given, before, {'prediction': turned})
-    assert before + after == pytest.approx(COMMAND, abs=1e-3) and np.hypot(*(after - before)) > 0.08
+    assert output.authority == 0.0 and blended[-1].tolist() == command.tolist()
+    assert np.hypot(*np.diff(blended, axis=0).T).max() <= 0.1 * PERIOD / settings.ramp_s * (1 + 1e-9)
 
 
 SAMPLES, PERIOD = 12, 0.005
@@ -173,7 +143,7 @@ def random_prediction(rng, t, start, obstacles):
 
 @dataclass
 class Run:
-    """What happened: outputs, positions (n, 2) and times (n,) of all updates."""
+    """What happened: outputs and positions (n, 2) [m] of all updates."""
 
     config: GuidanceConfig
     obstacles: Obstacles
@@ -184,23 +154,17 @@ class Run:
     def forces(self):
         return np.array([each.force for each in self.outputs])
 
-    @property
-    def times(self):
-        return np.array([each.t for each in self.outputs])
-
     def measure_extracted_energy(self):
-        """Return the energy [J] that the hand has extracted until each update, of forces that are held in between."""
-        return np.concatenate([[0.0], np.cumsum((self.forces[:-1] * np.diff(self.positions, axis=0)).sum(axis=1))])
+        """Return the largest energy [J] that the hand has extracted until an update, of forces that are held in between."""
+        return np.cumsum((self.forces[:-1] * np.diff(self.positions, axis=0)).sum(axis=1)).max(initial=0.0)
 
     def measure_force_into_margins(self):
-        """Return the largest force (n,) [N] into a margin within 1 mm of it at each update."""
-        if not len(self.obstacles):
-            return np.zeros(len(self.outputs))
+        """Return the largest force [N] into a margin within 1 mm of it."""
         offsets, distances = measure_offsets(np.array(self.positions), self.obstacles)
         normals = offsets / np.where(distances == 0.0, 1.0, distances)[..., None]
         heights = distances - self.obstacles.radius - self.config.margin
         inward = -(normals * self.forces[:, None]).sum(axis=2)
-        return np.where(np.abs(heights) <= 0.001, inward, 0.0).max(axis=1)
+        return inward[np.abs(heights) <= 0.001].max(initial=0.0)
 
 
 def move(rng, kind, state, obstacles, speed):

@@ -7,9 +7,20 @@ from functools import cache
 
 import numpy as np
 import pytest
-from message_helpers import SECOND, cloud, marker, marker_array, message_types, obstacle_table, pose_array, pose_stamped
+from message_helpers import (
+    BAGS,
+    SECOND,
+    cloud,
+    collision_object,
+    detection,
+    detections,
+    marker,
+    marker_array,
+    obstacle_table,
+    pose_array,
+    pose_stamped,
+)
 from numpy.testing import assert_allclose, assert_array_equal
-from object_messages import collision_object, detection, detections
 from prediction_samples import DT as MESSAGE_DT
 from prediction_samples import STEPS as MESSAGE_STEPS
 from prediction_samples import outcome, prediction
@@ -168,7 +179,6 @@ def test_a_predictor_with_heights_predicts_and_clears():
             predictor.update(1.0, position)
 
 
-TYPES = message_types('rosbags')
 CUBE, SPHERE, CYLINDER = 1, 2, 3
 UPRIGHT = (CYLINDER, 0.3), (SPHERE, 0.3), (CYLINDER, 0.0)
 PLANES = {'xy': [0, 1, 2], 'xz': [0, 2, 1], 'yz': [2, 0, 1]}
@@ -192,15 +202,15 @@ def test_the_size_of_a_row_gives_its_heights(plane):
     rows = [(*in_space((0.1, 0.0, 0.5), plane), 0.02, size) for size in (0.2, 0.0)]
     climbing = (*rows[0][:4], 0.2, *in_space((0.0, 0.0, 0.1), plane))
     passing = (*rows[0][:4], 0.2, *in_space((0.1, 0.0, 0.0), plane))
-    obstacles = decode_point_cloud(cloud(TYPES, table(*rows, climbing, passing)), plane).obstacles
+    obstacles = decode_point_cloud(cloud(BAGS, table(*rows, climbing, passing)), plane).obstacles
     assert_allclose(obstacles.heights, [[0.4, 0.6], UNKNOWN, UNKNOWN, [0.4, 0.6]], rtol=1e-6)
     assert obstacles.corners.tolist() == [1] * 4
 
 
 def test_a_wrong_size_is_refused_and_one_that_is_not_finite_is_dropped():
     with pytest.raises(MessageError, match=r'size_z\[1\]: expected a number in \[0, 10000\] m, got -0.1'):
-        decode_point_cloud(cloud(TYPES, table((0, 0, 0, 0.1, 0.1), (1, 0, 0, 0.1, -0.1))), 'xy')
-    decoded = decode_point_cloud(cloud(TYPES, table((0, 0, 0, 0.1, np.nan), (1, 0, 0, 0.1, 0.1))), 'xy')
+        decode_point_cloud(cloud(BAGS, table((0, 0, 0, 0.1, 0.1), (1, 0, 0, 0.1, -0.1))), 'xy')
+    decoded = decode_point_cloud(cloud(BAGS, table((0, 0, 0, 0.1, np.nan), (1, 0, 0, 0.1, 0.1))), 'xy')
     assert decoded.obstacles.ids == ('1',) and decoded.dropped == {'not_finite': 1}
 
 
@@ -209,9 +219,9 @@ def test_markers_say_their_heights(plane):
     place = in_space((0.1, 0.0, 0.5), plane)
     turned = {'x': np.sin(np.pi / 8), 'w': np.cos(np.pi / 8)} if plane == 'xy' else {'w': 1.0}
     kinds = (CUBE, (0.2, 0.2, 0.2), turned), *((kind, (0.1, 0.1, size), {'w': 1.0}) for kind, size in UPRIGHT)
-    markers = (marker(TYPES, place, size, type=kind, id=i, turned=by) for i, (kind, size, by) in enumerate(kinds))
+    markers = (marker(BAGS, place, size, type=kind, id=i, turned=by) for i, (kind, size, by) in enumerate(kinds))
     half = 0.1 * np.sqrt(2.0) if plane == 'xy' else 0.1
-    obstacles = ObjectTable().with_markers(marker_array(TYPES, *markers), SECOND, plane).obstacles(SECOND, 0.0)
+    obstacles = ObjectTable().with_markers(marker_array(BAGS, *markers), SECOND, plane).obstacles(SECOND, 0.0)
     assert_allclose(obstacles.heights, [[0.5 - half, 0.5 + half], [0.35, 0.65], UNKNOWN, UNKNOWN], rtol=1e-12)
     assert ObjectTable().obstacles(SECOND, 0.0).heights.shape == (0, 2)
 
@@ -230,7 +240,7 @@ def test_objects_and_detections_say_their_heights():
 
 
 def test_a_transform_moves_heights_and_must_not_tilt_them():
-    message = cloud(TYPES, table((0.1, 0.0, 0.5, 0.02, 0.2)), frame_id='camera')
+    message = cloud(BAGS, table((0.1, 0.0, 0.5, 0.02, 0.2)), frame_id='camera')
 
     def decode_turned(angle, z):
         """Decode it in a frame that is turned about the x axis, and shifted along z."""
@@ -248,12 +258,12 @@ def predict_in(plane):
     """Return the last prediction for a hand that goes down between a high, a low and a tall obstacle."""
     intake = Intake(Pipeline(replace_values(MESSAGE_CONFIG, {'plane': plane})))
     rows = ((0.2, 0.0, 0.5), 0.02, 0.2), ((0.2, 0.06, 0.1), 0.02, 0.04), ((0.2, -0.06, 0.3), 0.02, 0.0)
-    intake.take('goals', pose_array(TYPES, [in_space((0.4, 0.0, 0.2), plane)]))
+    intake.take('goals', pose_array(BAGS, [in_space((0.4, 0.0, 0.2), plane)]))
     scene = table(*((*in_space(place, plane), radius, size) for place, radius, size in rows))
-    intake.take('obstacles', cloud(TYPES, scene))
+    intake.take('obstacles', cloud(BAGS, scene))
     for tick in range(20):
         t = 0.02 * tick
-        intake.take('hand_pose', pose_stamped(TYPES, in_space((t**2, 0.0, 0.25 - 0.1 * t**2), plane), round((1 + t) * SECOND)))
+        intake.take('hand_pose', pose_stamped(BAGS, in_space((t**2, 0.0, 0.25 - 0.1 * t**2), plane), round((1 + t) * SECOND)))
         made = intake.pipeline.predict()
     assert made is not None
     return made
@@ -268,7 +278,7 @@ def test_every_plane_has_the_same_heights(plane):
         assert_allclose(one.mean, other.mean, atol=1e-9)
         assert_allclose(one.height.mean, other.height.mean, atol=1e-12)
         assert_allclose(one.height.covariance, other.height.covariance, atol=1e-12)
-    rows = np.frombuffer(encode_outputs(made, plane, TYPES, ['prediction'])['prediction'].data, CLOUD_ROW)
+    rows = np.frombuffer(encode_outputs(made, plane, BAGS, ['prediction'])['prediction'].data, CLOUD_ROW)
     normal = next(axis for axis in 'xyz' if axis not in plane)
     first = made.candidates[0].height
     assert first is not None
@@ -294,7 +304,7 @@ def test_path_and_markers_rise(plane):
     (candidate,) = given.candidates
     assert candidate.height is not None
     heights = candidate.height.mean[:, 0]
-    messages = encode_outputs(given, plane, TYPES)
+    messages = encode_outputs(given, plane, BAGS)
     points = [[getattr(each.pose.position, axis) for axis in 'xyz'] for each in messages['path'].poses]
     assert_allclose(points, lift(candidate.solution.path, heights, plane))
     assert len(messages['path'].poses) == len(np.arange(0.0, MESSAGE_STEPS * MESSAGE_DT + MESSAGE_DT / 2, MESSAGE_DT))
@@ -307,16 +317,12 @@ def test_path_and_markers_rise(plane):
     assert_allclose([each.scale.z for each in ellipses], 2.0 * candidate.height.stddev[1:])
 
 
-def test_json_has_the_height_where_it_is_predicted():
-    (encoded,) = encode_prediction(sample())['candidates']
+def test_json_has_the_height_where_it_is_predicted_and_a_replay_counts_what_was_cleared():
+    (encoded,), (without,) = (encode_prediction(each)['candidates'] for each in (sample(), prediction(outcome())))
     assert_allclose(encoded['height'], np.linspace(0.2, 0.4, MESSAGE_STEPS + 1))
     assert_allclose(encoded['height_velocity'], 1.0)
     assert_allclose(encoded['height_stddev'], np.linspace(0.0, 0.03, MESSAGE_STEPS + 1))
-    (without,) = encode_prediction(prediction(outcome()))['candidates']
     assert not {name for name in without if name.startswith('height')}
-
-
-def test_a_replay_counts_what_was_cleared():
     summary = Summary()
     summary.counts.update(samples=3, predictions=2, solved=2, cleared_by_height=5)
     answer = summary.answer({}, 1.0)

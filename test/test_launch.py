@@ -199,7 +199,7 @@ def read_layout():
     return json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
 
 
-def test_foxglove_shows_topics_of_the_node_in_its_panels():
+def test_foxglove_shows_topics_of_the_node_in_its_panels_in_the_size_of_a_reach():
     layout = read_layout()
     assert set(leaves(layout['layout'])) == set(layout['configById'])
     scene = layout['configById']['3D!foc']
@@ -208,11 +208,7 @@ def test_foxglove_shows_topics_of_the_node_in_its_panels():
     assert TOPICS[scene['publish']['poseTopic']] == 'geometry_msgs/msg/PoseStamped'
     tables = [panel['topicToRender'] for name, panel in layout['configById'].items() if name.startswith('Diagnostic')]
     assert tables == ['/foc/likelihoods_by_name', '/diagnostics']
-
-
-def test_what_foxglove_draws_has_the_size_of_a_reach():
-    """Its defaults are those of a street: axes of 1 m, names of frames of 0.2 m, and a path as a band of 0.2 m."""
-    scene = read_layout()['configById']['3D!foc']
+    # its defaults are those of a street: axes of 1 m, names of frames of 0.2 m, and a path as a band of 0.2 m
     topics, frames = scene['topics'], scene['scene']['transforms']
     sizes = [topics['/foc/path']['lineWidth'], topics['/hand_pose']['axisScale'], frames['axisScale']]
     sizes += topics['/goals']['arrowScale']

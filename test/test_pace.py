@@ -13,7 +13,6 @@ from foc_ros.core.config import Config, CovarianceConfig, replace_values
 from foc_ros.core.hand.duration import compute_movement_time, scale_durations
 from foc_ros.core.learning import movements as learning
 from foc_ros.core.learning.dispersion import Dispersion
-from foc_ros.core.learning.pace import Pace
 from foc_ros.core.learning.recordings import PRIOR_COUNT
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline
@@ -78,28 +77,11 @@ def test_an_operator_who_passes_the_goals_is_recognised():
     assert pipeline.adapted_config.duration.arrival == 'passing'
 
 
-def test_without_a_movement_nothing_changes_and_it_can_be_switched_off():
+def test_without_a_movement_nothing_changes():
     pipeline = Pipeline(CONFIG)
     follow(pipeline, np.zeros((200, 2)))
     assert pipeline.learnt.pace.movements == 0 and pipeline.learnt.pace.find_best(CONFIG.duration) == ('rest', 1.0)
     assert pipeline.adapted_config is CONFIG
-    off = Pipeline(replace_values(CONFIG, {'duration.adaptation': 'none'}))
-    follow(off, reach(4.0), reach(4.0))
-    assert off.learnt.pace.movements == 0
-
-
-def test_a_reset_and_new_durations_forget_the_pace_and_other_parameters_do_not():
-    pipeline = Pipeline(CONFIG)
-    follow(pipeline, reach(4.0), reach(3.5), reach(4.2))
-    pipeline.reconfigure(replace_values(CONFIG, {'rate_hz': 20.0}))
-    assert pipeline.learnt.pace.movements > 0
-    pipeline.reconfigure(pipeline.adapted_config)
-    assert pipeline.learnt.pace.movements == 0 and pipeline.config.duration.fitts_b_s > CONFIG.duration.fitts_b_s
-    follow(pipeline, reach(4.0), reach(3.5), reach(4.2))
-    assert pipeline.learnt.pace.movements > 0
-    pipeline.reset()
-    assert pipeline.learnt.pace.movements == 0 and pipeline.adapted_config is pipeline.config
-    np.testing.assert_array_equal(pipeline.learnt.pace.losses, Pace().losses)
 
 
 STDDEV = 0.02
@@ -146,6 +128,13 @@ def reach_around(pipeline):
     return follow(pipeline, AROUND, goals=GOAL, obstacles=make_obstacles([[0.15, 0.0]], 0.03, 0.001), is_predicting=True)
 
 
+def test_learning_can_be_switched_off():
+    off = Pipeline(replace_values(CONFIG, {'duration.adaptation': 'none', 'covariance.adaptation': 'none'}))
+    follow(off, reach(4.0), reach(4.0))
+    reach_around(off)
+    assert off.learnt.pace.movements == off.learnt.dispersion.errors == 0 and off.adapted_config is off.config
+
+
 def test_factors_scale_the_covariance_and_nothing_else():
     off = {'covariance.adaptation': 'none'}
     plain = reach_around(Pipeline(replace_values(DISPERSION_CONFIG, off)))
@@ -158,22 +147,6 @@ def test_factors_scale_the_covariance_and_nothing_else():
             np.testing.assert_array_equal(after.mean, before.mean)
             np.testing.assert_array_equal(after.motor_covariance, before.motor_covariance)
             assert after.likelihood == before.likelihood
-
-
-def test_factors_are_forgotten_by_a_reset_and_by_other_parameters_and_can_be_switched_off():
-    pipeline, given = Pipeline(DISPERSION_CONFIG), DISPERSION_CONFIG.covariance
-    reach_around(pipeline)
-    assert pipeline.adapted_config.covariance == pipeline.learnt.dispersion.adapt(given) != given
-    pipeline.reconfigure(replace_values(DISPERSION_CONFIG, {'rate_hz': 20.0}))
-    assert pipeline.learnt.dispersion.errors > 0
-    pipeline.reconfigure(replace_values(DISPERSION_CONFIG, {'foc.endpoint_stddev': 0.1}))
-    assert pipeline.learnt.dispersion.errors == 0
-    reach_around(pipeline)
-    pipeline.reset()
-    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config.covariance == given
-    pipeline = Pipeline(replace_values(DISPERSION_CONFIG, {'covariance.adaptation': 'none'}))
-    reach_around(pipeline)
-    assert pipeline.learnt.dispersion.errors == 0 and pipeline.adapted_config is pipeline.config
 
 
 MOVEMENT_CONFIG = Config().with_values(
@@ -247,15 +220,40 @@ def test_what_is_no_demonstration_is_refused(path, goals, reason):
     assert len(movements.states) <= MOST_STATES
 
 
-def test_a_reset_and_new_parameters_forget_what_was_learnt_and_keep_the_library():
-    (given,) = list_learnt(move_along(ABOVE), REST)
-    for forget in (Pipeline.reset, lambda each: each.reconfigure(MOVEMENT_CONFIG.with_values({'estimator.jerk_density': 3.0}))):
-        pipeline, _ = learn(move_along(BELOW), REST, library=[given])
-        assert len(pipeline.learnt.movements.learnt) == 1 and len(pipeline._library.recordings) == 2
-        pipeline.reconfigure(MOVEMENT_CONFIG.with_values({'rate_hz': 5.0, 'likelihood.beta': 3.0}))
-        assert len(pipeline.learnt.movements.learnt) == 1
+SLOW = reach(4.0), reach(3.5), reach(4.2)
+LEARNING = {
+    'pace': (CONFIG, lambda each: follow(each, *SLOW), {}, {'duration.fitts_b_s': 0.4}),
+    'dispersion': (DISPERSION_CONFIG, reach_around, {}, {'foc.endpoint_stddev': 0.1}),
+    'movements': (
+        MOVEMENT_CONFIG,
+        lambda each: follow(each, move_along(ABOVE), REST, goals=GOAL, obstacles=OBSTACLES),
+        {'likelihood.beta': 3.0},
+        {'estimator.jerk_density': 3.0},
+    ),
+}
+"""Parameters, a movement, other values of parameters that change nothing of what is learnt, and of one on which it depends."""
+
+
+def count_learnt(pipeline, name):
+    learnt = pipeline.learnt
+    return {'pace': learnt.pace.movements, 'dispersion': learnt.dispersion.errors, 'movements': len(learnt.movements.learnt)}[
+        name
+    ]
+
+
+@pytest.mark.parametrize('name', LEARNING)
+def test_a_reset_and_new_parameters_forget_what_was_learnt_with_the_old_ones_and_keep_the_library(name):
+    (given,), (config, move, others, changed) = list_learnt(move_along(BELOW), REST), LEARNING[name]
+    for forget in (Pipeline.reset, lambda each: each.reconfigure(config.with_values(changed))):
+        pipeline = Pipeline(config, [given])
+        move(pipeline)
+        known = count_learnt(pipeline, name)
+        pipeline.reconfigure(config.with_values({'rate_hz': 20.0} | others))
+        assert count_learnt(pipeline, name) == known > 0
         forget(pipeline)
-        assert not pipeline.learnt.movements.learnt and pipeline._library.recordings == (given,)
+        assert count_learnt(pipeline, name) == 0 and pipeline._library.recordings == (given,)
+    pipeline.reset()
+    assert pipeline.adapted_config is pipeline.config
 
 
 def test_the_diagnostics_count_movements():

@@ -61,20 +61,12 @@ def test_an_evaluation_is_the_same_with_one_worker_with_two_and_on_a_cluster(tmp
     assert answers[0] == answers[1] == answers[2]
 
 
-def check_that_only_the_deadly_fail(error):
-    found = dict(run(worker_tasks.deadly, ITEMS))
+@pytest.mark.parametrize(('is_cluster', 'error'), [(False, 'TerminatedWorkerError'), (True, 'KilledWorker')])
+def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(request, is_cluster, error):
+    with open_workers(1, request.getfixturevalue('cluster_address')) if is_cluster else open_workers(2):
+        found = dict(run(worker_tasks.deadly, ITEMS))
     failure = Failure(f'its worker process was lost ({error})')
     assert found == {name: failure if name in ('r3', 'r5') else square for name, square in SQUARES}
-
-
-def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else():
-    with open_workers(2):
-        check_that_only_the_deadly_fail('TerminatedWorkerError')
-
-
-def test_a_killed_worker_of_the_cluster_fails_what_it_was_doing_and_nothing_else(cluster_address):
-    with open_workers(1, cluster_address):
-        check_that_only_the_deadly_fail('KilledWorker')
 
 
 def start_workers(tmp_path):

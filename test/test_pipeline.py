@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from message_helpers import cloud, marker, marker_array, message_types, obstacle_table, pose_stamped
-from object_messages import collision_object
+from message_helpers import BAGS, cloud, collision_object, marker, marker_array, obstacle_table, pose_stamped
 from reach_helpers import make_predictor
 
 import foc_ros
@@ -73,20 +72,17 @@ def test_a_scene_that_the_predictor_refuses_is_counted(monkeypatch):
     assert pipeline.last_refusal == 'goals[0]: expected a goal outside of every obstacle, got (0.15, 0)'
 
 
-TYPES = message_types('rosbags')
-
-
 @pytest.fixture
 def intake():
     return Intake(Pipeline(replace_values(Config(), {'scene.marker_radius_stddev': 0.004})))
 
 
 def move(intake, seconds):
-    intake.take('hand_pose', pose_stamped(TYPES, (0.0, 0.0, 0.2), round(seconds * NANOSECONDS)))
+    intake.take('hand_pose', pose_stamped(BAGS, (0.0, 0.0, 0.2), round(seconds * NANOSECONDS)))
 
 
 def show(intake, *markers):
-    return intake.take('obstacle_markers', marker_array(TYPES, *markers))
+    return intake.take('obstacle_markers', marker_array(BAGS, *markers))
 
 
 def seen(intake):
@@ -96,15 +92,15 @@ def seen(intake):
 
 
 def test_markers_from_before_the_working_frame_was_known_are_forgotten_if_they_are_in_another_one(intake):
-    show(intake, marker(TYPES, id=1, frame_id='camera'))
+    show(intake, marker(BAGS, id=1, frame_id='camera'))
     move(intake, 1.0)
-    show(intake, marker(TYPES, id=2))
+    show(intake, marker(BAGS, id=2))
     assert seen(intake) == ('a/2',)
 
 
 def test_a_marker_expires_by_the_stamp_of_the_hand(intake):
     move(intake, 1.0)
-    show(intake, marker(TYPES, id=1, lifetime=0.5), marker(TYPES, id=2))
+    show(intake, marker(BAGS, id=1, lifetime=0.5), marker(BAGS, id=2))
     for seconds, expected in ((1.1, ('a/1', 'a/2')), (1.4, ('a/1', 'a/2')), (1.6, ('a/2',))):
         move(intake, seconds)
         assert seen(intake) == expected
@@ -113,7 +109,7 @@ def test_a_marker_expires_by_the_stamp_of_the_hand(intake):
 def test_markers_of_publishers_with_different_delays_are_all_used(intake):
     move(intake, 1.0)
     for name, seconds in (('a', 1.0), ('b', 0.9), ('c', 0.8)):
-        assert show(intake, marker(TYPES, ns=name, stamp_ns=round(seconds * NANOSECONDS))) is SampleStatus.ACCEPTED
+        assert show(intake, marker(BAGS, ns=name, stamp_ns=round(seconds * NANOSECONDS))) is SampleStatus.ACCEPTED
     assert seen(intake) == ('a/0', 'b/0', 'c/0')
     assert intake.pipeline.scene.obstacles(NANOSECONDS).radius_stddev.tolist() == [0.004] * 3
     assert intake.pipeline.scene.sources['markers'].stamp_ns == NANOSECONDS
@@ -130,11 +126,11 @@ def test_markers_that_are_held_have_the_deviation_of_the_present_parameters(inta
 def test_a_table_that_never_held_a_marker_is_no_source(intake):
     """One that did, and holds none any more, is an empty scene."""
     move(intake, 1.0)
-    nothing = marker(TYPES, action=3, ns='', frame_id='')
+    nothing = marker(BAGS, action=3, ns='', frame_id='')
     for message in ((), (nothing,)):
         assert show(intake, *message) is SampleStatus.ACCEPTED
         assert intake.pipeline.scene.sources == {}
-    show(intake, marker(TYPES))
+    show(intake, marker(BAGS))
     assert seen(intake) == ('a/0',)
     assert show(intake, nothing) is SampleStatus.ACCEPTED
     assert seen(intake) == () and 'markers' in intake.pipeline.scene.sources
@@ -144,13 +140,13 @@ def test_a_table_that_never_held_a_marker_is_no_source(intake):
 
 def test_a_source_that_is_removed_is_as_if_it_had_never_been_received(intake):
     move(intake, 1.0)
-    show(intake, marker(TYPES, id=1, lifetime=5.0))
-    intake.take('obstacles', cloud(TYPES, obstacle_table([(0.1, 0.2, 0.0, 0.03)])))
+    show(intake, marker(BAGS, id=1, lifetime=5.0))
+    intake.take('obstacles', cloud(BAGS, obstacle_table([(0.1, 0.2, 0.0, 0.03)])))
     intake.remove_source('markers')
     assert seen(intake) == ('0',)
     move(intake, 1.1)
     assert seen(intake) == ('0',), 'the markers do not come back with the next pose'
-    show(intake, marker(TYPES, id=2))
+    show(intake, marker(BAGS, id=2))
     assert seen(intake) == ('0', 'a/2')
     intake.remove_source('cloud')
     assert seen(intake) == ('a/2',)
@@ -164,7 +160,7 @@ A, S, R = SampleStatus.ACCEPTED, SampleStatus.SKIPPED, SampleStatus.RESTARTED_BA
 
 
 def pose(ms, x=0.0, frame_id='world'):
-    return pose_stamped(TYPES, (x, 0.0, 0.1), 10 * NANOSECONDS + round(ms * MS), frame_id)
+    return pose_stamped(BAGS, (x, 0.0, 0.1), 10 * NANOSECONDS + round(ms * MS), frame_id)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ import pytest
 
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
-from fit_recordings import use_few_predictions
+from evaluation_samples import use_few_predictions
+from reach_helpers import make_predictor
 from report_samples import predictions, samples
 from session_helpers import SCENE, TASKS, Page, Silent, reach, wait_until
 
@@ -23,9 +25,7 @@ from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError
 from foc_ros.io.bags import BagReader
-from foc_ros.io.topics import TYPES
 from foc_ros.play import jobs, recording
-from foc_ros.play.predictor import Predictor
 from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START, view_prediction
 from foc_ros.play.session import Session
 from foc_ros.reporting.encode import LENGTH
@@ -185,6 +185,7 @@ def test_the_page_predicts_with_the_fit_unless_positions_become_worse_and_says_s
     assert asyncio.run(work(page, 'compare'))['text'].endswith(' Not used: trial_002 (nothing could be predicted).')
 
 
+INPUTS = {'/hand_pose', '/obstacles', '/goals'}
 NO_POSITIONS = {'displacement_m': {'likelihood-weighted': {'average': {'0.5': None}}}, 'nlpd': {'foc': {'0.5': None}}}
 
 
@@ -252,40 +253,13 @@ def test_a_full_disk_ends_recording_and_tasks_and_nothing_else(page, monkeypatch
     page.move(START)
 
 
-def test_the_library_predicts_and_reports_the_session(tmp_path, monkeypatch):
-    """The hand moves to a goal; the report holds what was predicted, and the bag what was sent."""
-
-    async def run():
-        loop = asyncio.get_running_loop()
-
-        def make(config, receive):
-            return Predictor(config, lambda outcome: loop.call_soon_threadsafe(receive, outcome))
-
-        session = Session(make, Config(budget_s=0.0, rate_hz=20.0), tmp_path)
-        session.predictor.start()
-        try:
-            page = Page(session)
-            monkeypatch.setattr('foc_ros.play.session.time_ns', lambda: 10**15 + round(page.t_ms * 1e6))
-            session.tick()
-            page.send({'type': 'record', 'on': True})
-            for step in range(60):
-                page.move((0.004 * step, 0.0006 * step))
-                if step % 10 == 9:
-                    count = len(page.received)
-                    await wait_until(lambda count=count, page=page: any(m['type'] == 'prediction' for m in page.received[count:]))
-            page.send({'type': 'record', 'on': False})
-            page.send({'type': 'job', 'name': 'report'})
-            await wait_until(lambda: page.last('job')['state'] != 'running')
-        finally:
-            session.close()
-        return page, session
-
-    page, session = asyncio.run(run())
-    assert page.last('job')['state'] == 'done', page.last('job')
-    assert session.report is not None
-    numbers = json.loads((session.report.parent / 'predictions.json').read_text(encoding='utf-8'))
-    assert numbers['hand_samples'] == 60
-    assert numbers['predictions'], 'how many depends on how busy the machine is'
+def test_predictions_are_shown_and_recorded_beside_the_inputs(page):
+    """Paths on the page lead from the hand to their goals within the scene; the bag holds what was sent and predicted."""
+    page.send({'type': 'record', 'on': True})
+    page.move(START, 60)
+    made = make_predictor(Config(budget_s=0.0), FIRST_SCENE.points, FIRST_SCENE.tabulate()).update(0.0, START)
+    page.session._receive(view_prediction(replace(made, stamp_ns=page.session._hands[-1][0])))
+    page.send({'type': 'record', 'on': False})
     shown = page.last('prediction')
     shares = [shown['other'], *(each['likelihood'] or 0.0 for each in shown['candidates'])]
     assert sum(shares) == pytest.approx(1.0, abs=2e-3)
@@ -293,8 +267,10 @@ def test_the_library_predicts_and_reports_the_session(tmp_path, monkeypatch):
     for each in shown['candidates']:
         path = np.cumsum([each['x'], each['y']], axis=1).T * LENGTH
         assert ((path >= [low_x, low_y]) & (path <= [high_x, high_y])).all()
-        np.testing.assert_allclose(path[-1], FIRST_SCENE.points[each['goal']], atol=2e-3)
+        np.testing.assert_allclose(path[[0, -1]], [START, FIRST_SCENE.points[each['goal']]], atol=2e-3)
     with BagReader(Path(page.last('settings')['session']) / recording.SESSION) as reader:
-        topics = {each.topic for each in reader._channels}
-        assert {TYPES[item.role] for item in reader} == {TYPES[role] for role in ('hand_pose', 'obstacles', 'goals')}
-    assert topics == {'/hand_pose', '/obstacles', '/goals', '/foc/prediction', '/foc/likelihoods'}
+        assert {each.topic for each in reader._channels} == {*INPUTS, '/foc/prediction', '/foc/likelihoods'}
+        assert {item.topic for item in reader} == INPUTS
+    asyncio.run(work(page, 'report'))
+    numbers = json.loads((page.session.report.parent / 'predictions.json').read_text(encoding='utf-8'))
+    assert (numbers['hand_samples'], len(numbers['predictions'])) == (60, 1)

@@ -146,11 +146,10 @@ def test_transforms_and_markers_that_are_left_out_are_counted(tmp_path, capsys):
 
 
 def test_a_scene_in_another_frame_than_the_first_pose_is_counted(tmp_path, capsys):
-    array = marker_array(TYPES, marker(TYPES, stamp_ns=ns(0), frame_id='camera'))
-    assert run(write_bag(tmp_path / 'odd', by_stamp(messages(seconds=FEW), [('/obstacle_markers', ns(-0.08), array)]))) == 0
-    assert capsys.readouterr().err == (
-        'foc_ros replay: 1 messages before the first hand pose left out: they are in another frame than it\n'
-    )
+    given = [('/obstacle_markers', ns(-0.08), marker_array(TYPES, marker(TYPES, stamp_ns=ns(0), frame_id='camera')))]
+    assert run(write_bag(tmp_path / 'odd', by_stamp(messages(seconds=FEW), given))) == 0
+    told = '1 messages before the first hand pose left out: they are in another frame than it'
+    assert capsys.readouterr().err == f'foc_ros replay: {told}\n'
 
 
 def test_nothing_solved_is_exit_3_and_says_why(tmp_path, capsys):

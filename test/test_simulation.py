@@ -48,26 +48,25 @@ def test_measures_of_a_trial_with_known_answers():
     assert measures['opposing_share'] == pytest.approx(0.5, rel=0.02)
 
 
+def run(folder, capsys, *options, config=QUICK):
+    (folder / 'quick.yaml').write_text(dump_parameter_file(config))
+    assert main(['simulate', '--params', str(folder / 'quick.yaml'), '--json', *options]) == 0
+    return json.loads(capsys.readouterr().out)['cells']
+
+
 def test_without_a_force_guidance_opposes_nothing(tmp_path, capsys):
-    options = ['--operators', 'accurate', '--trials', '1', '--json']
-    (tmp_path / 'weak.yaml').write_text(dump_parameter_file(QUICK.with_values({'guidance.f_max': 0.0})))
-    assert main(['simulate', '--params', str(tmp_path / 'weak.yaml'), *options]) == 0
-    alone, guided = json.loads(capsys.readouterr().out)['cells']
+    weak = QUICK.with_values({'guidance.f_max': 0.0})
+    alone, guided = run(tmp_path, capsys, '--operators', 'accurate', '--trials', '1', config=weak)
     assert alone['opposing_share'] == guided['opposing_share'] == 0.0
     assert alone['completion_s'] == guided['completion_s'] and alone['path_m'] == guided['path_m']
 
 
 def test_the_hand_of_an_operator_is_as_large_as_the_parameters_say(tmp_path, capsys):
-    options = ['--operators', 'accurate', '--assistance', 'none', '--trials', '5', '--json']
-    clearances, paths = [], []
-    for radius in (0.0, 0.012):
-        (tmp_path / 'hand.yaml').write_text(dump_parameter_file(QUICK.with_values({'scene.hand_radius': radius})))
-        assert main(['simulate', '--params', str(tmp_path / 'hand.yaml'), *options]) == 0
-        (cell,) = json.loads(capsys.readouterr().out)['cells']
-        clearances.append(cell['min_clearance_m'])
-        paths.append(cell['path_m'])
-    assert paths[1] > paths[0] + 0.005, 'a larger hand makes larger detours'
-    assert abs(clearances[1] - clearances[0]) < 0.006, 'and keeps about the same distance'
+    options = ['--operators', 'accurate', '--assistance', 'none', '--trials', '5']
+    configs = [QUICK.with_values({'scene.hand_radius': radius}) for radius in (0.0, 0.012)]
+    (small,), (large,) = (run(tmp_path, capsys, *options, config=each) for each in configs)
+    assert large['path_m'] > small['path_m'] + 0.005, 'a larger hand makes larger detours'
+    assert abs(large['min_clearance_m'] - small['min_clearance_m']) < 0.006, 'and keeps about the same distance'
 
 
 class Misled(Assistance):
@@ -84,12 +83,6 @@ def test_a_wrong_way_costs_what_the_operator_needs_more_than_alone():
     for harm, name in (('wrong_way_s', 'completion_s'), ('wrong_way_effort', 'effort')):
         assert measures['misled'][harm] == measures['misled'][name] - measures['none'][name] > 0.0
         assert np.isnan(measures['none'][harm])
-
-
-def run(folder, capsys, *options):
-    (folder / 'quick.yaml').write_text(dump_parameter_file(QUICK))
-    assert main(['simulate', '--params', str(folder / 'quick.yaml'), '--json', *options]) == 0
-    return json.loads(capsys.readouterr().out)['cells']
 
 
 def test_the_command_prints_equal_cells_whatever_the_workers_and_writes_a_report(tmp_path, capsys):

@@ -175,11 +175,11 @@ def narrow_scene(seed):
     return problem, bowed((0, 0), (0.3, 0), 40, y)
 
 
-@pytest.mark.parametrize('strategy', ['lv', 'optimal', 'fixed'])
+@pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'algorithm1', 'fixed'])
 def test_nothing_is_below_the_least_safety_factor_that_is_reported(strategy):
     """At a hundred times a step, in scenes with gaps down to 1 mm, in a quarter of which all shapes move."""
     wrong = {}
-    for seed in (5, 6) if strategy == 'lv' else range(10):
+    for seed in (5, 6) if strategy in ('lv', 'hc') else range(10):
         problem, guess = narrow_scene(seed)
         solution = solved(problem, guess, strategy, tau=1e-5, algorithm1_growth=1.5)
         least, reported = measure_factors(problem, solution.control.T.ravel()).min(), solution.safety_factor

@@ -18,8 +18,6 @@ FOLDER = Path(__file__).resolve().parent
 LONG = (
     # studies of the solver over many scenes
     'test_tracks.py::test_*symmetric_obstacle*',
-    'test_shapes_in_ocp.py::test_what_is_solved_*',
-    'test_shapes_in_ocp.py::test_a_mean_that_only_just_*',
     'test_shapes_in_ocp.py::test_with_the_risk_*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # a fit and its comparison or without obstacles, the paper's studies and long reports
@@ -60,7 +58,7 @@ PROCESS = (
     'test_parameters.py::test_a_node_*',
     'test_play_server.py::test_the_command_*',
     'test_play_server.py::test_without_*',
-    'test_repository.py::test_every_source_*',
+    'test_packaging.py::test_every_source_*',
     'test_documentation.py::test_a_line_*',
     'test_simulation.py::test_the_command_*',
     'test_examples.py::test_output_*',
@@ -97,7 +95,6 @@ PROCESS = (
     'test_parameters.py::test_sections_apply_*',
     'test_benchmarks.py::*',
     # studies, pictures and pages
-    'test_evaluate.py::*',
     'test_evaluation_scores.py::test_the_region_*',
     'test_fit_estimates.py::test_the_*',
     'test_draw.py::test_a_plot_survives_*',
