@@ -18,6 +18,8 @@ FOLDER = Path(__file__).resolve().parent
 LONG = (
     # studies of the solver over many scenes
     'test_tracks.py::test_*symmetric_obstacle*',
+    'test_shapes_in_ocp.py::test_what_is_solved_*',
+    'test_shapes_in_ocp.py::test_a_mean_that_only_just_*',
     'test_shapes_in_ocp.py::test_with_the_risk_*',
     'test_guidance_safety.py::test_ten_thousand_hostile_hands',
     # a fit and its comparison or without obstacles, the paper's studies and long reports
