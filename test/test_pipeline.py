@@ -117,7 +117,7 @@ def test_markers_of_publishers_with_different_delays_are_all_used(intake):
 
 def test_markers_that_are_held_have_the_deviation_of_the_present_parameters(intake):
     move(intake, 1.0)
-    show(intake, marker(TYPES))
+    show(intake, marker(BAGS))
     intake.pipeline.reconfigure(replace_values(intake.pipeline.config, {'scene.marker_radius_stddev': 0.01}))
     move(intake, 1.1)
     assert intake.pipeline.scene.obstacles(NANOSECONDS).radius_stddev.tolist() == [0.01]
