@@ -80,6 +80,16 @@ def test_the_acceleration_of_the_hand_tells_which_candidate_it_follows(across, o
     assert 1.0 - weights.sum() == pytest.approx(nobody * weights[0])
 
 
+def test_a_force_yields_to_a_hand_that_accelerates_against_it():
+    pull, certain = np.array([[0.0, 2.0]]), np.array([1.0])
+    sizes = [
+        combine(weigh_candidates(certain, pull, np.array([0.0, across])), pull, np.zeros(1, dtype=bool))[0][1]
+        for across in (1e6, 1.0, 0.0, -1.0, -2.5, -1e6)
+    ]
+    assert sizes[0] == pytest.approx(2.0) and (np.diff(sizes) < 0.0).tolist() == [True, True, True, True, False]
+    assert sizes[2] == pytest.approx(2.0 * SURE) and sizes[4:] == [0.0, 0.0]
+
+
 def test_a_hand_beside_its_only_path_is_drawn_to_it():
     output = guide_hand(prediction(straight()), (0.1, 0.01), (0.0, 0.0))
     assert output.force == pytest.approx([0.0, -SURE], abs=1e-6)
