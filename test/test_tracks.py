@@ -247,6 +247,14 @@ def test_every_class_has_a_likelihood_whenever_the_time_ends(name):
     assert 1 < steps < 39
 
 
+@pytest.mark.parametrize('name', SCENES)
+def test_with_time_for_one_step_no_class_of_a_guess_becomes_unlikely(name):
+    expected = find_shares(predicted(0, NO_TRACKS, obstacles=SCENES[name])[0])
+    found = find_shares(predicted(0, NO_TRACKS, Counted(0), SCENES[name])[0])
+    assert found.keys() == expected.keys()
+    assert all(found[label] > 0.3 * share for label, share in expected.items() if share > 0.05), (found, expected)
+
+
 def test_what_is_not_settled_goes_on_in_the_next_prediction():
     """With time for two iterations in each prediction, all classes are solved after a few."""
     memory, unfinished = NO_TRACKS, []

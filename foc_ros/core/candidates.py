@@ -105,17 +105,22 @@ def _classify(candidate: Candidate, solution: Solution, sides: dict[str, int]) -
     return PredictedCandidate(candidate, solution, sides, solution.expected_effort * solution.dt, 0.0)
 
 
-def estimate_unsolved(candidates: Sequence[PredictedCandidate], in_the_way: Sequence[Obstacles]) -> list[PredictedCandidate]:
+def estimate_unsolved(
+    candidates: Sequence[PredictedCandidate], in_the_way: Sequence[Obstacles], begun: Collection[int] = ()
+) -> list[PredictedCandidate]:
     """Return the candidates with an estimate for those that the solver could not solve although the search has a path for them.
 
     The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from a similar
     class that is solved (`find_similar`). A class without a path, such as one that an obstacle closes on the way, stays as it is.
-    in_the_way: the obstacles on the way to each goal, grown by the radius of the hand.
+    in_the_way: the obstacles on the way to each goal, grown by the radius of the hand; begun: numbers of the classes for which
+    there was time for one step from a guess only, which tells less than the lengths of the paths. If there are no others, they
+    are compared with that of the least cost.
     """
-    solved = [each for each in candidates if each.has_likelihood]
+    answered = [each for each in candidates if each.has_likelihood]
+    solved = [each for each in answered if each.way not in begun] or sorted(answered, key=lambda each: each.cost)[:1]
     return [
         _estimate(each, find_similar(each.candidate, solved))
-        if solved and each.status in FAILED and _has_path(each, in_the_way[each.candidate.goal])
+        if solved and (each.status in FAILED or each.way in begun) and _has_path(each, in_the_way[each.candidate.goal])
         else each
         for each in candidates
     ]
@@ -173,7 +178,7 @@ def _estimate(candidate: PredictedCandidate, known: PredictedCandidate) -> Predi
     safety = known.solution.eta, known.solution.safety_factor, known.solution.safety_shortfall
     estimated = replace(
         failed,
-        status=Status.ESTIMATED,
+        status=failed.status if failed.status is Status.DEADLINE else Status.ESTIMATED,
         message=f'{failed.message}; estimated from the path that the search has found',
         mean=mean,
         effort=effort,

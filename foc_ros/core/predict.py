@@ -169,7 +169,9 @@ def _answer(
         held = _hold_track(track, track.candidate, situation, 'the class is not followed any more')
         if held is not None:
             answered.append(held)
-    return estimate_unsolved(answered, situation.in_the_way)
+    late = [(each, track) for each, track in zip(solved, matched, strict=True) if each.status is Status.DEADLINE]
+    begun = {each.way for each, track in late if track.solution is None and each.solution.qp_solves == 1}
+    return estimate_unsolved(answered, situation.in_the_way, begun)
 
 
 def _hold_track(track: Track, candidate: Candidate, situation: Situation, reason: str) -> PredictedCandidate | None:
