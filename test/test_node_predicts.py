@@ -107,7 +107,7 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros):
     bench.publish_scene(goals=[(0.3, 0.0, 0.1), (0.3, 0.1, 0.1)])
     poses = iter(hand_path(40))
     bench.move([next(poses)])
-    assert list_goal_topics(bench) == ['goal0', 'goal1']
+    ros.spin_until(lambda: list_goal_topics(bench) == ['goal0', 'goal1'], 'a topic for each goal')
     publishers = bench.node._goal_topics.publishers
     ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers), 'the subscriptions')
     count = len(bench.received['likelihoods'])
@@ -143,7 +143,7 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros):
     assert not list_goal_topics(bench), 'no prediction says that the last goals are gone'
     bench.deliver('goals', pose_array(TYPES, GOALS))
     bench.move([next(poses) for _ in range(4)])
-    assert list_goal_topics(bench) == ['goal0']
+    ros.spin_until(lambda: list_goal_topics(bench) == ['goal0'], 'the topic of the goal')
     bench.change('deactivate', 'cleanup')
     assert not list_goal_topics(bench)
 
