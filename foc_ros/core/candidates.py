@@ -113,8 +113,8 @@ def estimate_unsolved(
     The path is what the solver found, if it is in the class, or the guess of the search. Effort and safety follow from a similar
     class that is solved (`find_similar`). A class without a path, such as one that an obstacle closes on the way, stays as it is.
     in_the_way: the obstacles on the way to each goal, grown by the radius of the hand; begun: numbers of the classes for which
-    there was time for one step from a guess only, which tells less than the lengths of the paths. If there are no others, they
-    are compared with that of the least cost.
+    there was time for one step from a guess only. The lengths of the paths tell more than such a step. If all classes are like
+    this, the one of the least cost is the similar one.
     """
     answered = [each for each in candidates if each.has_likelihood]
     solved = [each for each in answered if each.way not in begun] or sorted(answered, key=lambda each: each.cost)[:1]

@@ -49,7 +49,7 @@ UNLIKELY, SMALL_PART = 4.0, 0.04
 as a logarithm, with all that its QP promises. At a guess QPs promise too little: there it waits only if that is less than the
 second number as a part of what it is behind."""
 TRUSTED = 3.0
-"""Largest gain, as a logarithm of likelihood, up to which a class waits: from a bad start, QPs promise too little."""
+"""Promised gain, as a logarithm of likelihood, above which no class waits: from a bad start, QPs promise too little."""
 LARGEST_TOLERANCE = 5e-3
 """Gain of its last whole step up to which a class without the wanted eta counts as settled."""
 MOST_TRIALS, SHORTER = 5, 0.35
