@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the search for a solution begins: at a guess of the path, or at an earlier solution, shifted in time."""
+"""Where the search for a solution begins: at a guess of the path, or at an earlier solution, from where the hand is on it now."""
 
 from __future__ import annotations
 
@@ -19,6 +19,11 @@ from .problem import Problem
 HELD = 3e-3
 """Distance from the places where an earlier solution touched obstacles, relative to the scene, that counts as much as a change of
 the control by its own size."""
+ERROR_EFFORT = np.array([[720.0, 360.0, 60.0], [360.0, 192.0, 36.0], [60.0, 36.0, 9.0]])
+"""Effort with which a triple integrator loses an error e of its position, velocity and acceleration within T: e'Me / T^5, for an
+error in units of T."""
+TRIED, PARTS = 0.5, 4
+"""Share of an earlier movement on which the hand is looked for, and points of each step at which it is."""
 JITTER = 1e-13
 """Softness of the goal: its rows, of unit length, may depend on each other."""
 
@@ -55,34 +60,55 @@ def cold_start(guess: Array) -> Start:
 
 
 def warm_start(previous: Solution, problem: Problem) -> Start:
-    """Start at an earlier solution, resampled at the new steps so that both end at the same time.
+    """Start at an earlier solution, from where the hand is on it now, at the pace with which it ends at the new time.
 
-    Before the earlier solution begins, the hand is where it began; after it ends, the hand rests at its goal. From where
-    the hand is now, the least change of the control leads it to the places where the earlier solution touched obstacles.
+    A movement that takes longer than was thought has the same path, and with a pace r of its time a control r^3 times as large:
+    the derivative of the position of the order of the control. From the state of the hand, the least change of the control leads
+    to the places where the earlier solution touched obstacles.
     """
     steps, dt, gain = problem.horizon.steps, problem.horizon.dt, problem.horizon.gain
-    elapsed_s = previous.dt * len(previous.control) - dt * steps
-    path, control = resample(previous, elapsed_s, dt, steps)
+    begin_s = _find_hand(previous, problem)
+    pace = (previous.dt * len(previous.control) - begin_s) / (dt * steps)
+    path, control = resample(previous, begin_s, pace * dt, steps)
+    control *= pace ** (previous.mean.shape[1] // 2)
     row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
     cost = max(previous.effort, np.finfo(float).tiny)
     kept = [
         (row[identity], shifted, multiplier / cost)
         for identity, time, multiplier in previous.multipliers
-        if identity in row and 1 <= (shifted := (time * previous.dt - elapsed_s) / dt) <= steps
+        if identity in row and 1 <= (shifted := (time * previous.dt - begin_s) / (pace * dt)) <= steps
     ]
     table = np.array(kept, dtype=float).reshape(-1, 3)
     forces = Forces(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
     if kept:
-        places = interpolate_position(previous.mean, previous.dt, forces.time * dt + elapsed_s)
+        places = interpolate_position(previous.mean, previous.dt, forces.time * pace * dt + begin_s)
         weight = (HELD * problem.extent) ** 2 / cost
         control = follow(problem, forces.time, places, weight / gain**2, control * gain) / gain
     return Start(path, control, forces, previous.safety_factor, previous.lam)
 
 
-def resample(previous: Solution, elapsed_s: float, dt: float, steps: int) -> tuple[Array, Array]:
-    """Return path (steps + 1, 2) and stacked control (2 steps,) of a solution at new steps of dt [s], from elapsed_s on."""
+def _find_hand(previous: Solution, problem: Problem) -> float:
+    """Return the time of an earlier movement [s] from which on the hand needs least effort to go on as it does.
+
+    It is not the time that has passed: a hand at rest is at the beginning, for as long as it rests.
+    """
+    count, new_s = len(previous.control), problem.horizon.dt * problem.horizon.steps
+    at = np.linspace(0.0, TRIED * count, int(TRIED * count) * PARTS + 1)
+    step = np.minimum(at.astype(np.intp), count - 1)
+    share = (at - step)[:, None]
+    states = (1.0 - share) * previous.mean[step] + share * previous.mean[step + 1]
+    orders = states.shape[1] // 2
+    pace, order = (previous.dt * (count - at) / new_s)[:, None, None], np.arange(orders)[:, None]
+    errors = states[:, : 2 * orders].reshape(-1, orders, 2) * pace**order - problem.initial_mean[: 2 * orders].reshape(orders, 2)
+    errors *= new_s**order
+    effort = (errors * (ERROR_EFFORT[:orders, :orders] @ errors)).sum(axis=(1, 2))
+    return float(previous.dt * at[effort.argmin()])
+
+
+def resample(previous: Solution, begin_s: float, dt: float, steps: int) -> tuple[Array, Array]:
+    """Return path (steps + 1, 2) and stacked control (2 steps,) of a solution at new steps of dt [s], from a time of it on."""
     count = len(previous.control)
-    at = np.clip((elapsed_s + dt * np.arange(steps + 1)) / previous.dt, 0.0, count)
+    at = np.minimum((begin_s + dt * np.arange(steps + 1)) / previous.dt, count)
     step = np.minimum(at.astype(np.intp), count - 1)
     share = (at - step)[:, None]
     path: Array = (1.0 - share) * previous.path[step] + share * previous.path[step + 1]
