@@ -15,12 +15,16 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, Wrench, WrenchStamped
 from message_helpers import SECOND, pose_stamped
 from node_helpers import TYPES, Bench, figures
 from play_helpers import until
+from prediction_samples import predict_aside
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
 
 from foc_ros.core import pipeline as pipelines
 from foc_ros.core.config import Config
+from foc_ros.core.guidance.guide import GuidanceOutput, GuidanceStatus
+from foc_ros.core.hand import kalman
+from foc_ros.core.types import HandSample
 from foc_ros.ros import guidance
 from foc_ros.ros.guidance import GuidanceLoop
 
@@ -219,6 +223,36 @@ def test_neither_a_slow_prediction_nor_an_error_stops_guidance(ros, monkeypatch)
     assert int(figures(bench.health())['count internal_errors']) == 1
     bench.wrenches.clear()
     bench.drive_until(lambda: bool(bench.wrenches), 'guidance')
+
+
+@pytest.mark.parametrize('seconds', [-5.0, 0.02, 1.0], ids=['stamps go back', 'jump', 'gap'])
+def test_a_hand_that_restarts_elsewhere_takes_nothing_from_the_tank_and_is_not_guided_by_what_was_predicted_before(seconds):
+    config = Config().with_values({'guidance.enabled': True, 'guidance.clearance': 0.0})
+    published: list[GuidanceOutput] = []
+    loop = GuidanceLoop(config, lambda output, _: published.append(output), lambda _: None, lambda _: None)
+    loop.set_released(False)
+    state, now_s = None, 100.0
+
+    def move(position, stamps):
+        """Move the hand, and update guidance twice after each of its poses."""
+        nonlocal state, now_s
+        for stamp_s in stamps:
+            state = kalman.update(state, HandSample(round(stamp_s * SECOND), np.array(position)), config.estimator).state
+            loop.note_hand(state, now_s)
+            for _ in range(2):
+                loop.update(now_s)
+                now_s += 0.005
+
+    move((0.0, 0.0), [10.0])
+    loop.note_prediction(predict_aside(), now_s)
+    move((0.0, 0.0), 10.0 + 0.01 * np.arange(1, 20))
+    assert published[-1].force[1] > 2.0
+    guided = len(published)
+    move((0.0, 0.4), 10.19 + seconds + 0.01 * np.arange(14))  # 0.4 m in the direction of the force
+    assert {each.status for each in published[guided + 2 :]} == {GuidanceStatus.NO_PREDICTION}
+    sizes = np.hypot(*np.array([each.force for each in published[guided - 1 :]]).T)
+    assert sizes[-1] == 0.0 and np.abs(np.diff(sizes)).max() <= config.guidance.slew * 0.005 * (1 + 1e-9)
+    assert min(each.tank for each in published) > 0.4
 
 
 PRIORITY_CONFIG = Config().with_values({'guidance.enabled': True, 'guidance.realtime_priority': 7})

@@ -87,12 +87,15 @@ class GuidanceLoop:
         self._priority = self._wanted_priority = 0
         self._has_warned = False
         self._state, self._zeros = GuidanceState(), ZEROS
+        self._hand: FilterState | None = None  # of the last update
         self._end, self._enabled = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
 
     def note_hand(self, hand: FilterState | None, now_s: float) -> None:
-        """Use a new estimate of the hand; None if there is none any more."""
-        self.newest = replace(self.newest, hand=hand, hand_s=now_s, prediction=self.newest.prediction if hand else None)
+        """Use a new estimate of the hand; None if there is none any more. After a restart, only new predictions count."""
+        before = self.newest.hand
+        prediction = self.newest.prediction if before is not None and before.is_continued_by(hand) else None
+        self.newest = replace(self.newest, hand=hand, hand_s=now_s, prediction=prediction)
 
     def note_prediction(self, prediction: Prediction, received_s: float) -> None:
         """Use a new prediction; received_s: when its hand pose was received."""
@@ -144,10 +147,13 @@ class GuidanceLoop:
 
     def update(self, now_s: float) -> None:
         """Compute guidance at a time by the steady clock, and publish it; called in the thread."""
-        newest = self.newest
+        newest, before = self.newest, self._hand
         is_released = newest.is_released or not newest.config.guidance.enabled
         mean = newest.hand.mean if newest.hand is not None else np.concatenate([self._state.position, np.zeros(4)])
         position, velocity, acceleration = mean.reshape(3, 2)
+        self._hand = newest.hand
+        if before is None or not before.is_continued_by(newest.hand):
+            self._state = replace(self._state, position=position)  # the hand did not move there: that is no work
         if self._zeros >= ZEROS and (is_released or newest.prediction is None):
             self._state = replace(self._state, t=now_s, position=position)
             return
