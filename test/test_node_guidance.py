@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guidance of the node: its topics, its clutch, its diagnostics, and its rate while a prediction takes long."""
 
+import dataclasses
 import itertools
 import os
 import threading
@@ -253,6 +254,31 @@ def test_a_hand_that_restarts_elsewhere_takes_nothing_from_the_tank_and_is_not_g
     sizes = np.hypot(*np.array([each.force for each in published[guided - 1 :]]).T)
     assert sizes[-1] == 0.0 and np.abs(np.diff(sizes)).max() <= config.guidance.slew * 0.005 * (1 + 1e-9)
     assert min(each.tank for each in published) > 0.4
+
+
+def test_the_state_is_told_without_a_force_and_the_clutch_fills_the_tank():
+    config = Config().with_values({'guidance.enabled': True})
+    loop = GuidanceLoop(config, lambda *_: None, lambda _: None, lambda _: None)
+
+    def tell(now_s):
+        loop.update(now_s)
+        return loop.describe()
+
+    assert tell(100.0)['guidance'] == 'no hand yet'
+    hand = kalman.update(None, HandSample(SECOND, np.array([0.1, 0.0])), config.estimator).state
+    loop.note_hand(hand, 100.0)
+    assert tell(100.005)['guidance'] == 'released'
+    loop.set_released(False)
+    assert tell(100.01)['guidance'] == 'no_prediction'
+    assert loop.output is not None and loop.output.position.tolist() == [0.1, 0.0]
+    loop.note_prediction(predict_aside(), 100.0)
+    loop._state = dataclasses.replace(loop._state, energy=0.01)
+    told = tell(100.015)
+    assert (told['guidance'], told['tank_J']) == ('guiding', '0.0100')
+    loop.set_released(True)
+    told = [tell(100.02 + 0.005 * tick) for tick in range(5)]
+    assert [each['guidance'] for each in told] == ['released'] * 5
+    assert told[-1]['tank_J'] == '0.5000'
 
 
 PRIORITY_CONFIG = Config().with_values({'guidance.enabled': True, 'guidance.realtime_priority': 7})

@@ -134,7 +134,7 @@ class GuidanceLoop:
         output, settings = self.output, self.newest.config.guidance
         if not settings.enabled:
             return {'guidance': 'disabled'}
-        if output is None:
+        if output is None or self.newest.hand is None:
             return {'guidance': 'no hand yet'}
         return {
             'guidance': output.status.value,
@@ -154,9 +154,6 @@ class GuidanceLoop:
         self._hand = newest.hand
         if before is None or not before.is_continued_by(newest.hand):
             self._state = replace(self._state, position=position)  # the hand did not move there: that is no work
-        if self._zeros >= ZEROS and (is_released or newest.prediction is None):
-            self._state = replace(self._state, t=now_s, position=position)
-            return
         ages = now_s - newest.hand_s, now_s - newest.prediction_s
         given = GuidanceInput(now_s, position, velocity, newest.prediction, *ages, is_released, acceleration)
         self.output, self._state = guide(newest.config, self._state, given)
@@ -166,6 +163,8 @@ class GuidanceLoop:
             self.sample_header = newest.sample_header or self.sample_header
             if self.sample_header is not None:
                 self._publish(self.output, self.sample_header)
+        elif is_released:
+            self._state = GuidanceState()  # with a full tank
 
     def _run(self) -> None:
         """Update once in a period; a late update shifts the following ones."""
