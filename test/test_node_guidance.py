@@ -191,6 +191,9 @@ def test_commands_are_blended_and_pass_unchanged_without_guidance(ros):
     # a hand that was silent on a busy machine, or is at a fork, is not guided for a moment
     bench.drive_until(is_blended, 'a command that is blended')
     assert bench.answer(0.0, 0.1, 'elsewhere').linear.x == 0.0
+    bench.drive_until(is_blended, 'a command that is blended')
+    assert bench.answer(np.nan, 0.1).linear.y == 0.1
+    assert bench.answer(np.inf, 0.1).linear.y == 0.1
     ros.spin_until(lambda: not bench.forces[-1].any(), 'the hand is released')
     ros.spin_until(lambda: bench.answer(0.0, 0.1).linear.x == 0.0, 'the command alone')
     assert bench.answer(0.0, 0.1).linear.x == 0.0

@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from foc_ros.core.config import Config
+from foc_ros.core.errors import InputError
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.hand.kalman import FilterState
 from foc_ros.core.prediction import Prediction
 from foc_ros.io.topics import COMMAND
 
 from .health import THROTTLE_S
-from .messages.decode_poses import decode_frame
 from .messages.encode_guidance import (
     GUIDANCE_OUTPUTS,
     LIVE_OUTPUTS,
@@ -229,12 +229,10 @@ class GuidanceTopics:
         if not config.guidance.enabled:
             return
         if output is not None and header is not None and monotonic() - output.t <= config.guidance.hold_s:
-            frame_id = decode_frame(command.header)
-            if frame_id == header.frame_id:
-                command = blend_twist(output, command, config.plane, types)
-            else:
-                text = f'{COMMAND}: frame {frame_id!r} is not the working frame {header.frame_id!r}: not blended'
-                self._node.get_logger().warning(text, throttle_duration_sec=THROTTLE_S)
+            try:
+                command = blend_twist(output, header, command, types)
+            except InputError as error:
+                self._node.get_logger().warning(f'{COMMAND} is not blended: {error}', throttle_duration_sec=THROTTLE_S)
         self._publish(TWIST, command)
 
     def _publish_output(self, output: GuidanceOutput, header: SampleHeader) -> None:

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foc_ros.core.config import Config, GuidanceConfig
-from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.prediction import Prediction
+from foc_ros.core.support import check_vector
 from foc_ros.core.types import Array, Record
 
 from .limits import (
@@ -121,11 +121,10 @@ class GuidanceOutput(Record):
     def blend_command(self, command: ArrayLike) -> Array:
         """Return (1 - A) u + A |u| h (2,) for an operator's velocity command u (2,), the authority A and the heading h.
 
-        It is never faster than the command, and equal to it where the authority is 0. InputError is raised for a wrong shape.
+        It is never faster than the command, and equal to it where the authority is 0. InputError is raised for a wrong shape or
+        a number that is not finite.
         """
-        wanted = np.asarray(command, dtype=float)
-        if wanted.shape != (2,):
-            raise InputError('command', 'two numbers [m/s]', repr(command))
+        wanted = check_vector('command', command, 2)
         blended: Array = (1.0 - self.authority) * wanted + self.authority * float(np.hypot(*wanted)) * self.heading
         return blended
 
