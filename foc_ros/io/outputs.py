@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -57,6 +58,30 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(option, 'a folder that can be written', f'{directory}: {error.strerror}') from error
+
+
+@contextmanager
+def lock_folder(folder: Path, *, waits: bool = True) -> Iterator[None]:
+    """Let one process at a time continue for a folder, where its system and its file system can; a lock ends with its process.
+
+    Raises BlockingIOError where another process has the lock, unless it `waits`.
+    """
+    if sys.platform == 'win32':
+        yield
+        return
+    import fcntl
+
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX if waits else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise
+        except OSError:
+            pass
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def check_picture(option: str, file: Path) -> None:
