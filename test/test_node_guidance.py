@@ -178,6 +178,16 @@ def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros):
     assert bench.node._guidance.loop._thread is None, 'the thread has ended'
 
 
+@pytest.mark.parametrize('transitions', [['shutdown'], ['deactivate', 'cleanup']])
+def test_a_node_that_ends_leaves_no_force(ros, transitions):
+    bench = begin(ros)
+    bench.drive_until(lambda: np.hypot(*bench.forces[-1, :2]) > 0.1, 'a force')
+    for each in transitions:
+        getattr(bench.node, f'trigger_{each}')()
+    assert bench.node._guidance.loop._thread is None
+    ros.spin_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice', 5.0)
+
+
 def test_commands_are_blended_and_pass_unchanged_without_guidance(ros):
     bench = begin(ros)
 

@@ -9,11 +9,12 @@ disabled, the thread waits without updates. The loop needs no ROS; `play` uses i
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from time import monotonic
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -88,7 +89,7 @@ class GuidanceLoop:
         self._has_warned = False
         self._state, self._zeros = GuidanceState(), ZEROS
         self._hand: FilterState | None = None  # of the last update
-        self._end, self._enabled = threading.Event(), threading.Event()
+        self._end_s, self._enabled = math.inf, threading.Event()
         self._thread: threading.Thread | None = None
 
     def note_hand(self, hand: FilterState | None, now_s: float) -> None:
@@ -115,17 +116,20 @@ class GuidanceLoop:
 
     def start(self) -> None:
         """Begin to update."""
-        self._end.clear()
+        self._end_s = math.inf
         self.reconfigure(self.newest.config)
         self._thread = threading.Thread(target=self._run, name='guidance', daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread. Nothing is published after that."""
-        self._end.set()
+        """Release the hand, and end the thread once there is no force. Nothing is published after that."""
+        self.set_released(True)
+        settings = self.newest.config.guidance
+        longest_s = settings.ramp_s + (ZEROS + 2) / settings.rate_hz + 1.0  # an update may be late
+        self._end_s = monotonic() + longest_s
         self._enabled.set()
         if self._thread is not None:
-            self._thread.join(1.0)
+            self._thread.join(longest_s + 1.0)
             self._thread = None
         self._state, self._zeros = GuidanceState(), ZEROS
 
@@ -169,7 +173,8 @@ class GuidanceLoop:
     def _run(self) -> None:
         """Update once in a period; a late update shifts the following ones."""
         due_s = monotonic()
-        while not self._end.wait(max(due_s - monotonic(), 0.0)):
+        while self._end_s == math.inf or (self._zeros < ZEROS and monotonic() < self._end_s):
+            sleep(max(due_s - monotonic(), 0.0))
             if self._zeros >= ZEROS and not self._enabled.is_set():
                 self._set_priority(0)
                 self._enabled.wait()
