@@ -250,8 +250,9 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
     In mode `path` there is no force along the direction of the hand, which is that of the path where the hand is at rest. Near
     the end of a path, h is the time to its end. With h = 0 this is f_i = K_i (x_i - x).
     """
-    paths, progress, speed = followed.paths, followed.progress, float(np.hypot(*given.velocity))
-    assert paths is not None
+    prediction, paths, progress = followed.prediction, followed.paths, followed.progress
+    speed = float(np.hypot(*given.velocity))
+    assert prediction is not None and paths is not None
     need = find_need(settings, followed.zones, given.position, given.velocity)
     ahead = np.minimum(progress + need.time_s * speed, paths.lengths[:, -1])
     times = np.minimum(need.time_s, (ahead - progress) / max(speed, 1e-9))
@@ -262,9 +263,8 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
         stiffness = project_out(stiffness, normalize(given.velocity + 0.02 * paths.find_tangents(progress)))
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
     errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
-    shares = () if followed.prediction is None else (followed.prediction.unknown, followed.prediction.other)
     forces = (stiffness @ errors[..., None])[..., 0]
-    weights = weigh_candidates(paths.likelihoods, forces, given.acceleration, *shares)
+    weights = weigh_candidates(paths.likelihoods, forces, given.acceleration, prediction.unknown, prediction.other)
     force, agreement = combine(weights, forces, find_crossing(need, errors))
     places = paths.locate(np.maximum(ahead, progress + HEADING_M))
     heading = paths.likelihoods @ normalize(paths.interpolate(paths.points, places) - given.position)
