@@ -102,9 +102,9 @@ class Recorder(ReportCollector):
         return f'{progress}   hand samples {poses}/s, predictions {predictions}/s, delay {delay_ms:.0f} ms'
 
 
-def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -> int:
+def perform(output: Path, last_s: float = np.inf) -> int:
     """Run the demo; return 1 if the node fails, 130 after an interrupt. last_s: seconds of the recording to play."""
-    with BagReader(recording) as reader:
+    with BagReader(RECORDING) as reader:
         items = list(reader)
     items = [item for item in items if item.log_ns - items[0].log_ns <= last_s * NANOSECONDS]
     with prepare(output):
