@@ -57,10 +57,13 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
     text = json.dumps({'ways': rows}, allow_nan=False) + '\n'
     if len(text) > MAX_BYTES:
         raise InputError(f'{file}: ways', f'at most {MAX_BYTES:,} bytes', f'{len(text):,} of {len(ways)} ways')
-    unfinished = file.with_name(f'{file.name}.{os.getpid()}.unfinished')  # another process may write its own
+    target = file.resolve()  # a link stays
+    if target.exists() and not target.is_file():
+        raise RecordingError(f'{file}: cannot be written: it is no regular file')
+    unfinished = target.with_name(f'{target.name}.{os.getpid()}.unfinished')  # another process may write its own
     try:
         unfinished.write_text(text, encoding='utf-8')
-        unfinished.replace(file)
+        unfinished.replace(target)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
         raise RecordingError(f'{file}: cannot be written: {error.strerror}') from error
