@@ -75,7 +75,7 @@ def extend_library(file: Path, ways: Sequence[Demonstration]) -> int:
     Processes that do so at once wait for each other, so that the file has what all of them add. Raises as `load_library` and
     `save_library` do.
     """
-    with lock_folder(file.parent):
+    with lock_folder(file.resolve().parent):
         given = load_library(str(file)) if file.exists() else ()
         new = [each for each in ways if not any(is_same_recording(each, known) for known in given)]
         save_library(file, [*given, *new])
