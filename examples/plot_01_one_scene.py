@@ -22,7 +22,7 @@ print(solution.label, solution.status.value, f'effort {solution.effort:.0f} m^2/
 
 # %%
 # The left plot shows the mean path with ellipses of one standard deviation. The right plot shows the speed and the standard
-# deviation of the position. The hand slows down near the obstacles, because noise grows with the effort.
+# deviation of the position. The hand is fastest behind the cup: noise grows with the effort, and adds up with the time.
 
 figure, (scene, speeds) = plt.subplots(1, 2, figsize=(11, 3.6), width_ratios=(1.7, 1), layout='constrained')
 solution.plot(scene)

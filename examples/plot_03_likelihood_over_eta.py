@@ -5,7 +5,7 @@ Likelihoods over eta
 ====================
 
 The likelihood of a homotopy class follows from the ratio of the efforts. This example solves all classes of one scene for
-increasing eta. The short path has less clearance, so that its effort grows faster.
+increasing eta. The detours become wider and their efforts grow faster, so that the short path becomes more likely.
 """
 
 import matplotlib.pyplot as plt
@@ -24,8 +24,7 @@ etas = np.linspace(0.5, 0.95, 19)
 results = [foc_ros.solve_classes((0.0, 0.0), (0.3, 0.0), obstacles, eta=eta, strategy='optimal', config=config) for eta in etas]
 
 # %%
-# A candidate that needs too much effort for eta is compromised: it keeps a smaller eta, and it is less likely than the ratio of
-# the efforts says.
+# Up to an eta of 0.75 the straight line is safe enough between the obstacles, and its effort stays the same.
 
 figure, (scene, efforts, likelihoods) = plt.subplots(1, 3, figsize=(12, 3.6), width_ratios=(1.5, 1, 1), layout='constrained')
 foc_ros.plot_candidates(results[len(etas) // 2], scene)

@@ -43,6 +43,6 @@ ratios = [
     if slow.status is best.status is foc_ros.Status.SOLVED and slow.label == best.label
 ]
 figure, axes = plt.subplots(figsize=(6.5, 4), layout='constrained')
-axes.hist(ratios, bins=np.linspace(1.0, max(ratios), 25))
+axes.hist(ratios, bins=24)
 axes.set(xlabel='effort of lv / effort of optimal', ylabel='number of scenes')
 plt.show()

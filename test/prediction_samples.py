@@ -49,4 +49,13 @@ def three_ways() -> Prediction:
     )
 
 
+def predict_aside(**changes: Any) -> Prediction:
+    """Return a prediction of one certain and precise path along x, at y = 5 cm; changes: to the prediction."""
+    candidate = outcome('goal0:', 1.0)
+    mean = candidate.mean.copy()
+    mean[:, :2] = np.column_stack([np.linspace(0.0, 0.3, len(mean)), np.full(len(mean), 0.05)])
+    solution = replace(candidate.solution, mean=mean, covariance=np.zeros((len(mean), 6, 6)))
+    return prediction(replace(candidate, solution=solution), **changes)
+
+
 OBSTACLES = make_obstacles([[0.1, 0.0], [0.2, 0.1]], [0.03, 0.02], [0.005, 0.0])

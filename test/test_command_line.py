@@ -109,6 +109,10 @@ NAMES = '--operators: expected names of accurate, noisy, laggy, changes_way, una
 KINDS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections, goals, goal_pose'
 PEOPLE = '--recordings: expected recordings of people for the operator human_paths, got none'
 INPUTS = f'--remap: expected one of the inputs {KINDS}'
+NEW_FILE = 'expected a new file, or an earlier one of this kind'
+NO_LIBRARY = 'ways: expected a list of at most 500 ways, got NoneType'
+NO_NODE = '/start: expected ros__parameters with parameters below it, got [0, 0]'
+NO_PARAMETERS = 'expected a section for the node /foc, such as /** or /foc, got str'
 SCHEDULER = '--scheduler: expected the address of a Dask scheduler, as in tcp://host:8786'
 
 WRONG = [
@@ -136,6 +140,9 @@ WRONG = [
         ['--allow: expected names of eta, positions (did you mean eta?), got etta'],
     ),
     (['evaluate', '.', '--scheduler', 'here'], [f'{SCHEDULER}, got here']),
+    (['learn', 'tables', '--output', 'tables/goals.csv'], [f'--output: {NEW_FILE}, got tables/goals.csv: {NO_LIBRARY}']),
+    (['fit', 'tables', '--output', 'tables/goals.csv'], [f'--output: {NEW_FILE}, got tables/goals.csv: {NO_PARAMETERS}']),
+    (['replay', 'bag.mcap', '--operator', 'scene.yaml'], [f'--operator: {NEW_FILE}, got scene.yaml: {NO_NODE}']),
     (['learn', '.', '--output', '/proc/sys/a'], ['--output: expected a file that can be written, got /proc/sys/a']),
 ]
 ANSWERS = """

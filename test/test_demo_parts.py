@@ -139,18 +139,19 @@ def test_nothing_solved_is_shown(terminal):
 
 def test_output_directory_is_made_an_earlier_demo_is_replaced_and_other_contents_are_refused(tmp_path):
     output = tmp_path / 'new' / 'demo_output'
-    demo.prepare(output)
+    with demo.prepare(output), pytest.raises(InputError, match='--output: expected the directory of a demo that has ended'):
+        demo.prepare(output).__enter__()
     for name in ('bag', 'report'):
         (output / name).mkdir()
         (output / name / 'old').write_text('')
     (output / 'notes.txt').write_text('mine')
-    demo.prepare(output)
-    assert {file.name for file in output.iterdir()} == {demo.MARK, 'notes.txt'}
+    with demo.prepare(output):
+        assert {file.name for file in output.iterdir()} == {demo.MARK, 'notes.txt'}
     (tmp_path / 'other' / 'bag').mkdir(parents=True)
     (tmp_path / 'file').write_text('mine')
     for other in ('other', 'file'):
         with pytest.raises(InputError, match='--output'):
-            demo.prepare(tmp_path / other)
+            demo.prepare(tmp_path / other).__enter__()
     assert (tmp_path / 'other' / 'bag').exists() and (tmp_path / 'file').read_text() == 'mine'
 
 

@@ -3,6 +3,7 @@
 """Demonstrations are recorded with the obstacles that they pass, and recalled if the scene is the same."""
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from foc_ros.cli.main import main
 from foc_ros.core.classes import find_path_sides, search
 from foc_ros.core.classes.library import STEP_S, GuessTiming, recall_demonstrations, record_demonstration
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
-from foc_ros.core.errors import FocError
+from foc_ros.core.errors import FocError, RecordingError
 from foc_ros.core.learning.learnt import Knowledge
 from foc_ros.core.learning.recordings import NO_LIBRARY, PRIOR_COUNT, PRIOR_COUNT_GOAL, make_library
 from foc_ros.core.obstacle_table import make_obstacles
@@ -331,6 +332,19 @@ def test_a_library_that_cannot_be_used_is_exit_2_in_one_line(bag, tmp_path, caps
     assert captured.out == ''
     assert str(file) in captured.err and captured.err.count('\n') == 1
     assert file.read_text() == text
+
+
+def test_a_library_behind_a_link_is_written_there_and_a_device_stays(tmp_path):
+    file, link, device = tmp_path / 'ways.json', tmp_path / 'link.json', tmp_path / 'pipe'
+    save_library(file, [])
+    link.symlink_to(file)
+    way = record_demonstration('world', np.array([[0.0, 0.0], [0.3, 0.0]]), make_obstacles([[0.1, 1.0]], 0.01))
+    save_library(link, [way])
+    assert link.is_symlink() and len(load_library(str(file))) == 1
+    os.mkfifo(device)
+    with pytest.raises(RecordingError, match='pipe: cannot be written: it is no regular file'):
+        save_library(device, [way])
+    assert device.is_fifo()
 
 
 def test_a_full_library_stays_as_it_was(bag, tmp_path, capsys, monkeypatch):

@@ -160,8 +160,10 @@ def test_a_blended_command_is_never_faster_and_equals_the_command_without_author
     assert replace(output, authority=0.0).blend_command(command).tolist() == command.tolist()
     assert output.blend_command(np.zeros(2)).tolist() == [0.0, 0.0]
     assert output.blend_command((0, 0.1)).tolist() == blended.tolist(), 'any sequence will do'
-    with pytest.raises(foc_ros.InputError, match=r'^command: expected two numbers \[m/s\], got \(0, 0\.1, 0\)'):
+    with pytest.raises(foc_ros.InputError, match=r'^command: expected finite numbers of shape \(2,\), got \(0, 0\.1, 0\)'):
         output.blend_command((0, 0.1, 0))
+    with pytest.raises(foc_ros.InputError, match=r'^command: expected numbers in .*, got .*nan'):
+        output.blend_command((np.nan, 0.1))
 
 
 def test_mirrored_input_gives_mirrored_guidance():

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from prediction_samples import outcome, prediction
+from prediction_samples import outcome, predict_aside, prediction
 
 from foc_ros.core.config import Config, GuidanceConfig
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
@@ -62,11 +62,7 @@ def test_ten_thousand_hostile_hands(batch):
 
 
 def build_guiding_state(config):
-    candidate = outcome('goal0:', 1.0)
-    mean = candidate.mean.copy()
-    mean[:, :2] = np.column_stack([np.linspace(0.0, 0.3, len(mean)), np.full(len(mean), 0.05)])
-    solution, state = replace(candidate.solution, mean=mean, covariance=np.zeros((len(mean), 6, 6))), GuidanceState()
-    newest = prediction(replace(candidate, solution=solution), stamp_ns=0)
+    newest, state = predict_aside(stamp_ns=0), GuidanceState()
     for tick in range(60):
         given = GuidanceInput(PERIOD * tick, np.zeros(2), np.zeros(2), newest)
         output, state = guide(config, state, given)

@@ -306,7 +306,7 @@ def test_without_time_each_goal_has_a_candidate_at_once_and_one_goal_after_the_o
 
 
 def test_without_time_previous_candidates_stay_unless_their_obstacles_or_goals_are_gone():
-    before = find(make_obstacles(CROWD[:4], 0.02), SIX_GOALS, k=12).candidates
+    before = find(make_obstacles(CROWD[:4], 0.02), SIX_GOALS, k=12, steps=20).candidates
     assert {each.goal for each in before} == set(range(6))
     same = search_within(-1.0, make_obstacles(CROWD[:4], 0.02), previous=before, k=12)
     assert {each.label for each in same.candidates} >= {each.label for each in before if each.goal}

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guidance of the node: its topics, its clutch, its diagnostics, and its rate while a prediction takes long."""
 
+import dataclasses
 import itertools
 import os
 import threading
@@ -15,12 +16,16 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, Wrench, WrenchStamped
 from message_helpers import SECOND, pose_stamped
 from node_helpers import TYPES, Bench, figures
 from play_helpers import until
+from prediction_samples import predict_aside
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
 
 from foc_ros.core import pipeline as pipelines
 from foc_ros.core.config import Config
+from foc_ros.core.guidance.guide import GuidanceOutput, GuidanceStatus
+from foc_ros.core.hand import kalman
+from foc_ros.core.types import HandSample
 from foc_ros.ros import guidance
 from foc_ros.ros.guidance import GuidanceLoop
 
@@ -173,6 +178,16 @@ def test_the_clutch_releases_the_hand_and_guidance_falls_silent(ros):
     assert bench.node._guidance.loop._thread is None, 'the thread has ended'
 
 
+@pytest.mark.parametrize('transitions', [['shutdown'], ['deactivate', 'cleanup']])
+def test_a_node_that_ends_leaves_no_force(ros, transitions):
+    bench = begin(ros)
+    bench.drive_until(lambda: np.hypot(*bench.forces[-1, :2]) > 0.1, 'a force')
+    for each in transitions:
+        getattr(bench.node, f'trigger_{each}')()
+    assert bench.node._guidance.loop._thread is None
+    ros.spin_until(lambda: not bench.forces[-2:].any(), 'a force of zero, twice', 5.0)
+
+
 def test_commands_are_blended_and_pass_unchanged_without_guidance(ros):
     bench = begin(ros)
 
@@ -186,6 +201,9 @@ def test_commands_are_blended_and_pass_unchanged_without_guidance(ros):
     # a hand that was silent on a busy machine, or is at a fork, is not guided for a moment
     bench.drive_until(is_blended, 'a command that is blended')
     assert bench.answer(0.0, 0.1, 'elsewhere').linear.x == 0.0
+    bench.drive_until(is_blended, 'a command that is blended')
+    assert bench.answer(np.nan, 0.1).linear.y == 0.1
+    assert bench.answer(np.inf, 0.1).linear.y == 0.1
     ros.spin_until(lambda: not bench.forces[-1].any(), 'the hand is released')
     ros.spin_until(lambda: bench.answer(0.0, 0.1).linear.x == 0.0, 'the command alone')
     assert bench.answer(0.0, 0.1).linear.x == 0.0
@@ -219,6 +237,61 @@ def test_neither_a_slow_prediction_nor_an_error_stops_guidance(ros, monkeypatch)
     assert int(figures(bench.health())['count internal_errors']) == 1
     bench.wrenches.clear()
     bench.drive_until(lambda: bool(bench.wrenches), 'guidance')
+
+
+@pytest.mark.parametrize('seconds', [-5.0, 0.02, 1.0], ids=['stamps go back', 'jump', 'gap'])
+def test_a_hand_that_restarts_elsewhere_takes_nothing_from_the_tank_and_is_not_guided_by_what_was_predicted_before(seconds):
+    config = Config().with_values({'guidance.enabled': True, 'guidance.clearance': 0.0})
+    published: list[GuidanceOutput] = []
+    loop = GuidanceLoop(config, lambda output, _: published.append(output), lambda _: None, lambda _: None)
+    loop.set_released(False)
+    state, now_s = None, 100.0
+
+    def move(position, stamps):
+        """Move the hand, and update guidance twice after each of its poses."""
+        nonlocal state, now_s
+        for stamp_s in stamps:
+            state = kalman.update(state, HandSample(round(stamp_s * SECOND), np.array(position)), config.estimator).state
+            loop.note_hand(state, now_s)
+            for _ in range(2):
+                loop.update(now_s)
+                now_s += 0.005
+
+    move((0.0, 0.0), [10.0])
+    loop.note_prediction(predict_aside(), now_s)
+    move((0.0, 0.0), 10.0 + 0.01 * np.arange(1, 20))
+    assert published[-1].force[1] > 2.0
+    guided = len(published)
+    move((0.0, 0.4), 10.19 + seconds + 0.01 * np.arange(14))  # 0.4 m in the direction of the force
+    assert {each.status for each in published[guided + 2 :]} == {GuidanceStatus.NO_PREDICTION}
+    sizes = np.hypot(*np.array([each.force for each in published[guided - 1 :]]).T)
+    assert sizes[-1] == 0.0 and np.abs(np.diff(sizes)).max() <= config.guidance.slew * 0.005 * (1 + 1e-9)
+    assert min(each.tank for each in published) > 0.4
+
+
+def test_the_state_is_told_without_a_force_and_the_clutch_fills_the_tank():
+    config = Config().with_values({'guidance.enabled': True})
+    loop = GuidanceLoop(config, lambda *_: None, lambda _: None, lambda _: None)
+
+    def tell(now_s):
+        loop.update(now_s)
+        return loop.describe()
+
+    assert tell(100.0)['guidance'] == 'no hand yet'
+    hand = kalman.update(None, HandSample(SECOND, np.array([0.1, 0.0])), config.estimator).state
+    loop.note_hand(hand, 100.0)
+    assert tell(100.005)['guidance'] == 'released'
+    loop.set_released(False)
+    assert tell(100.01)['guidance'] == 'no_prediction'
+    assert loop.output is not None and loop.output.position.tolist() == [0.1, 0.0]
+    loop.note_prediction(predict_aside(), 100.0)
+    loop._state = dataclasses.replace(loop._state, energy=0.01)
+    told = tell(100.015)
+    assert (told['guidance'], told['tank_J']) == ('guiding', '0.0100')
+    loop.set_released(True)
+    told = [tell(100.02 + 0.005 * tick) for tick in range(5)]
+    assert [each['guidance'] for each in told] == ['released'] * 5
+    assert told[-1]['tank_J'] == '0.5000'
 
 
 PRIORITY_CONFIG = Config().with_values({'guidance.enabled': True, 'guidance.realtime_priority': 7})

@@ -12,7 +12,7 @@ from reach_helpers import make_predictor
 import foc_ros
 from foc_ros.core import pipeline as module
 from foc_ros.core.config import Config, replace_values
-from foc_ros.core.deadline import NEVER
+from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline, SampleStatus
@@ -96,6 +96,17 @@ def test_markers_from_before_the_working_frame_was_known_are_forgotten_if_they_a
     move(intake, 1.0)
     show(intake, marker(BAGS, id=2))
     assert seen(intake) == ('a/2',)
+
+
+def test_other_steps_count_at_once_also_where_there_is_no_time_to_search():
+    pipeline = ready()
+    pipeline.add_hand_sample(hand(0.0))
+    before = pipeline.predict()
+    pipeline.reconfigure(replace_values(CONFIG, {'foc.steps': 10}))
+    pipeline.add_hand_sample(hand(20.0))
+    after = pipeline.predict(Deadline(0.0))
+    assert before is not None and after is not None and len(before) == 2
+    assert [len(each.mean) for each in after] == [11] * len(after)
 
 
 def test_a_marker_expires_by_the_stamp_of_the_hand(intake):

@@ -270,6 +270,16 @@ def test_a_trial_is_scored():
     assert tabulate_scores([score]) == [('without guidance', '1', *numbers)]
 
 
+def test_a_pose_that_is_refused_is_no_sign_of_the_hand():
+    """The age of the hand, at which guidance releases it, is that of the last pose that was used."""
+    predictor = Predictor(Config(), lambda _: None)
+    pose = encode_hand_pose(TYPES, NOW_NS, 'play', (0.0, 0.0, 0.0))
+    predictor._take('hand_pose', pose)
+    noted = predictor._guidance.newest
+    predictor._take('hand_pose', pose)
+    assert predictor._guidance.newest is noted
+
+
 def test_the_state_is_well_only_while_predictions_succeed():
     """It fails where the pipeline fails, no path is found, all paths are from before, or the thread is gone."""
     predictor = Predictor(Config(budget_s=0.0), lambda _: None)

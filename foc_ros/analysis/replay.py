@@ -15,10 +15,11 @@ from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import ONLINE, Config
 from foc_ros.core.errors import MessageError, RecordingError, warn
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
+from foc_ros.core.hand.kalman import FilterState
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import Scene
-from foc_ros.core.types import NANOSECONDS, HandSample, HandState, SampleStatus
+from foc_ros.core.types import NANOSECONDS, HandSample, SampleStatus
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
@@ -166,7 +167,7 @@ class GuidanceReplay:
         self._pipeline = pipeline
         self._period_ns = round(NANOSECONDS / pipeline.config.guidance.rate_hz)
         self._state, self._first_ns, self._next_ns = GuidanceState(), 0, 0
-        self._hand: HandState | None = None
+        self._hand: FilterState | None = None
         self._prediction: Prediction | None = None
 
     def add(self, step: Step) -> Iterator[GuidanceStep]:
@@ -178,11 +179,13 @@ class GuidanceReplay:
             self._state, self._first_ns, self._next_ns, self._prediction = GuidanceState(), stamp_ns, stamp_ns, None
         else:
             yield from self._update_until(stamp_ns, self._hand)
+            if hand is not None and not self._hand.is_continued_by(hand):
+                self._state, self._prediction = replace(self._state, position=hand.mean[:2]), None
         self._hand = hand
         if step.prediction is not None:
             self._prediction = step.prediction
 
-    def _update_until(self, end_ns: int, hand: HandState) -> Iterator[GuidanceStep]:
+    def _update_until(self, end_ns: int, hand: FilterState) -> Iterator[GuidanceStep]:
         config, prediction = self._pipeline.config, self._prediction
         while self._next_ns < end_ns:
             prediction_ns = self._next_ns if prediction is None else prediction.stamp_ns
@@ -193,7 +196,7 @@ class GuidanceReplay:
             output, self._state = guide(config, self._state, given)
             yield GuidanceStep(self._next_ns, SampleHeader(hand.stamp_ns, hand.frame_id, hand.height, config.plane), output)
             self._next_ns += self._period_ns
-            if output.status is GuidanceStatus.STALE and not output.force.any() and not output.authority:
+            if output.status is not GuidanceStatus.GUIDING and not output.force.any() and not output.authority:
                 self._next_ns = max(self._next_ns, end_ns)
                 self._state = replace(self._state, t=(self._next_ns - self._first_ns) / NANOSECONDS)
 

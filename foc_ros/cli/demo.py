@@ -28,7 +28,7 @@ from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io import topics
 from foc_ros.io.bags import TYPESTORE, BagReader, BagWriter, Item
-from foc_ros.io.outputs import make_folder
+from foc_ros.io.outputs import lock_folder, make_folder
 from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
 from foc_ros.reporting.report import ReportCollector, describe_late
@@ -102,13 +102,17 @@ class Recorder(ReportCollector):
         return f'{progress}   hand samples {poses}/s, predictions {predictions}/s, delay {delay_ms:.0f} ms'
 
 
-def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -> int:
+def perform(output: Path, last_s: float = np.inf) -> int:
     """Run the demo; return 1 if the node fails, 130 after an interrupt. last_s: seconds of the recording to play."""
-    with BagReader(recording) as reader:
+    with BagReader(RECORDING) as reader:
         items = list(reader)
     items = [item for item in items if item.log_ns - items[0].log_ns <= last_s * NANOSECONDS]
+    with prepare(output):
+        return _play_and_report(items, output)
+
+
+def _play_and_report(items: list[Item], output: Path) -> int:
     recorder = Recorder(Config())
-    prepare(output)
     print('The node starts ...', flush=True)
     try:
         with _catch_interrupts() as stopped, BagWriter(output / 'bag') as bag:
@@ -140,15 +144,24 @@ def perform(output: Path, recording: Path = RECORDING, last_s: float = np.inf) -
     return 0
 
 
-def prepare(output: Path) -> None:
-    """Make the output directory and remove bag and report of an earlier demo; refuse a directory with other contents."""
+@contextmanager
+def prepare(output: Path) -> Iterator[None]:
+    """Make the output directory and remove bag and report of an earlier demo; no other demo has it within the context.
+
+    Raises InputError for a directory with other contents, and for that of a demo that runs.
+    """
     if output.exists() and not (output / MARK).exists() and (not output.is_dir() or any(output.iterdir())):
         raise InputError('--output', 'a new or empty directory, or one of an earlier demo', f'{output}, which has other contents')
     with make_folder('--output', output):
         (output / MARK).write_text('The next demo replaces bag and report beside this file.\n', encoding='utf-8')
-        for name in ('bag', 'report'):
-            if (output / name).exists():
-                shutil.rmtree(output / name)
+    try:
+        with lock_folder(output, waits=False):
+            for name in ('bag', 'report'):
+                if (output / name).exists():
+                    shutil.rmtree(output / name)
+            yield
+    except BlockingIOError as error:
+        raise InputError('--output', 'the directory of a demo that has ended', f'{output}, where one runs') from error
 
 
 def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: threading.Event) -> None:

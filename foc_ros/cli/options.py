@@ -25,7 +25,7 @@ import foc_ros
 from foc_ros.analysis.simulation import ASSISTANCE, OPERATORS
 from foc_ros.core.config import ONLINE, Config
 from foc_ros.core.errors import InputError, collect_all, suggest
-from foc_ros.io.outputs import check_file, check_page
+from foc_ros.io.outputs import check_file, check_new_or_earlier, check_page
 from foc_ros.io.topics import TYPES
 from foc_ros.ros.parameters import load_parameter_file
 
@@ -132,9 +132,10 @@ class Learning:
 
     def check(self, config: Config) -> None:
         """Raise InputError for a file that cannot be written, and for two class libraries."""
-        for option, file in (('--learn', self.learn), ('--operator', self.operator)):
-            if file is not None:
-                check_file(option, file)
+        if self.learn is not None:
+            check_file('--learn', self.learn)
+        if self.operator is not None:
+            check_new_or_earlier('--operator', self.operator, load_parameter_file)
         library = config.homotopy.library
         if self.learn is not None and library and Path(library) != self.learn:
             raise InputError('--learn', 'no other class library in homotopy.library', library)

@@ -13,7 +13,7 @@ from typing import Any
 
 from foc_ros.analysis.simulation import ASSISTANCE, HUMAN_PATHS, OPERATORS
 from foc_ros.core.errors import InputError, RecordingError
-from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE, check_file, check_folder
+from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE, check_folder, check_new_or_earlier
 
 from . import options
 from .options import PLAIN, RECORDINGS, Data, Existing, Study, app, warn_all
@@ -29,15 +29,14 @@ def learn(data: Data, /, *, output: Path, params: options.Params = options.DEFAU
         Class library to write, for homotopy.library; an earlier one is replaced.
     """
     from foc_ros.analysis.recordings import find_recordings
-    from foc_ros.io.class_library import MOST_WAYS
+    from foc_ros.io.class_library import MOST_WAYS, load_library, save_library
 
-    check_file('--output', output)
+    check_new_or_earlier('--output', output, lambda file: load_library(str(file)))
     recordings = find_recordings(data)
     if len(recordings) > MOST_WAYS:
         raise InputError(f'{data}', f'at most {MOST_WAYS} recordings', len(recordings))
     from foc_ros.analysis.parallel import collect
     from foc_ros.analysis.replay import learn_recording
-    from foc_ros.io.class_library import save_library
 
     movements, failed = collect(partial(learn_recording, config=params), list(recordings.items()), 'learn')
     learnt = [each for found in movements for each in found]
@@ -62,13 +61,13 @@ def fit(data: Data, /, *, output: Path, allow: options.Allowed = (), study: Stud
         positions, parameters are written even if predicted positions become worse.
     """
     from foc_ros.analysis.recordings import find_recordings
+    from foc_ros.ros.parameters import load_parameter_file, write_parameter_file
 
-    check_file('--output', output)
+    check_new_or_earlier('--output', output, load_parameter_file)
     study.check(FIT_PAGE)
     recordings = find_recordings(data)
     write_report = study.load_report('fit')
     from foc_ros.analysis.fitting import fit as fitting
-    from foc_ros.ros.parameters import write_parameter_file
 
     with study.open_workers():
         found = fitting.fit_parameters(recordings, study.params, may_lower_eta='eta' in allow)

@@ -220,7 +220,7 @@ class GuidanceConfig(Group):
         0.012, 'distance that guidance keeps the hand from obstacles: no force farther away; 0: force everywhere', 'm', 0.0, 1.0
     )
     margin: float = param(0.002, 'distance from every obstacle within which no force leads towards it', 'm', 0.0, 1.0)
-    tank: float = param(0.5, 'capacity and first content of the energy tank: most energy that guidance gives', 'J', 0.0, 1e3)
+    tank: float = param(0.5, 'energy tank: most energy that guidance gives; the clutch fills it again', 'J', 0.0, 1e3)
     max_speed: float = param(1.0, 'speed of the fastest hand, for which tank and margins are guaranteed', 'm/s', 0.01, 100.0)
     hold_s: float = param(0.25, 'age of the newest pose or prediction after which the force is released', 's', 0.001, 10.0)
     ramp_s: float = param(0.1, 'time within which a released force becomes zero', 's', 0.001, 10.0)

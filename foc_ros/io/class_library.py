@@ -7,9 +7,7 @@ from __future__ import annotations
 import json
 import os
 import reprlib
-import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +18,7 @@ from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.support import check_array
 
 from .documents import MAX_BYTES, read_document
+from .outputs import lock_folder
 
 SIDES = {'left': LEFT, 'right': RIGHT}
 MOST_WAYS, MOST_OBSTACLES = 500, 4096
@@ -58,10 +57,13 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
     text = json.dumps({'ways': rows}, allow_nan=False) + '\n'
     if len(text) > MAX_BYTES:
         raise InputError(f'{file}: ways', f'at most {MAX_BYTES:,} bytes', f'{len(text):,} of {len(ways)} ways')
-    unfinished = file.with_name(f'{file.name}.{os.getpid()}.unfinished')  # another process may write its own
+    target = file.resolve()  # a link stays
+    if target.exists() and not target.is_file():
+        raise RecordingError(f'{file}: cannot be written: it is no regular file')
+    unfinished = target.with_name(f'{target.name}.{os.getpid()}.unfinished')  # another process may write its own
     try:
         unfinished.write_text(text, encoding='utf-8')
-        unfinished.replace(file)
+        unfinished.replace(target)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
         raise RecordingError(f'{file}: cannot be written: {error.strerror}') from error
@@ -73,28 +75,11 @@ def extend_library(file: Path, ways: Sequence[Demonstration]) -> int:
     Processes that do so at once wait for each other, so that the file has what all of them add. Raises as `load_library` and
     `save_library` do.
     """
-    with _lock(file.parent):
+    with lock_folder(file.resolve().parent):
         given = load_library(str(file)) if file.exists() else ()
         new = [each for each in ways if not any(is_same_recording(each, known) for known in given)]
         save_library(file, [*given, *new])
     return len(new)
-
-
-@contextmanager
-def _lock(folder: Path) -> Iterator[None]:
-    """Let one process at a time continue for a folder, where its system and its file system can; a lock ends with its process."""
-    if sys.platform == 'win32':
-        yield
-        return
-    import fcntl
-
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError):
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def _read_demonstration(field: str, way: object) -> Demonstration:

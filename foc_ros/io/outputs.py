@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from foc_ros.core.errors import InputError
+from foc_ros.core.errors import FocError, InputError
 
 MARK = 'made by foc_ros'
 """Text that every picture and page contains that a command writes."""
@@ -25,6 +26,19 @@ def check_file(option: str, file: Path) -> None:
         raise InputError(option, 'a file in a directory that exists', file)
     if not os.access(file if file.exists() else file.resolve().parent, os.W_OK):
         raise InputError(option, 'a file that can be written', file)
+
+
+def check_new_or_earlier(option: str, file: Path, read: Callable[[Path], object]) -> None:
+    """Raise InputError, which names the option, as `check_file` does, or if a file exists that is no earlier one of the command.
+
+    read: reads an earlier one; raises FocError for another file.
+    """
+    check_file(option, file)
+    try:
+        if file.is_file() and file.stat().st_size:
+            read(file)
+    except FocError as error:
+        raise InputError(option, 'a new file, or an earlier one of this kind', error) from error
 
 
 def check_folder(option: str, directory: Path) -> None:
@@ -44,6 +58,30 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(option, 'a folder that can be written', f'{directory}: {error.strerror}') from error
+
+
+@contextmanager
+def lock_folder(folder: Path, *, waits: bool = True) -> Iterator[None]:
+    """Let one process at a time continue for a folder, where its system and its file system can; a lock ends with its process.
+
+    Raises BlockingIOError where another process has the lock, unless it `waits`.
+    """
+    if sys.platform == 'win32':
+        yield
+        return
+    import fcntl
+
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX if waits else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise
+        except OSError:
+            pass
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def check_picture(option: str, file: Path) -> None:

@@ -109,8 +109,8 @@ class Predictor:
                 self._intake.pipeline.reset()
 
     def _take(self, role: str, message: Any) -> None:
-        self._intake.take(role, message)
-        if role == HAND:
+        status = self._intake.take(role, message)
+        if role == HAND and status is not None and status.is_taken:
             self._guidance.note_hand(self._intake.pipeline.hand_state, monotonic())
 
     def _predict(self) -> None:

@@ -9,23 +9,24 @@ disabled, the thread waits without updates. The loop needs no ROS; `play` uses i
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from time import monotonic
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from foc_ros.core.config import Config
+from foc_ros.core.errors import InputError
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
 from foc_ros.core.hand.kalman import FilterState
 from foc_ros.core.prediction import Prediction
 from foc_ros.io.topics import COMMAND
 
 from .health import THROTTLE_S
-from .messages.decode_poses import decode_frame
 from .messages.encode_guidance import (
     GUIDANCE_OUTPUTS,
     LIVE_OUTPUTS,
@@ -68,9 +69,9 @@ class Newest:
 class GuidanceLoop:
     """Updates guidance, and publishes it until the force has become zero, and then once more.
 
-    Attributes: newest; output, the last one, and place, that of the last one that was published, None before the first. Called in
-    the thread: publish, with each output and the place where it holds; report, with an exception of an update, after which
-    guidance begins anew with a force of zero; warn, with a text if it may not have its priority, the first time.
+    Attributes: newest; output, the last one; sample_header, that of the last one that was published; None before the first.
+    Called in the thread: publish, with each output and its header; report, with an exception of an update, after which guidance
+    begins anew with a force of zero; warn, with a text if it may not have its priority, the first time.
     """
 
     def __init__(
@@ -87,12 +88,15 @@ class GuidanceLoop:
         self._priority = self._wanted_priority = 0
         self._has_warned = False
         self._state, self._zeros = GuidanceState(), ZEROS
-        self._end, self._enabled = threading.Event(), threading.Event()
+        self._hand: FilterState | None = None  # of the last update
+        self._end_s, self._enabled = math.inf, threading.Event()
         self._thread: threading.Thread | None = None
 
     def note_hand(self, hand: FilterState | None, now_s: float) -> None:
-        """Use a new estimate of the hand; None if there is none any more."""
-        self.newest = replace(self.newest, hand=hand, hand_s=now_s, prediction=self.newest.prediction if hand else None)
+        """Use a new estimate of the hand; None if there is none any more. After a restart, only new predictions count."""
+        before = self.newest.hand
+        prediction = self.newest.prediction if before is not None and before.is_continued_by(hand) else None
+        self.newest = replace(self.newest, hand=hand, hand_s=now_s, prediction=prediction)
 
     def note_prediction(self, prediction: Prediction, received_s: float) -> None:
         """Use a new prediction; received_s: when its hand pose was received."""
@@ -112,17 +116,20 @@ class GuidanceLoop:
 
     def start(self) -> None:
         """Begin to update."""
-        self._end.clear()
+        self._end_s = math.inf
         self.reconfigure(self.newest.config)
         self._thread = threading.Thread(target=self._run, name='guidance', daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread. Nothing is published after that."""
-        self._end.set()
+        """Release the hand, and end the thread once there is no force. Nothing is published after that."""
+        self.set_released(True)
+        settings = self.newest.config.guidance
+        longest_s = settings.ramp_s + (ZEROS + 2) / settings.rate_hz + 1.0  # an update may be late
+        self._end_s = monotonic() + longest_s
         self._enabled.set()
         if self._thread is not None:
-            self._thread.join(1.0)
+            self._thread.join(longest_s + 1.0)
             self._thread = None
         self._state, self._zeros = GuidanceState(), ZEROS
 
@@ -131,7 +138,7 @@ class GuidanceLoop:
         output, settings = self.output, self.newest.config.guidance
         if not settings.enabled:
             return {'guidance': 'disabled'}
-        if output is None:
+        if output is None or self.newest.hand is None:
             return {'guidance': 'no hand yet'}
         return {
             'guidance': output.status.value,
@@ -144,13 +151,13 @@ class GuidanceLoop:
 
     def update(self, now_s: float) -> None:
         """Compute guidance at a time by the steady clock, and publish it; called in the thread."""
-        newest = self.newest
+        newest, before = self.newest, self._hand
         is_released = newest.is_released or not newest.config.guidance.enabled
         mean = newest.hand.mean if newest.hand is not None else np.concatenate([self._state.position, np.zeros(4)])
         position, velocity, acceleration = mean.reshape(3, 2)
-        if self._zeros >= ZEROS and (is_released or newest.prediction is None):
-            self._state = replace(self._state, t=now_s, position=position)
-            return
+        self._hand = newest.hand
+        if before is None or not before.is_continued_by(newest.hand):
+            self._state = replace(self._state, position=position)  # the hand did not move there: that is no work
         ages = now_s - newest.hand_s, now_s - newest.prediction_s
         given = GuidanceInput(now_s, position, velocity, newest.prediction, *ages, is_released, acceleration)
         self.output, self._state = guide(newest.config, self._state, given)
@@ -160,11 +167,14 @@ class GuidanceLoop:
             self.sample_header = newest.sample_header or self.sample_header
             if self.sample_header is not None:
                 self._publish(self.output, self.sample_header)
+        elif is_released:
+            self._state = GuidanceState()  # with a full tank
 
     def _run(self) -> None:
         """Update once in a period; a late update shifts the following ones."""
         due_s = monotonic()
-        while not self._end.wait(max(due_s - monotonic(), 0.0)):
+        while self._end_s == math.inf or (self._zeros < ZEROS and monotonic() < self._end_s):
+            sleep(max(due_s - monotonic(), 0.0))
             if self._zeros >= ZEROS and not self._enabled.is_set():
                 self._set_priority(0)
                 self._enabled.wait()
@@ -224,12 +234,10 @@ class GuidanceTopics:
         if not config.guidance.enabled:
             return
         if output is not None and header is not None and monotonic() - output.t <= config.guidance.hold_s:
-            frame_id = decode_frame(command.header)
-            if frame_id == header.frame_id:
-                command = blend_twist(output, command, config.plane, types)
-            else:
-                text = f'{COMMAND}: frame {frame_id!r} is not the working frame {header.frame_id!r}: not blended'
-                self._node.get_logger().warning(text, throttle_duration_sec=THROTTLE_S)
+            try:
+                command = blend_twist(output, header, command, types)
+            except InputError as error:
+                self._node.get_logger().warning(f'{COMMAND} is not blended: {error}', throttle_duration_sec=THROTTLE_S)
         self._publish(TWIST, command)
 
     def _publish_output(self, output: GuidanceOutput, header: SampleHeader) -> None:

@@ -68,7 +68,7 @@ class SearchScene:
     names : Names
         How the obstacles that are near count.
     known : list[PathClass]
-        The classes of the previous prediction that still fit the scene, in the order of their length.
+        The classes of the previous prediction that still fit the scene and the steps, in the order of their length.
     notes : Counter[str]
         Counts of what is decided, see `search.Search`.
     """
@@ -95,7 +95,7 @@ class SearchScene:
         self._clearance, self._max_states = config.clearance, STATES + STATES_PER_CANDIDATE * config.max_candidates
         blocks = ~find_holders(goals, self._now, objects, duration_s)
         self.names = find_names(self._hand, self._goals, self._near, blocks, config.clearance, previous)
-        ids, fitting = {*obstacles.ids}, [each for each in previous if each.goal < len(goals)]
+        ids, fitting = {*obstacles.ids}, [each for each in previous if each.goal < len(goals) and len(each.guess) == steps + 1]
         known = [PathClass(each.length, each.label, each.goal, each.sides, each.guess, each) for each in fitting]
         self.known = sorted([each for each in known if each.named <= ids], key=lambda each: each[:2])
         self.notes = Counter(

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from foc_ros.core.config import Config, GuidanceConfig
-from foc_ros.core.errors import InputError
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.prediction import Prediction
+from foc_ros.core.support import check_vector
 from foc_ros.core.types import Array, Record
 
 from .limits import (
@@ -121,11 +121,10 @@ class GuidanceOutput(Record):
     def blend_command(self, command: ArrayLike) -> Array:
         """Return (1 - A) u + A |u| h (2,) for an operator's velocity command u (2,), the authority A and the heading h.
 
-        It is never faster than the command, and equal to it where the authority is 0. InputError is raised for a wrong shape.
+        It is never faster than the command, and equal to it where the authority is 0. InputError is raised for a wrong shape or
+        a number that is not finite.
         """
-        wanted = np.asarray(command, dtype=float)
-        if wanted.shape != (2,):
-            raise InputError('command', 'two numbers [m/s]', repr(command))
+        wanted = check_vector('command', command, 2)
         blended: Array = (1.0 - self.authority) * wanted + self.authority * float(np.hypot(*wanted)) * self.heading
         return blended
 
@@ -251,8 +250,9 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
     In mode `path` there is no force along the direction of the hand, which is that of the path where the hand is at rest. Near
     the end of a path, h is the time to its end. With h = 0 this is f_i = K_i (x_i - x).
     """
-    paths, progress, speed = followed.paths, followed.progress, float(np.hypot(*given.velocity))
-    assert paths is not None
+    prediction, paths, progress = followed.prediction, followed.paths, followed.progress
+    speed = float(np.hypot(*given.velocity))
+    assert prediction is not None and paths is not None
     need = find_need(settings, followed.zones, given.position, given.velocity)
     ahead = np.minimum(progress + need.time_s * speed, paths.lengths[:, -1])
     times = np.minimum(need.time_s, (ahead - progress) / max(speed, 1e-9))
@@ -263,9 +263,8 @@ def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMarg
         stiffness = project_out(stiffness, normalize(given.velocity + 0.02 * paths.find_tangents(progress)))
     points = keep_clear(settings, followed.obstacles, paths.interpolate(paths.points, places))
     errors = saturate(settings, points - given.position - times[:, None] * given.velocity, need.share)
-    shares = () if followed.prediction is None else (followed.prediction.unknown, followed.prediction.other)
     forces = (stiffness @ errors[..., None])[..., 0]
-    weights = weigh_candidates(paths.likelihoods, forces, given.acceleration, *shares)
+    weights = weigh_candidates(paths.likelihoods, forces, given.acceleration, prediction.unknown, prediction.other)
     force, agreement = combine(weights, forces, find_crossing(need, errors))
     places = paths.locate(np.maximum(ahead, progress + HEADING_M))
     heading = paths.likelihoods @ normalize(paths.interpolate(paths.points, places) - given.position)

@@ -51,11 +51,17 @@ JUMP_SPEED = 5.0
 class FilterState(HandState):
     """A hand state with the internal state of the filter.
 
-    root (3, 3): lower triangular root of the covariance of one axis; jumped: the last sample, if its position jumped.
+    root (3, 3): lower triangular root of the covariance of one axis; jumped: the last sample, if its position jumped; restarts:
+    how often the filter has started anew.
     """
 
     root: Array = field(default_factory=lambda: np.zeros((3, 3)))
     jumped: HandSample | None = None
+    restarts: int = 0
+
+    def is_continued_by(self, later: FilterState | None) -> bool:
+        """Return whether there is a later state, and the filter has not started anew in between."""
+        return later is not None and later.restarts == self.restarts
 
 
 @dataclass(frozen=True)
@@ -91,16 +97,16 @@ def update(state: FilterState | None, sample: HandSample, config: EstimatorConfi
     if dt == 0.0:
         return Update(state, SampleStatus.DUPLICATE)
     if dt < -config.gap_s:
-        return Update(_start_state(sample, config), SampleStatus.RESTARTED_BACKWARD)
+        return Update(_start_state(sample, config, state.restarts + 1), SampleStatus.RESTARTED_BACKWARD)
     if dt < 0.0:
         return Update(state, SampleStatus.LATE)
     if dt > config.gap_s:
-        return Update(_start_state(sample, config), SampleStatus.RESTARTED_GAP)
+        return Update(_start_state(sample, config, state.restarts + 1), SampleStatus.RESTARTED_GAP)
     away_m, limit_m = measure_jump(state, sample, config)
     if state.jumped is not None and state.jumped.stamp_ns < sample.stamp_ns:
         jumped_m, jumped_limit_m = measure_jump(_start_state(state.jumped, config), sample, config)
         if jumped_m < away_m and jumped_m <= jumped_limit_m:
-            return Update(_start_state(sample, config), SampleStatus.RESTARTED_JUMP)
+            return Update(_start_state(sample, config, state.restarts + 1), SampleStatus.RESTARTED_JUMP)
     if away_m > limit_m:
         return Update(replace(state, jumped=sample), SampleStatus.JUMPED)
     return Update(_update_state(state, sample, dt, config), SampleStatus.ACCEPTED)
@@ -143,14 +149,14 @@ def expand_to_both_axes(covariance: Array) -> Array:
     return both
 
 
-def _start_state(sample: HandSample, config: EstimatorConfig) -> FilterState:
+def _start_state(sample: HandSample, config: EstimatorConfig, restarts: int = 0) -> FilterState:
     """Return the state after a first position."""
     root = np.zeros((3, 3))
     root[0, 0] = config.position_stddev
     root[1:, 1:] = config.jerk_density * np.linalg.cholesky(compute_gramian(config.gap_s)[1:, 1:])
     mean, height_mean = np.concatenate([sample.position, np.zeros(4)]), np.array([sample.height, 0.0, 0.0])
     hand = sample.stamp_ns, mean, expand_to_both_axes(root @ root.T), sample.height, sample.frame_id
-    return FilterState(*hand, height_mean=height_mean, root=root)
+    return FilterState(*hand, height_mean=height_mean, root=root, restarts=restarts)
 
 
 _UNIT_ROOT = np.linalg.cholesky(compute_gramian(1.0))
@@ -173,7 +179,7 @@ def _update_state(state: FilterState, sample: HandSample, dt: float, config: Est
     mean, height_mean, covariance, root = map(as_readonly, found)
     onset_ns, onset_position = _update_movement(state, sample.stamp_ns, mean, covariance, config)
     hand = sample.stamp_ns, mean, covariance, sample.height, sample.frame_id
-    return FilterState(*hand, onset_ns, onset_position, height_mean, root)
+    return FilterState(*hand, onset_ns, onset_position, height_mean, root, restarts=state.restarts)
 
 
 def _update_movement(

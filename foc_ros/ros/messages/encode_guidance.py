@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from foc_ros.core.errors import MessageError
 from foc_ros.core.guidance.guide import GuidanceOutput
 
+from .decode_poses import decode_frame
 from .encode_inputs import NO_ROTATION, encode_array, encode_hand_pose
 from .plane import lift, project
 from .types import MessageTypes, make_header
@@ -52,11 +54,16 @@ def encode_stiffness(output: GuidanceOutput, sample: SampleHeader, types: Messag
     return encode_array(types, axes.T @ output.stiffness @ axes, (('row', 3, 9), ('column', 3, 3)))
 
 
-def blend_twist(output: GuidanceOutput, command: Any, plane: str, types: MessageTypes) -> Any:
-    """Return a geometry_msgs/TwistStamped command with the part in the plane blended; the rest of it is kept."""
-    linear = command.twist.linear
-    velocity, across = project([linear.x, linear.y, linear.z], plane)
-    blended = lift(output.blend_command(velocity), across, plane)
+def blend_twist(output: GuidanceOutput, sample: SampleHeader, command: Any, types: MessageTypes) -> Any:
+    """Return a geometry_msgs/TwistStamped command with the part in the plane blended; the rest of it is kept.
+
+    Raises InputError for a command in another frame, and for a number that is not finite.
+    """
+    frame_id, linear = decode_frame(command.header), command.twist.linear
+    if frame_id != sample.frame_id:
+        raise MessageError('header.frame_id', f'the working frame {sample.frame_id!r}', repr(frame_id))
+    velocity, across = project([linear.x, linear.y, linear.z], sample.plane)
+    blended = lift(output.blend_command(velocity), across, sample.plane)
     return types.fill('geometry_msgs/msg/TwistStamped', (command.header, (blended, command.twist.angular)))
 
 
