@@ -127,7 +127,7 @@ def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(monk
     known = {each.way: each for each in ask().candidates}
     let_fail(monkeypatch, number, status)
     found = ask()
-    (failed,) = [each for each in found.candidates if 'estimated from the path' in each.solution.message]
+    (failed,) = [each for each in found.candidates if 'length of its path' in each.solution.message]
     assert failed.way == number and failed.status is Status.ESTIMATED and len(found.candidates) == 4
     # classes that are so unlikely that they go on in the next prediction are estimated too
     assert found.notes['estimated'] == sum(each.status is Status.ESTIMATED for each in found.candidates)

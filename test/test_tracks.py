@@ -250,8 +250,10 @@ def test_every_class_has_a_likelihood_whenever_the_time_ends(name):
 @pytest.mark.parametrize('name', SCENES)
 def test_with_time_for_one_step_no_class_of_a_guess_becomes_unlikely(name):
     expected = find_shares(predicted(0, NO_TRACKS, obstacles=SCENES[name])[0])
-    found = find_shares(predicted(0, NO_TRACKS, Counted(0), SCENES[name])[0])
+    prediction = predicted(0, NO_TRACKS, Counted(0), SCENES[name])[0]
+    found = find_shares(prediction)
     assert found.keys() == expected.keys()
+    assert all(each.solution.message.count('estimated') == 1 for each in prediction.candidates)
     assert all(found[label] > 0.3 * share for label, share in expected.items() if share > 0.05), (found, expected)
 
 

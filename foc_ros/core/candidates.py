@@ -179,7 +179,7 @@ def _estimate(candidate: PredictedCandidate, known: PredictedCandidate) -> Predi
     estimated = replace(
         failed,
         status=failed.status if failed.status is Status.DEADLINE else Status.ESTIMATED,
-        message=f'{failed.message}; estimated from the path that the search has found',
+        message=f'{failed.message}; its effort follows from the length of its path',
         mean=mean,
         effort=effort,
         expected=effort,
