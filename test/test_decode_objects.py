@@ -92,8 +92,8 @@ def test_what_is_no_shape_is_counted():
         (collision_object((BOX, (1, -1, 1), (0, 0, 0))), 'primitives[0].dimensions[1]: expected a size in [0, 10000] m, got -1'),
         (collision_object((SPHERE, (math.nan,), (0, 0, 0))), 'primitives[0].dimensions[0]: expected a size in [0, 10000] m'),
         (collision_object((BOX, (0, 0, 0), (0, 0, 0))), 'primitives[0].dimensions: expected a size > 0 m, got 0'),
-        (collision_object((SPHERE, (1,), (0, 2e4, 0))), 'primitive_poses[0].position.y: expected a coordinate within 10000 m'),
-        (collision_object(turned={'w': math.nan}), 'pose.orientation.w: expected a finite number [m], got nan'),
+        (collision_object((SPHERE, (1,), (0, 2e4, 0))), 'primitive_poses[0].position.y: expected a number from -10000 to 10000 [m]'),
+        (collision_object(turned={'w': math.nan}), 'pose.orientation.w: expected a finite number, got nan'),
         (collision_object((SPHERE, (1,), (0, 0, 0)), primitive_poses=[]), 'primitive_poses: expected 1, one for each primitive'),
         (collision_object(name='chair', operation=3), "id: expected an object that was added before it is moved, got 'chair'"),
         (collision_object(frame_id='base'), "header.frame_id: expected 'world', as the other objects, got 'base'"),
@@ -126,7 +126,7 @@ def test_detections_that_are_not_finite_or_repeated_are_dropped():
     [
         (detection((0, 0, 0), (1, -1, 1)), 'detections[0].bbox.size.y: expected a size in [0, 10000] m, got -1'),
         (detection((0, 0, 0), (0, 0, 1)), 'detections[0].bbox.size: expected a size > 0 m along an axis of the plane'),
-        (detection((2e4, 0, 0), (1, 1, 1)), 'detections[0].bbox.center.position.x: expected a coordinate within 10000 m'),
+        (detection((2e4, 0, 0), (1, 1, 1)), 'detections[0].bbox.center.position.x: expected a number from -10000 to 10000 [m]'),
         (detection((0, 0, 0), (1, 1, 1), frame_id='base'), "detections[0].header.frame_id: expected 'world', as the array"),
     ],
 )  # fmt: skip
@@ -214,7 +214,7 @@ def test_the_position_0_without_an_orientation_means_no_data(types, turn):
         (math.nan, r'expected a finite number \[m\], got nan'),
         (math.inf, r'expected a finite number \[m\], got inf'),
         (-math.inf, r'expected a finite number \[m\], got -inf'),
-        (1.1e4, r'expected a coordinate within 10000 m of the origin, got 11000'),
+        (1.1e4, r'expected a number from -10000 to 10000 \[m\], got 11000'),
     ],
 )
 def test_a_coordinate_that_is_not_finite_or_too_large_is_refused(types, axis, value, words):

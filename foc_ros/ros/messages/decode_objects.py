@@ -275,7 +275,7 @@ def _is_finite(pose: Any, size: Any, *, is_turned: bool) -> bool:
 
 def _read_pose(name: str, pose: Any, transform: Transform = NO_TRANSFORM) -> Transform:
     """Return a pose after a transform, if its numbers are within their bounds."""
-    check_coordinates(f'{name}.orientation', [*_read(pose.orientation), pose.orientation.w])
+    check_coordinates(f'{name}.orientation', [*_read(pose.orientation), pose.orientation.w], unit='')
     position = decode_point(pose.position, f'{name}.position', transform)
     return Transform(transform.rotation @ compute_rotation(pose.orientation), position)
 
