@@ -27,7 +27,7 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording, group_by_operator
-from foc_ros.analysis.replay import Replay, Step
+from foc_ros.analysis.replay import Replay, Step, keep_last_run
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows, tabulate_sides
 from foc_ros.core.classes.sides import BranchTimes, compute_branch_times, measure_passages
 from foc_ros.core.config import Config, replace_values
@@ -143,10 +143,7 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
     made: list[tuple[Step, HandState, Config]] = []
     for step in replayed.steps(recording.items()):
         if step.sample is not None:
-            if samples and step.sample.stamp_ns <= samples[-1].stamp_ns:  # the recording begins anew
-                samples.clear()
-                made.clear()
-            samples.append(step.sample)
+            keep_last_run(samples, step.sample, made)
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state, replayed.pipeline.adapted_config))
