@@ -149,6 +149,8 @@ def test_classes_are_followed_to_goals_that_have_other_rows_in_the_next_message(
 
     known = follow([0, 1, 2])
     assert follow(rows) == {(goal, sides): way for (goal, sides), way in known.items() if goal in rows}
+    # a goal that had no time is searched first, in whatever row it is now
+    assert replace(NO_TRACKS, goals=places, next_goal=1).keep_goals(places[rows]).next_goal == rows.index(1)
 
 
 def test_unlikely_classes_are_solved_in_turns_unless_the_scene_changes():

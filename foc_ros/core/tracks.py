@@ -124,7 +124,8 @@ class Tracks(Record):
             tuple(each.in_row(rows[each.candidate.goal]) for each in part if each.candidate.goal in rows)
             for part in (self.followed, self.absent)
         )
-        return replace(self, followed=followed, absent=absent, durations_s=durations_s)
+        next_goal = rows.get(self.next_goal, 0)
+        return replace(self, followed=followed, absent=absent, durations_s=durations_s, next_goal=next_goal)
 
     def without_solutions(self) -> Tracks:
         """Return the same classes without their solutions, which other parameters would not give."""
