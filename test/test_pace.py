@@ -142,8 +142,12 @@ def test_factors_scale_the_covariance_and_nothing_else():
     assert len(plain) == len(scaled) > 10
     for one, other in zip(plain, scaled, strict=True):
         for before, after in zip(one.candidates, other.candidates, strict=True):
-            factors = 2.0 * 1.5 ** (np.linspace(0.0, 1.0, len(after.mean)) ** 2)
-            np.testing.assert_allclose(after.covariance, factors[:, None, None] ** 2 * before.covariance, rtol=1e-12)
+            np.testing.assert_allclose(after.covariance_at(after.times), after.covariance[:, :2, :2], rtol=1e-12)
+            for count, exact in ((len(after.mean), 1e-12), (333, 1e-4)):  # at the steps, and between them
+                shares = np.linspace(0.0, 1.0, count)
+                expected = (2.0 * 1.5**shares**2)[:, None, None] ** 2 * before.covariance_at(shares * before.times[-1])
+                found = after.covariance_at(shares * after.times[-1])
+                np.testing.assert_allclose(found, expected, atol=exact * expected.max())
             np.testing.assert_array_equal(after.mean, before.mean)
             np.testing.assert_array_equal(after.motor_covariance, before.motor_covariance)
             assert after.likelihood == before.likelihood
