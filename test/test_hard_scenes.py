@@ -260,6 +260,19 @@ def test_an_obstacle_that_has_a_new_name_in_each_message_is_one_obstacle():
         assert {each.label for each in prediction} == {f'goal0:-{100 + tick}', f'goal0:+{100 + tick}'}
 
 
+def test_two_classes_that_an_obstacle_does_not_tell_apart_when_the_hand_is_there_are_one_without_its_name():
+    """The post moves ahead of the hand, past the goal. Noise decides on which side of it the shorter guess is."""
+    noise, predictor = np.random.default_rng(0), make_predictor(Config(budget_s=0.0), GOAL)
+    merged = 0
+    for tick in range(40):
+        t = TICK_S * tick
+        predictor.set_obstacles(foc_ros.Circle((0.12 + 0.4 * t, 0.0), 0.02, name='post', velocity=(0.4, 0.0)))
+        (only,) = prediction = predictor.update(t, (0.3 * t**2, 0.0) + 5e-4 * noise.normal(size=2))
+        merged += prediction.notes.get('merged', 0)
+        assert (only.label, only.way) == ('goal0:', 0) and only.likelihood > 0.95
+    assert merged > 10, 'the post is no test'
+
+
 def test_a_class_that_is_no_candidate_any_more_gains_no_likelihood():
     """The hand turns away from a class that was never likely, while all other classes become dearer."""
     walls = [foc_ros.Circle((0.16, y), 0.022, radius_stddev=0.002) for y in (-0.1, -0.03, 0.04, 0.11)]
