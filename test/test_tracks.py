@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tracks: a class keeps its number, its solution and its share under changing names, and what fails is held."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -206,9 +207,10 @@ class Counted(Deadline):
         super().__init__()
         self.steps = steps
 
-    def allows(self):
+    @property
+    def left_s(self):
         self.steps -= 1
-        return self.steps >= 0
+        return math.inf if self.steps >= 0 else -math.inf
 
     def take_share(self, share):
         return NEVER if share < 0.5 else self

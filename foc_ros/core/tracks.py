@@ -142,18 +142,18 @@ class Tracks(Record):
         """Return the track of each candidate, a new one where it continues none; those not seen for `HOLD_S` are forgotten."""
         alive = self._find_recent(stamp_ns)
         pairs = [
-            (each.candidate.label == candidate.label, shared, each.seen_ns, each.likelihood, -place, each)
-            for place, candidate in enumerate(candidates)
+            (each.candidate.label != candidate.label, -shared, -each.seen_ns, -each.likelihood, row, each)
+            for row, candidate in enumerate(candidates)
             for each in alive
             if (shared := count_shared(each.candidate, candidate)) is not None
         ]
         found, taken = dict[int, Track](), set[int]()
-        for *_, place, each in sorted(pairs, key=lambda pair: pair[:5], reverse=True):
-            if -place not in found and each.number not in taken:
-                found[-place] = each
+        for *_, row, each in sorted(pairs, key=lambda pair: pair[:5]):
+            if row not in found and each.number not in taken:
+                found[row] = each
                 taken.add(each.number)
         numbers = iter(range(self.next_number, self.next_number + len(candidates)))
-        return [found.get(place) or Track(next(numbers), each, stamp_ns) for place, each in enumerate(candidates)]
+        return [found.get(row) or Track(next(numbers), each, stamp_ns) for row, each in enumerate(candidates)]
 
     def find_resting(self, matched: Sequence[Track], obstacles: Obstacles, stamp_ns: int) -> set[int]:
         """Return the numbers of the tracks whose last solution is good enough, because their classes are unlikely."""
