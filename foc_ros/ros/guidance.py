@@ -68,8 +68,8 @@ class Newest:
 class GuidanceLoop:
     """Updates guidance, and publishes it until the force has become zero, and then once more.
 
-    Attributes: newest; output, the last one, and place, that of the last one that was published, None before the first. Called in
-    the thread: publish, with each output and the place where it holds; report, with an exception of an update, after which
+    Attributes: newest; output, the last one, and sample_header, of the last one that was published, None before the first. Called
+    in the thread: publish, with each output and its header; report, with an exception of an update, after which
     guidance begins anew with a force of zero; warn, with a text if it may not have its priority, the first time.
     """
 
