@@ -23,7 +23,7 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import predict
 from foc_ros.core.situation import prepare_situation
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Status
-from foc_ros.core.tracks import FULL_CHANGE_S, NO_TRACKS, REST_S, TURNS, Track, Tracks
+from foc_ros.core.tracks import FULL_CHANGE_S, NO_TRACKS, TURNS, WAIT_S, Track, Tracks
 from foc_ros.core.types import NANOSECONDS, HandSample, HandState
 
 CONFIG = replace_values(Config(), {'foc.steps': 20})
@@ -170,7 +170,7 @@ def test_unlikely_classes_are_solved_in_turns_unless_the_scene_changes():
         solved |= new
         ages += [each.age_s for each in prediction.candidates]
         tracks = following
-    assert solved >= unlikely and max(ages) <= REST_S + 1e-9
+    assert solved >= unlikely and max(ages) <= WAIT_S + 1e-9
     aside, wider, fewer = row.centre + np.array([0.0, 0.02]), row.radius + 0.02, row.take([0, 1])
     for now, some_rest in ((row, True), (replace(row, centre=aside), False), (replace(row, radius=wider), False), (fewer, False)):
         prediction, _ = predict(config, replace(hand, stamp_ns=TURNS * STEP_NS + 1_000_000), now, GOALS, tracks)
@@ -293,7 +293,7 @@ def test_a_class_waits_for_the_next_prediction_only_if_it_is_unlikely(position, 
 
     before, now = prepare(2.5, position, velocity, (0, 0)), prepare(duration_s, position, velocity, acceleration)
     candidates = search(before.hand.mean, goals, obstacles, before.config.homotopy, [2.5], 30).candidates
-    problems = [[each.build_problem(0)] * len(candidates) for each in (before, now)]
+    problems = [[each.pose_problem(0)] * len(candidates) for each in (before, now)]
     earlier = [each.solution for each in solve_candidates(candidates, problems[0], before.config.foc)]
     whole, brief = (
         solve_candidates(candidates, problems[1], now.config.foc, earlier, Deadline(goes_on=goes_on)) for goes_on in (False, True)
