@@ -57,14 +57,15 @@ def follow(pipeline, *movements, goals=FAR_GOAL, obstacles=None, is_predicting=F
     return made
 
 
-@pytest.mark.parametrize('factor', [0.6, 1.0, 2.0, 3.0])
-def test_the_factor_approaches_that_of_the_operator(factor):
-    pipeline, duration_s = Pipeline(CONFIG), factor * compute_movement_time(0.4, CONFIG.duration)
+@pytest.mark.parametrize(('factor', 'spread'), [(0.6, 0.4), (1.0, 0.4), (2.0, 0.4), (3.0, 0.4), (0.6, 0.0), (2.0, 0.0)])
+def test_the_factor_approaches_that_of_the_operator(factor, spread):
+    config = replace_values(CONFIG, {'duration.spread': spread})
+    pipeline, duration_s = Pipeline(config), factor * compute_movement_time(0.4, config.duration)
     follow(pipeline, *[reach(duration_s)] * 3)
     assert pipeline.learnt.pace.movements >= 2
-    arrival, found = pipeline.learnt.pace.find_best(CONFIG.duration)
+    arrival, found = pipeline.learnt.pace.find_best(config.duration)
     assert arrival == 'rest' and found == pytest.approx(factor, rel=0.3)
-    assert pipeline.adapted_config.duration == scale_durations(CONFIG.duration, found)
+    assert pipeline.adapted_config.duration == scale_durations(config.duration, found)
 
 
 def test_an_operator_who_passes_the_goals_is_recognised():
