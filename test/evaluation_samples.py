@@ -34,8 +34,7 @@ def make_candidates(sides, goal=None, likelihood=None, cost_to_go=None) -> Candi
         sides=np.array(sides, dtype=np.int8).reshape(k, n),
         mean=np.zeros((k, H, 2)),
         covariance=np.tile(np.eye(2), (k, len(HORIZONS_S), 1, 1)),
-        unwidened=np.tile(np.eye(2), (k, len(HORIZONS_S), 1, 1)),
-        widening=np.zeros((3, k, len(HORIZONS_S), 2, 2)),
+        plans=np.zeros((0, k, len(HORIZONS_S), 2, 2)),
         branch_times=BranchTimes(np.where(np.eye(k, dtype=bool), np.inf, 0.0), np.arange(k)),
         decisions=Decisions(np.arange(k), np.arange(k), np.zeros(k, dtype=np.intp)),
     )

@@ -25,10 +25,13 @@ from message_helpers import (
 from rosbags.rosbag2 import StoragePlugin
 
 from foc_ros.analysis.replay import replay
+from foc_ros.core.config import replace_values
 from foc_ros.core.errors import LostHandError, MessageError, RecordingError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.polygons import make_box_polygon
+from foc_ros.core.pipeline import Pipeline
 from foc_ros.io.topics import OPTIONAL, TYPES, assign_topics
+from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import ObjectTable, decode_detections
 from foc_ros.ros.messages.decode_poses import MAX_GOALS, decode_goal, decode_goals, decode_hand_sample
 from foc_ros.ros.messages.plane import Transform, compute_rotation
@@ -92,8 +95,8 @@ def test_what_is_no_shape_is_counted():
         (collision_object((BOX, (1, -1, 1), (0, 0, 0))), 'primitives[0].dimensions[1]: expected a size in [0, 10000] m, got -1'),
         (collision_object((SPHERE, (math.nan,), (0, 0, 0))), 'primitives[0].dimensions[0]: expected a size in [0, 10000] m'),
         (collision_object((BOX, (0, 0, 0), (0, 0, 0))), 'primitives[0].dimensions: expected a size > 0 m, got 0'),
-        (collision_object((SPHERE, (1,), (0, 2e4, 0))), 'primitive_poses[0].position.y: expected a coordinate within 10000 m'),
-        (collision_object(turned={'w': math.nan}), 'pose.orientation.w: expected a finite number [m], got nan'),
+        (collision_object((SPHERE, (1,), (0, 2e4, 0))), 'primitive_poses[0].position.y: expected a number from -10000'),
+        (collision_object(turned={'w': math.nan}), 'pose.orientation.w: expected a finite number, got nan'),
         (collision_object((SPHERE, (1,), (0, 0, 0)), primitive_poses=[]), 'primitive_poses: expected 1, one for each primitive'),
         (collision_object(name='chair', operation=3), "id: expected an object that was added before it is moved, got 'chair'"),
         (collision_object(frame_id='base'), "header.frame_id: expected 'world', as the other objects, got 'base'"),
@@ -107,18 +110,27 @@ def test_a_wrong_object_is_refused(message, words):
 
 def test_detections_are_boxes_by_id():
     boxes = detection((1, 2, 3), (0.4, 0.2, 0.1), 'cup;1'), detection((4, 5, 6), (0.4, 0.2, 0.1), turned=QUARTER)
-    found = decode_detections(detections(*boxes), 'xy', 0.01)
+    found = decode_detections(detections(*boxes), 'xy')
     assert (found.stamp_ns, found.frame_id, found.dropped) == (SECOND, 'world', {})
-    assert found.obstacles.ids == ('cup%3B1', '1') and found.obstacles.radius_stddev.tolist() == [0.01, 0.01]
-    check_polygon(found.obstacles, 0, (1.0, 2.0), (0.4, 0.2), 0.0)
-    check_polygon(found.obstacles, 1, (4.0, 5.0), (0.4, 0.2), math.pi / 2)
-    assert not len(decode_detections(detections(), 'xy', 0.0).obstacles)
+    obstacles = found.obstacles(0, 0.01)
+    assert obstacles.ids == ('cup%3B1', '1') and obstacles.radius_stddev.tolist() == [0.01, 0.01]
+    check_polygon(obstacles, 0, (1.0, 2.0), (0.4, 0.2), 0.0)
+    check_polygon(obstacles, 1, (4.0, 5.0), (0.4, 0.2), math.pi / 2)
+    assert not len(decode_detections(detections(), 'xy').obstacles(0, 0.0))
+
+
+def test_detections_have_the_deviation_of_the_present_parameters():
+    intake = Intake(Pipeline(CONFIG))
+    intake.take('detections', detections(detection((1, 2, 3), (0.4, 0.2, 0.1))))
+    intake.pipeline.reconfigure(replace_values(CONFIG, {'scene.marker_radius_stddev': 0.01}))
+    intake.take('hand_pose', pose_stamped(BAGS, (0, 0, 0.1), SECOND))
+    assert intake.pipeline.scene.obstacles(SECOND).radius_stddev.tolist() == [0.01]
 
 
 def test_detections_that_are_not_finite_or_repeated_are_dropped():
     each = [detection((x, 0, 0), (1, 1, 1), 'a') for x in (1.0, 2.0)]
-    found = decode_detections(detections(*each, detection((math.nan, 0, 0), (1, 1, 1))), 'xy', 0.0)
-    assert found.dropped == {'duplicate_id': 1, 'not_finite': 1} and found.obstacles.centre.tolist() == [[2.0, 0.0]]
+    found = decode_detections(detections(*each, detection((math.nan, 0, 0), (1, 1, 1))), 'xy')
+    assert found.dropped == {'duplicate_id': 1, 'not_finite': 1} and found.obstacles(0, 0.0).centre.tolist() == [[2.0, 0.0]]
 
 
 @pytest.mark.parametrize(
@@ -126,13 +138,13 @@ def test_detections_that_are_not_finite_or_repeated_are_dropped():
     [
         (detection((0, 0, 0), (1, -1, 1)), 'detections[0].bbox.size.y: expected a size in [0, 10000] m, got -1'),
         (detection((0, 0, 0), (0, 0, 1)), 'detections[0].bbox.size: expected a size > 0 m along an axis of the plane'),
-        (detection((2e4, 0, 0), (1, 1, 1)), 'detections[0].bbox.center.position.x: expected a coordinate within 10000 m'),
+        (detection((2e4, 0, 0), (1, 1, 1)), 'detections[0].bbox.center.position.x: expected a number from -10000 to 10000 [m]'),
         (detection((0, 0, 0), (1, 1, 1), frame_id='base'), "detections[0].header.frame_id: expected 'world', as the array"),
     ],
 )  # fmt: skip
 def test_a_wrong_detection_is_refused(each, words):
     with pytest.raises(MessageError, match=re.escape(words)):
-        decode_detections(detections(each), 'xy', 0.0)
+        decode_detections(detections(each), 'xy')
 
 
 @pytest.mark.parametrize('topic', ['/collision_objects', '/other'])
@@ -156,11 +168,11 @@ def test_a_bag_with_them_is_replayed_by_its_own_definitions(tmp_path, topic):
 def test_both_inputs_are_transformed():
     found = Transform(compute_rotation(SimpleNamespace(x=0.0, y=0.0, **QUARTER)), np.array([1.0, 0.0, 0.0]))
     given = detections(detection((0.5, 0, 0), (0.4, 0.2, 0.1), frame_id='camera'), frame_id='camera')
-    array = decode_detections(given, 'xy', 0.0, lambda _: ('world', found))
+    array = decode_detections(given, 'xy', lambda _: ('world', found))
     thing = collision_object((BOX, (0.4, 0.2, 0.1), (0, 0, 0)), place=(0.5, 0, 0), frame_id='camera')
     table = ObjectTable().with_collision_object(thing, 'xy', lambda _: ('world', found))
     assert (array.frame_id, table.frame_id) == ('world', 'world')
-    for obstacles in (array.obstacles, table.obstacles(0, 0.0)):
+    for obstacles in (array.obstacles(0, 0.0), table.obstacles(0, 0.0)):
         check_polygon(obstacles, 0, (1.0, 0.5), (0.4, 0.2), math.pi / 2)
 
 
@@ -214,7 +226,7 @@ def test_the_position_0_without_an_orientation_means_no_data(types, turn):
         (math.nan, r'expected a finite number \[m\], got nan'),
         (math.inf, r'expected a finite number \[m\], got inf'),
         (-math.inf, r'expected a finite number \[m\], got -inf'),
-        (1.1e4, r'expected a coordinate within 10000 m of the origin, got 11000'),
+        (1.1e4, r'expected a number from -10000 to 10000 \[m\], got 11000'),
     ],
 )
 def test_a_coordinate_that_is_not_finite_or_too_large_is_refused(types, axis, value, words):

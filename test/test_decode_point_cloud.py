@@ -312,7 +312,7 @@ def test_another_type_replaces_an_obstacle_and_is_counted():
         ({'action': 1}, 'markers[1].action: expected ADD (0), DELETE (2) or DELETEALL (3), got 1'),
         ({'scale': (0.1, -0.1, 0.1)}, 'markers[1].scale.y: expected a size in [0, 10000] m, got -0.1'),
         ({'scale': (2e4, 0.1, 0.1)}, 'markers[1].scale.x: expected a size in [0, 10000] m, got 20000'),
-        ({'position': (0, 0, 2e4)}, 'markers[1].pose.position.z: expected a coordinate within 10000 m of the origin, got 20000'),
+        ({'position': (0, 0, 2e4)}, 'markers[1].pose.position.z: expected a number from -10000 to 10000 [m], got 20000'),
         ({'type': 1, 'scale': (0.1, -0.1, 0.1)}, 'markers[1].scale.y: expected a size in [0, 10000] m, got -0.1'),
         ({'type': 1, 'scale': (0, 0, 1)}, 'markers[1].scale: expected a size > 0 m along an axis of the plane, got 0 x 0 x 1'),
         ({'lifetime': -1}, 'markers[1].lifetime: expected at least 0 s (0: no end), got -1 s'),

@@ -243,8 +243,9 @@ def test_a_pooled_path_stays_in_its_class_and_out_of_obstacles(height, beside, s
         [replace(ABOVE, frame_id='elsewhere')],
         [replace(ABOVE, centre=ABOVE.centre + 0.03)],
         [replace(ABOVE, states=ABOVE.states + 1.0)],
+        [record(bow(0.01), make_obstacles(OBSTACLES.centre, 0.005))],
     ],
-    ids=['none', 'without states', 'another frame', 'obstacles moved', 'far from the hand'],
+    ids=['none', 'without states', 'another frame', 'obstacles moved', 'far from the hand', 'obstacles have grown'],
 )
 def test_without_a_recording_that_agrees_it_is_the_model(library):
     known, model = ask(make_library(library)), ask(NO_LIBRARY)

@@ -43,7 +43,7 @@ def data(tmp_path_factory):
 
 
 def observe_one(data, config):
-    return observe(find_recordings(data)['one'], config)
+    return observe(find_recordings(data)['one'], config, with_plans=True)
 
 
 def test_other_parameters_on_observations_give_the_likelihoods_of_a_replay_with_them(data):

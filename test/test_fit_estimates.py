@@ -307,7 +307,7 @@ LATE = 9.0 * (S**3 * (1 - S) ** 2)[:, None] * [1.0, 0.0]
 KNOWN = np.tile(1e-8 * np.eye(2), (2, 3, 1, 1))
 SCATTERED = (TO_GOAL**2)[HORIZONS, None, None] * np.eye(2)
 ADDED = S[HORIZONS, None, None] * np.eye(2), SCATTERED, (LATE[:, :, None] * LATE[:, None])[HORIZONS]
-CANDIDATES = replace(TWO_CLASSES, covariance=KNOWN, unwidened=KNOWN, widening=np.stack([ADDED, ADDED], axis=1))
+CANDIDATES = replace(TWO_CLASSES, covariance=KNOWN, plans=np.stack([KNOWN, *(KNOWN + each for each in ADDED)]))
 
 
 def _make_recordings(endpoint, spread):

@@ -127,7 +127,7 @@ def test_a_class_that_the_search_sees_and_the_solver_fails_in_keeps_a_share(monk
     known = {each.way: each for each in ask().candidates}
     let_fail(monkeypatch, number, status)
     found = ask()
-    (failed,) = [each for each in found.candidates if 'estimated from the path' in each.solution.message]
+    (failed,) = [each for each in found.candidates if 'length of its path' in each.solution.message]
     assert failed.way == number and failed.status is Status.ESTIMATED and len(found.candidates) == 4
     # classes that are so unlikely that they go on in the next prediction are estimated too
     assert found.notes['estimated'] == sum(each.status is Status.ESTIMATED for each in found.candidates)
@@ -258,6 +258,19 @@ def test_an_obstacle_that_has_a_new_name_in_each_message_is_one_obstacle():
         predictor.set_obstacles(foc_ros.Circle((0.17, 0.01), 0.03, name=f'{100 + tick}'))
         prediction = predictor.update(TICK_S * tick, (0.0, 0.0))
         assert {each.label for each in prediction} == {f'goal0:-{100 + tick}', f'goal0:+{100 + tick}'}
+
+
+def test_two_classes_that_an_obstacle_does_not_tell_apart_when_the_hand_is_there_are_one_without_its_name():
+    """The post moves ahead of the hand, past the goal. Noise decides on which side of it the shorter guess is."""
+    noise, predictor = np.random.default_rng(0), make_predictor(Config(budget_s=0.0), GOAL)
+    merged = 0
+    for tick in range(40):
+        t = TICK_S * tick
+        predictor.set_obstacles(foc_ros.Circle((0.12 + 0.4 * t, 0.0), 0.02, name='post', velocity=(0.4, 0.0)))
+        (only,) = prediction = predictor.update(t, (0.3 * t**2, 0.0) + 5e-4 * noise.normal(size=2))
+        merged += prediction.notes.get('merged', 0)
+        assert (only.label, only.way) == ('goal0:', 0) and only.likelihood > 0.95
+    assert merged > 10, 'the post is no test'
 
 
 def test_a_class_that_is_no_candidate_any_more_gains_no_likelihood():

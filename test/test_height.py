@@ -234,9 +234,9 @@ def test_objects_and_detections_say_their_heights():
     leaning = ObjectTable().with_collision_object(collision_object((3, (0.4, 0.02), (0, 0, 0)), turned=tilted), 'xy')
     half = (0.2 + 0.02) * np.sqrt(0.5)
     assert_allclose(leaning.obstacles(0, 0.0).heights, [[-half, half]])
-    found = decode_detections(detections(detection((0, 0, 0.5), (0.2, 0.3, 0.4))), 'xy', 0.0).obstacles
+    found = decode_detections(detections(detection((0, 0, 0.5), (0.2, 0.3, 0.4))), 'xy').obstacles(0, 0.0)
     assert_allclose(found.heights, [[0.3, 0.7]])
-    assert decode_detections(detections(), 'xy', 0.0).obstacles.heights.shape == (0, 2)
+    assert decode_detections(detections(), 'xy').obstacles(0, 0.0).heights.shape == (0, 2)
 
 
 def test_a_transform_moves_heights_and_must_not_tilt_them():

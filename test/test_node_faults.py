@@ -114,11 +114,12 @@ def test_dropped_rows_are_reported_and_the_newest_valid_scene_of_the_queue_is_us
     (table,) = bench.wait_for('likelihoods', 1)
     assert '0' in table.layout.dim[0].label
     assert bench.health().level == OK
-    good = [cloud(TYPES, obstacle_table([(x, 0, 0, 0.01)]), 10 * SECOND) for x in (1, 2, 3)]
-    bench.take('obstacles', *good[:1])
-    bench.send('obstacles', *good, cloud(TYPES, obstacle_table(ROWS), data=b'abc'))
-    ros.spin_until(lambda: bench.node.pipeline.scene.obstacles(0).centre[0, 0] == 3.0, 'the newest')
-    assert figures(bench.health())['obstacles refused'] == '1 of 4', 'the two that were replaced are not taken'
+    tenths = {1: 101, 2: 103, 3: 102}  # the last one is late
+    good = [cloud(TYPES, obstacle_table([(x, 0, 0, 0.01)]), tenth * SECOND // 10) for x, tenth in tenths.items()]
+    bench.take('obstacles', *good, cloud(TYPES, obstacle_table(ROWS), data=b'abc'))
+    assert bench.node.pipeline.scene.obstacles(0).centre[0, 0] == 2.0
+    values = figures(bench.health())
+    assert (values['obstacles refused'], values['count obstacles_late']) == ('2 of 5', '1')
 
 
 def test_a_scene_that_is_not_renewed_stops_predictions(ros):

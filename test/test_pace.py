@@ -57,14 +57,15 @@ def follow(pipeline, *movements, goals=FAR_GOAL, obstacles=None, is_predicting=F
     return made
 
 
-@pytest.mark.parametrize('factor', [0.6, 1.0, 2.0, 3.0])
-def test_the_factor_approaches_that_of_the_operator(factor):
-    pipeline, duration_s = Pipeline(CONFIG), factor * compute_movement_time(0.4, CONFIG.duration)
+@pytest.mark.parametrize(('factor', 'spread'), [(0.6, 0.4), (1.0, 0.4), (2.0, 0.4), (3.0, 0.4), (0.6, 0.0), (2.0, 0.0)])
+def test_the_factor_approaches_that_of_the_operator(factor, spread):
+    config = replace_values(CONFIG, {'duration.spread': spread})
+    pipeline, duration_s = Pipeline(config), factor * compute_movement_time(0.4, config.duration)
     follow(pipeline, *[reach(duration_s)] * 3)
     assert pipeline.learnt.pace.movements >= 2
-    arrival, found = pipeline.learnt.pace.find_best(CONFIG.duration)
+    arrival, found = pipeline.learnt.pace.find_best(config.duration)
     assert arrival == 'rest' and found == pytest.approx(factor, rel=0.3)
-    assert pipeline.adapted_config.duration == scale_durations(CONFIG.duration, found)
+    assert pipeline.adapted_config.duration == scale_durations(config.duration, found)
 
 
 def test_an_operator_who_passes_the_goals_is_recognised():
@@ -142,8 +143,12 @@ def test_factors_scale_the_covariance_and_nothing_else():
     assert len(plain) == len(scaled) > 10
     for one, other in zip(plain, scaled, strict=True):
         for before, after in zip(one.candidates, other.candidates, strict=True):
-            factors = 2.0 * 1.5 ** (np.linspace(0.0, 1.0, len(after.mean)) ** 2)
-            np.testing.assert_allclose(after.covariance, factors[:, None, None] ** 2 * before.covariance, rtol=1e-12)
+            np.testing.assert_allclose(after.covariance_at(after.times), after.covariance[:, :2, :2], rtol=1e-12)
+            for count, exact in ((len(after.mean), 1e-12), (333, 1e-4)):  # at the steps, and between them
+                shares = np.linspace(0.0, 1.0, count)
+                expected = (2.0 * 1.5**shares**2)[:, None, None] ** 2 * before.covariance_at(shares * before.times[-1])
+                found = after.covariance_at(shares * after.times[-1])
+                np.testing.assert_allclose(found, expected, atol=exact * expected.max())
             np.testing.assert_array_equal(after.mean, before.mean)
             np.testing.assert_array_equal(after.motor_covariance, before.motor_covariance)
             assert after.likelihood == before.likelihood

@@ -14,15 +14,18 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 from matplotlib.figure import Figure
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
 
+from foc_ros.analysis.replay import Step
 from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
+from foc_ros.core.scene import Scene
 from foc_ros.core.solution import Status
 from foc_ros.core.types import HandSample
+from foc_ros.io.bags import Item
 from foc_ros.io.outputs import REPORT_FILES, check_page, check_replaceable
 from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
 from foc_ros.reporting.figures import write_picture
 from foc_ros.reporting.page import write_page
-from foc_ros.reporting.report import describe_late, write_report
+from foc_ros.reporting.report import ReportCollector, describe_late, write_report
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot, choose_moment
 from foc_ros.ros.messages.ranking import find_drawn_curve
 
@@ -99,6 +102,17 @@ def test_page_and_numbers_agree_with_the_predictions(tmp_path):
             assert shares[data['labels'][candidate['label']]] == track['share'][row - track['first']]
         assert written['candidates'][0]['end'] == pytest.approx(known.solved_candidates[0].solution.path[-1], abs=1e-6)
         assert written['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
+
+
+def test_of_a_recording_that_begins_anew_the_last_run_is_shown(tmp_path):
+    made, collector = samples(), ReportCollector()
+    for sample in (*made[:100], *made):
+        shown = prediction(sample.stamp_ns, sample.position) if sample.stamp_ns % 10**8 == 0 else None
+        collector.add(Step(Item('hand_pose', '/hand_pose', sample.stamp_ns, None, b''), sample, shown, Scene()))
+    collector.write(tmp_path, 'x', {})
+    numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
+    assert numbers['hand_samples'] == len(made) and numbers['summary']['runs'] == '2, of which the last one is shown'
+    assert [each['t_s'] for each in numbers['predictions']] == pytest.approx(np.arange(15) / 10.0)
 
 
 def test_paths_on_the_page_are_those_predicted(tmp_path):

@@ -5,6 +5,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,11 @@ def test_measures_of_a_trial_with_known_answers():
     position = np.linspace([0.0, 0.0], [0.3, 0.1], 101)
     direction = np.array([0.3, 0.1]) / np.hypot(0.3, 0.1)
     forces = np.tile(-2.0 * direction, (101, 1))
-    measures = measure_trial(Trial(position, forces, np.ones((101, 2)), np.zeros(101)), task, 4.0)
+    trial = Trial(position, forces, np.ones((101, 2)), np.zeros(101), has_arrived=True)
+    measures = measure_trial(trial, task, 4.0)
+    assert (measures['arrival_rate'], measures['completion_s']) == (1.0, pytest.approx(101 * DT))
+    never = measure_trial(replace(trial, has_arrived=False), task, 4.0)
+    assert never['arrival_rate'] == 0.0 and np.isnan(never['completion_s']), 'the time limit is no time of arrival'
     assert measures['collision_rate'] == 1.0
     assert measures['min_clearance_m'] == pytest.approx(-0.02, abs=1e-6)
     assert measures['path_m'] == pytest.approx(np.hypot(0.3, 0.1))
@@ -74,7 +79,7 @@ class Misled(Assistance):
 
     def compute_force(self, step, position, velocity, acceleration):
         self.is_wrong = True
-        return np.array([-1.0, 0.0])
+        return np.array([-0.3, 0.0])
 
 
 def test_a_wrong_way_costs_what_the_operator_needs_more_than_alone():

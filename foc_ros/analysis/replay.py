@@ -9,6 +9,7 @@ from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.classes.library import Demonstration
@@ -137,6 +138,19 @@ class Replay:
             key = role, 'invalid' if status is None else status.value
             self._refused[key] += 1
             self._reasons[key] = self.intake.last_refusal or ''
+
+
+def keep_last_run(samples: list[HandSample], sample: HandSample, *made: list[Any]) -> bool:
+    """Add a sample to those of a recording, and return whether the recording begins anew with it.
+
+    Then the samples before it, and what was made from them, are dropped: their path is that of another movement.
+    """
+    begins_anew = bool(samples) and sample.stamp_ns <= samples[-1].stamp_ns
+    if begins_anew:
+        for each in (samples, *made):
+            each.clear()
+    samples.append(sample)
+    return begins_anew
 
 
 def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = None) -> Iterator[Prediction]:

@@ -22,13 +22,15 @@ from .ocp.problem import Problem
 from .ocp.solve import solve_problems
 from .ocp.start import Start, cold_start, warm_start
 from .prediction import PredictedCandidate
-from .solution import Candidate, Solution, Status
+from .solution import Candidate, Solution, Status, label_class
 from .types import Array, HandState, as_readonly
 
 FAILED = (Status.LEFT_CLASS, Status.ITERATION_LIMIT, Status.INFEASIBLE)
 """What a solver says of classes that it could not solve."""
 SHORTEST_M = 1e-6
 """Lower limit of a distance in ratios [m]: a micrometre."""
+NO_NUMBER = 2**31
+"""In place of the number of a class that is not followed: larger than all of them."""
 DETOUR = 64.0 / 9.0
 """Effort of going aside over that of going straight, see `compute_detour_effort`."""
 
@@ -179,7 +181,7 @@ def _estimate(candidate: PredictedCandidate, known: PredictedCandidate) -> Predi
     estimated = replace(
         failed,
         status=failed.status if failed.status is Status.DEADLINE else Status.ESTIMATED,
-        message=f'{failed.message}; estimated from the path that the search has found',
+        message=f'{failed.message}; its effort follows from the length of its path',
         mean=mean,
         effort=effort,
         expected=effort,
@@ -233,24 +235,38 @@ def estimate_unfollowed(
             effort=cost / dt,
             expected=cost / dt,
         )
-        estimated.append(PredictedCandidate(candidate, solution, dict(candidate.sides), cost, 0.0))
+        estimated.append(PredictedCandidate(candidate, solution, dict(candidate.sides), cost, 0.0, way=NO_NUMBER))
     return estimated
 
 
 def drop_duplicates(candidates: Sequence[PredictedCandidate]) -> list[PredictedCandidate]:
-    """Drop candidates whose paths are in the class of an earlier one, so that no class is counted twice.
+    """Return the candidates, and of those whose paths are in one class only one, so that no class is counted twice.
 
     The solver has moved a path into another class, or the obstacle that told two classes apart moves out of the way.
     """
-    first: dict[tuple[int, frozenset[tuple[str, int]]], PredictedCandidate] = {}
+    alike: dict[tuple[int, frozenset[tuple[str, int]]], list[PredictedCandidate]] = {}
     for each in candidates:
         if each.has_likelihood:
-            first.setdefault(_identify_class(each), each)
-    return [
+            alike.setdefault(_identify_class(each), []).append(each)
+    others = [
         each
         for each in candidates
-        if first.get(_identify_class(each), each) is each or not (each.has_likelihood or each.status is Status.LEFT_CLASS)
+        if not each.has_likelihood and not (each.status is Status.LEFT_CLASS and _identify_class(each) in alike)
     ]
+    return [*map(_merge, alike.values()), *others]
+
+
+def _merge(alike: Sequence[PredictedCandidate]) -> PredictedCandidate:
+    """Return the newest of solutions in one class, a followed one if there is one.
+
+    The name of several has only obstacles that the path passes.
+    """
+    newest = min(alike, key=lambda each: (each.way == NO_NUMBER, each.age_s))
+    if len(alike) == 1:
+        return newest
+    sides = tuple(each for each in newest.candidate.sides if each[0] in newest.sides)
+    named = replace(newest.candidate, sides=sides, label=label_class(newest.candidate.goal, sides))
+    return replace(newest, candidate=named, way=min(each.way for each in alike))
 
 
 def _identify_class(candidate: PredictedCandidate) -> tuple[int, frozenset[tuple[str, int]]]:

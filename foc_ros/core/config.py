@@ -92,7 +92,7 @@ class DurationConfig(Group):
 class CovarianceConfig(Group):
     """Factors on the predicted standard deviations."""
 
-    near: float = param(1.0, 'factor on the standard deviations of predicted states, for those at once', '', 0.01, 100.0)
+    near: float = param(1.0, 'factor on the standard deviations of predicted positions, for those at once', '', 0.01, 100.0)
     far: float = param(
         1.0, 'the same at the end of each candidate; its logarithm changes with the square of the time', '', 0.01, 100.0
     )

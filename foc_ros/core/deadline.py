@@ -57,8 +57,7 @@ class Deadline:
 
     def allows(self) -> bool:
         """Tell whether there is time for a step as long as the longest so far."""
-        is_whole = self._whole is None or self._whole.allows()
-        return is_whole and self.left_s >= self.step_times.longest_s
+        return self.left_s >= self.step_times.longest_s
 
     def take_share(self, share: float) -> Deadline:
         """Return an earlier deadline, at a share of the time that is left."""

@@ -24,7 +24,7 @@ from .plant.models import TripleIntegratorModel, make_plant_model
 from .prediction import PredictedCandidate, Prediction
 from .situation import Situation, prepare_situation
 from .solution import Candidate, Status
-from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_rest
+from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_remainder
 from .types import NANOSECONDS, Array, HandState, Unassigned
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
@@ -73,8 +73,8 @@ def predict(
     situation = prepare_situation(config, hand, obstacles, goals, knowledge.objects, goal_heights, known)
     found, candidates = _find_candidates(situation, known, knowledge.library, deadline)
     matched = known.match(candidates, stamp_ns)
-    absent, resting = known.find_absent(candidates, matched, stamp_ns), known.find_resting(matched, obstacles, stamp_ns)
-    solved = _solve(situation, candidates, matched, resting, deadline.take_share(SOLVE_SHARE))
+    absent, waiting = known.find_absent(candidates, matched, stamp_ns), known.find_waiting(matched, obstacles, stamp_ns)
+    solved = _solve(situation, candidates, matched, waiting, deadline.take_share(SOLVE_SHARE))
     answered = _answer(situation, solved, matched, absent)
     shared, unassigned = _share_likelihood(situation, answered, found.unfollowed, knowledge, hand)
     limited, unassigned = known.limit_changes(shared, unassigned, stamp_ns, absent)
@@ -132,25 +132,25 @@ def _solve(
     situation: Situation,
     candidates: Sequence[Candidate],
     matched: Sequence[Track],
-    resting: Collection[int],
+    waiting: Collection[int],
     deadline: Deadline,
 ) -> list[PredictedCandidate]:
-    """Solve the candidates that do not rest, each from the solution of its track; return all with their numbers, in their order.
+    """Solve the candidates that do not wait, each from the solution of its track; return all with their numbers, in their order.
 
-    The solutions have predictive covariances. resting: numbers of tracks of which the rest of their last solution is taken.
+    The solutions have predictive covariances. waiting: numbers of tracks of which the rest of their last solution is taken.
     """
     found = [
-        _hold_track(track, candidate, situation, 'unlikely, and solved again soon') if track.number in resting else None
+        _hold_track(track, candidate, situation, 'unlikely, and solved again soon') if track.number in waiting else None
         for candidate, track in zip(candidates, matched, strict=True)
     ]
     open_rows = [row for row, each in enumerate(found) if each is None]
-    by_goal = {goal: situation.build_problem(goal) for goal in {candidates[row].goal for row in open_rows}}
+    by_goal = {goal: situation.pose_problem(goal) for goal in {candidates[row].goal for row in open_rows}}
     earlier = [None if matched[row].has_failed else matched[row].solution for row in open_rows]
     tried = [candidates[row] for row in open_rows]
     until = Deadline(whole=deadline, goes_on=True)
     solved = solve_candidates(tried, [by_goal[each.goal] for each in tried], situation.config.foc, earlier, until)
     for row, each in zip(open_rows, solved, strict=True):
-        found[row] = situation.widen_covariance(replace(each, way=matched[row].number))
+        found[row] = situation.add_uncertainty(replace(each, way=matched[row].number))
     return [each for each in found if each is not None]
 
 
@@ -183,7 +183,7 @@ def _hold_track(track: Track, candidate: Candidate, situation: Situation, reason
     if track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):
         return None
     age_s = (hand.stamp_ns - track.solved_ns) / NANOSECONDS
-    rest = take_rest(track.solution, age_s, hand.mean[:2], reason)
+    rest = take_remainder(track.solution, age_s, hand.mean[:2], reason)
     if rest is None or not is_there(candidate, rest, obstacles):
         return None
     return PredictedCandidate(candidate, rest, track.sides, rest.expected_effort * rest.dt, 0.0, age_s, track.number)

@@ -50,11 +50,11 @@ class Situation(Record):
     heights: HeightPredictor
     covariances: SharedCovariances
 
-    def build_problem(self, goal: int) -> Problem:
+    def pose_problem(self, goal: int) -> Problem:
         """Return the problem of reaching the goal of a row."""
         return build_problem(self.config, self.hand, self.in_the_way[goal], self.goals[goal], self.durations_s[goal])
 
-    def widen_covariance(self, candidate: PredictedCandidate) -> PredictedCandidate:
+    def add_uncertainty(self, candidate: PredictedCandidate) -> PredictedCandidate:
         """Add the predictive covariance, and that of the timing, to the covariance that motor noise causes."""
         solution, is_at_rest = candidate.solution, self.hand.onset_ns is None
         covariance = widen_covariance(solution, self.covariances[solution.dt], is_at_rest, self.config)

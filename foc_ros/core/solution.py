@@ -18,11 +18,11 @@ from .errors import SceneError
 
 LEFT, RIGHT = 1, -1
 """Side on which a path passes an obstacle, seen in the direction of travel."""
-Way = frozenset[tuple[str, int]]
+Signature = frozenset[tuple[str, int]]
 """The obstacles in the name of a class, by id, each with LEFT or RIGHT."""
 
 
-def agrees(one: Way, other: Way) -> bool:
+def agrees(one: Signature, other: Signature) -> bool:
     """Tell whether two classes pass the obstacles alike: the name of one is that of the other, with obstacles left out."""
     return one <= other or other <= one
 

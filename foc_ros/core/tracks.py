@@ -39,9 +39,9 @@ from .types import NANOSECONDS, Array, Record, Unassigned, as_readonly
 HOLD_S = 0.2
 """Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten
 predictions at 50 Hz, within which a solver or a search that missed a class finds it again."""
-SELDOM, TURNS, REST_S = 0.02, 5, 0.1
+SELDOM, TURNS, WAIT_S = 0.02, 5, 0.1
 """A class is solved in one of TURNS predictions if its likelihood is less than the part SELDOM of the largest one. No class waits
-for more than REST_S [s]."""
+for more than WAIT_S [s]."""
 FULL_CHANGE_S = 0.15
 """Shortest time in which a likelihood changes by one [s]: less than people take to react to what they see."""
 LEAD = 0.15
@@ -124,7 +124,8 @@ class Tracks(Record):
             tuple(each.in_row(rows[each.candidate.goal]) for each in part if each.candidate.goal in rows)
             for part in (self.followed, self.absent)
         )
-        return replace(self, followed=followed, absent=absent, durations_s=durations_s)
+        next_goal = rows.get(self.next_goal, 0)
+        return replace(self, followed=followed, absent=absent, durations_s=durations_s, next_goal=next_goal)
 
     def without_solutions(self) -> Tracks:
         """Return the same classes without their solutions, which other parameters would not give."""
@@ -141,25 +142,25 @@ class Tracks(Record):
         """Return the track of each candidate, a new one where it continues none; those not seen for `HOLD_S` are forgotten."""
         alive = self._find_recent(stamp_ns)
         pairs = [
-            (each.candidate.label == candidate.label, shared, each.seen_ns, each.likelihood, -place, each)
-            for place, candidate in enumerate(candidates)
+            (each.candidate.label != candidate.label, -shared, -each.seen_ns, -each.likelihood, row, each)
+            for row, candidate in enumerate(candidates)
             for each in alive
             if (shared := count_shared(each.candidate, candidate)) is not None
         ]
         found, taken = dict[int, Track](), set[int]()
-        for *_, place, each in sorted(pairs, key=lambda pair: pair[:5], reverse=True):
-            if -place not in found and each.number not in taken:
-                found[-place] = each
+        for *_, row, each in sorted(pairs, key=lambda pair: pair[:5]):
+            if row not in found and each.number not in taken:
+                found[row] = each
                 taken.add(each.number)
         numbers = iter(range(self.next_number, self.next_number + len(candidates)))
-        return [found.get(place) or Track(next(numbers), each, stamp_ns) for place, each in enumerate(candidates)]
+        return [found.get(row) or Track(next(numbers), each, stamp_ns) for row, each in enumerate(candidates)]
 
-    def find_resting(self, matched: Sequence[Track], obstacles: Obstacles, stamp_ns: int) -> set[int]:
+    def find_waiting(self, matched: Sequence[Track], obstacles: Obstacles, stamp_ns: int) -> set[int]:
         """Return the numbers of the tracks whose last solution is good enough, because their classes are unlikely."""
         if self.obstacles is None or not obstacles.is_near(self.obstacles, MOVED_M):
             return set()
         least = SELDOM * max([each.likelihood for each in matched], default=0.0)
-        unlikely = [each for each in matched if each.likelihood < least and each.is_solved_within(stamp_ns, REST_S)]
+        unlikely = [each for each in matched if each.likelihood < least and each.is_solved_within(stamp_ns, WAIT_S)]
         unlikely.sort(key=lambda each: (each.solved_ns, each.number))
         return {each.number for each in unlikely[math.ceil(len(unlikely) / TURNS) :]}
 
@@ -285,7 +286,7 @@ def _inherits(candidate: PredictedCandidate, before: Candidate) -> bool:
     return is_to_goal and is_known and before.contains(candidate.sides)
 
 
-def take_rest(solution: Solution, age_s: float, position: Array, reason: str) -> Solution | None:
+def take_remainder(solution: Solution, age_s: float, position: Array, reason: str) -> Solution | None:
     """Return the rest of a solution from an age [s] on, at as many steps, that begins at a position (2,) [m].
 
     None if no more than a step remains. reason: why it is used, in words. The distance of the hand from the solution now falls to
@@ -295,12 +296,12 @@ def take_rest(solution: Solution, age_s: float, position: Array, reason: str) ->
     if left_s <= solution.dt:
         return None
     begin, motor = age_s / solution.dt, solution.motor_covariance
-    mean, covariance = interpolate_rest(solution.mean, begin), as_readonly(interpolate_rest(solution.covariance, begin))
+    mean, covariance = resample(solution.mean, begin), as_readonly(resample(solution.covariance, begin))
     aside, fall = position - mean[0, :2], fall_as_minimum_jerk(np.linspace(0.0, 1.0, steps + 1)[:, None])
     for order in range(mean.shape[1] // 2):
         mean[:, 2 * order : 2 * order + 2] += fall[order] * (aside / left_s**order)
     if motor is not None:
-        motor = as_readonly(interpolate_rest(motor, begin))
+        motor = as_readonly(resample(motor, begin))
     during = (begin + (steps - begin) * (np.arange(steps) + 0.5) / steps).astype(np.intp)
     control = as_readonly(solution.control[np.minimum(during, steps - 1)])
     message, effort = f'{reason}; the answer is from {age_s:.3g} s ago', float((control**2).sum())
@@ -311,7 +312,7 @@ def take_rest(solution: Solution, age_s: float, position: Array, reason: str) ->
     return replace(rest, effort=effort, expected=expected, dt=left_s / steps, message=message)
 
 
-def interpolate_rest(states: Array, begin: float) -> Array:
+def resample(states: Array, begin: float) -> Array:
     """Return states (N + 1, ...), such as means or covariances, from the step `begin` on, at N steps."""
     steps = len(states) - 1
     at = np.linspace(begin, steps, steps + 1)

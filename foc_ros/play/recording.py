@@ -88,9 +88,9 @@ class Recording:
         # markers and path say nothing more
         self._add_outputs(encode_outputs(prediction, 'xy', self._types, ('prediction', 'likelihoods')))
 
-    def add_guidance(self, output: GuidanceOutput, sample: SampleHeader) -> None:
+    def add_guidance(self, output: GuidanceOutput, header: SampleHeader) -> None:
         """Record guidance."""
-        self._add_outputs({name: encode(output, sample, self._types) for name, (_, encode) in GUIDANCE_OUTPUTS.items()})
+        self._add_outputs({name: encode(output, header, self._types) for name, (_, encode) in GUIDANCE_OUTPUTS.items()})
 
     def begin_trial(self) -> None:
         """Record the inputs for a trial from now on."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foc_ros.analysis.replay import Step
+from foc_ros.analysis.replay import Step, keep_last_run
 from foc_ros.core.errors import InputError
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
@@ -39,12 +39,14 @@ class PageWarning(NamedTuple):
 class ReportCollector:
     """Collects what a report shows.
 
-    Attributes: samples, of the hand; snapshots, as `build_snapshot` and `read_snapshot` make them.
+    Attributes: samples, of the hand; snapshots, as `build_snapshot` and `read_snapshot` make them; runs, of which a replay that
+    begins anew has several.
     """
 
     def __init__(self) -> None:
         self.samples: list[HandSample] = []
         self.snapshots: list[Prediction] = []
+        self.runs = 1
 
     @property
     def hand(self) -> HandTrajectory:
@@ -54,13 +56,14 @@ class ReportCollector:
     def add(self, step: Step) -> None:
         """Keep the hand sample and the prediction of a step of a replay."""
         if step.sample is not None:
-            self.samples.append(step.sample)
+            self.runs += keep_last_run(self.samples, step.sample, self.snapshots)
         if step.prediction is not None:
             self.snapshots.append(build_snapshot(step.prediction))
 
     def write(self, directory: Path, title: str, summary: Mapping[str, str], tables: Sequence[Table] = ()) -> Path:
         """Write the report and return its page; see :func:`write_report`."""
-        return write_report(directory, title, self.hand, self.snapshots, summary, tables)[0]
+        runs = {'runs': f'{self.runs}, of which the last one is shown'} if self.runs > 1 else {}
+        return write_report(directory, title, self.hand, self.snapshots, {**summary, **runs}, tables)[0]
 
 
 def write_report(

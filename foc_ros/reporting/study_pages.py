@@ -64,7 +64,8 @@ FIT_WORDS = {
 }
 SIMULATION_WORDS = {
     'collisions': 'trials in which the hand entered an obstacle.',
-    'time': 'from the beginning of the movement to the arrival.',
+    'arrivals': 'trials in which the hand came to rest at its goal.',
+    'time': 'from the beginning of the movement to the arrival, over these trials.',
     'clearance': 'the least distance from an obstacle; negative within one.',
     'effort': 'the integral of the square of the force of the operator.',
     'opposing impulse': 'force of the guidance against the direction in which the operator wants to go, added up over time.',

@@ -15,7 +15,7 @@ from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io import topics
 
 from .messages.decode_objects import ObjectTable, decode_detections
-from .messages.decode_point_cloud import DecodedCloud, decode_point_cloud
+from .messages.decode_point_cloud import decode_point_cloud
 from .messages.decode_poses import FrameLookup, decode_goal, decode_goals, decode_hand_sample, decode_stamp, keep_frame
 
 SOURCES = {role: role for role in (topics.COLLISION, topics.DETECTIONS)} | {topics.CLOUD: 'cloud', topics.MARKERS: 'markers'}
@@ -52,7 +52,7 @@ class Intake:
         self.sample: HandSample | None = None
         self._still: HandSample | None = None  # the first of those that were used with the same position as the last one
         self.last_refusal: str | None = None
-        self._tables = {topics.MARKERS: ObjectTable(), topics.COLLISION: ObjectTable()}
+        self._tables = dict.fromkeys((topics.MARKERS, topics.COLLISION, topics.DETECTIONS), ObjectTable())
         self._shown = dict.fromkeys(self._tables, (0, 0.0))  # the conditions under which each table is in the scene
         self._counts: Counter[str] = Counter()
         self._handlers: dict[str, Callable[[Any, FrameLookup], SampleStatus]] = {
@@ -136,12 +136,13 @@ class Intake:
         return status
 
     def _take_cloud(self, message: Any, look_up: FrameLookup) -> SampleStatus:
-        return self._set_obstacles(topics.CLOUD, decode_point_cloud(message, self.pipeline.config.plane, look_up))
+        cloud = decode_point_cloud(message, self.pipeline.config.plane, look_up)
+        status = self.pipeline.set_obstacles(SOURCES[topics.CLOUD], cloud.obstacles, cloud.stamp_ns or None, cloud.frame_id)
+        return self._note_dropped(topics.CLOUD, cloud.dropped, status)
 
     def _take_detections(self, message: Any, look_up: FrameLookup) -> SampleStatus:
-        config = self.pipeline.config
-        found = decode_detections(message, config.plane, config.scene.marker_radius_stddev, look_up)
-        return self._set_obstacles(topics.DETECTIONS, found)
+        table = decode_detections(message, self.pipeline.config.plane, look_up)
+        return self._note_dropped(topics.DETECTIONS, table.dropped, self._set_table(topics.DETECTIONS, table))
 
     def _take_collision_object(self, message: Any, look_up: FrameLookup) -> SampleStatus:
         plane = self.pipeline.config.plane
@@ -181,10 +182,6 @@ class Intake:
     def _find_conditions(self, table: ObjectTable) -> tuple[int, float]:
         """Return what changes the obstacles of a table without a message: the number of expired ones, the deviation [m]."""
         return table.count_expired(self._now_ns()), self.pipeline.config.scene.marker_radius_stddev
-
-    def _set_obstacles(self, role: str, decoded: DecodedCloud) -> SampleStatus:
-        status = self.pipeline.set_obstacles(SOURCES[role], decoded.obstacles, decoded.stamp_ns or None, decoded.frame_id)
-        return self._note_dropped(role, decoded.dropped, status)
 
     def _note_dropped(self, role: str, dropped: Mapping[str, int], status: SampleStatus) -> SampleStatus:
         """Count the parts of a message that were left out, if the others were used."""

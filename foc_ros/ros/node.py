@@ -36,7 +36,7 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.class_library import load_library
-from foc_ros.io.topics import CLOUD, COMMAND, DETECTIONS, GOAL, GOALS, HAND, MARKERS, REQUIRED
+from foc_ros.io.topics import COMMAND, HAND, MARKERS, REQUIRED
 
 from . import endpoints
 from .guidance import GuidanceTopics
@@ -52,8 +52,6 @@ REST_S, LONGEST_REST_S = 0.004, 0.02
 """Shortest and longest time for which the poses of a fast hand gather before they are taken together [s]."""
 DRAWN_S = 0.035
 """Least time between the stamps of two arrays of markers [s]: of 50 predictions a second, every second one is drawn."""
-COMPLETE = (GOALS, GOAL, CLOUD, DETECTIONS)
-"""Inputs of which each message replaces the one before: of several in the queue, the newest that is accepted is used."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
@@ -229,12 +227,9 @@ class FocNode(LifecycleNode):
 
     def _take_released(self, role: str) -> None:
         """Take the messages of an input that are not held, and predict if a hand pose was used and a prediction is due."""
-        arrivals = self._transforms.release(role, monotonic())
         is_taken = False
-        for each in reversed(list(arrivals)) if role in COMPLETE else arrivals:
+        for each in self._transforms.release(role, monotonic()):
             is_taken = self._take(role, each) or is_taken
-            if is_taken and role in COMPLETE:
-                break
         if self._retries.is_canceled() and self._transforms.roles:
             self._retries.reset()
         if is_taken and role == HAND:

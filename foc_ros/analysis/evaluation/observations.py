@@ -27,7 +27,7 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording, group_by_operator
-from foc_ros.analysis.replay import Replay, Step
+from foc_ros.analysis.replay import Replay, Step, keep_last_run
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows, tabulate_sides
 from foc_ros.core.classes.sides import BranchTimes, compute_branch_times, measure_passages
 from foc_ros.core.config import Config, replace_values
@@ -60,8 +60,8 @@ class CandidateTable(Record):
     likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; named:
     obstacles in any label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
     (k, h, 2) [m]: the positions at `TIMES_S`; covariance (k, 3, 2, 2) [m^2], positive definite: of those at `HORIZONS_S`;
-    unwidened (k, 3, 2, 2) [m^2]: what that of the plan is without `WIDENINGS`; widening (3, k, 3, 2, 2): what each of them adds
-    where it is 1; branch_times: when the candidates part; decisions: of those that take part.
+    plans (4, k, 3, 2, 2) [m^2]: that of the plan without `WIDENINGS`, and with each of them at 1, none if not asked for;
+    branch_times: when the candidates part; decisions: of those that take part.
     """
 
     labels: tuple[str, ...]
@@ -76,8 +76,7 @@ class CandidateTable(Record):
     sides: Sides
     mean: Array
     covariance: Array
-    unwidened: Array
-    widening: Array
+    plans: Array
     branch_times: BranchTimes
     decisions: Decisions
 
@@ -130,10 +129,13 @@ class ObservedRecording:
     path: RecordedPath
 
 
-def observe(recording: Recording, config: Config, replayed: Replay | None = None) -> ObservedRecording:
+def observe(
+    recording: Recording, config: Config, replayed: Replay | None = None, *, with_plans: bool = False
+) -> ObservedRecording:
     """Replay a recording; raises RecordingError where it cannot be read or nothing could be predicted in it.
 
     replayed: a replay with the same config that goes on, with what it has learnt but not with its scene; a new one if not given.
+    with_plans: whether the covariances are tabulated that other `WIDENINGS` would give.
     """
     if replayed is None:
         replayed = Replay(config)
@@ -143,10 +145,7 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
     made: list[tuple[Step, HandState, Config]] = []
     for step in replayed.steps(recording.items()):
         if step.sample is not None:
-            if samples and step.sample.stamp_ns <= samples[-1].stamp_ns:  # the recording begins anew
-                samples.clear()
-                made.clear()
-            samples.append(step.sample)
+            keep_last_run(samples, step.sample, made)
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state, replayed.pipeline.adapted_config))
@@ -159,7 +158,7 @@ def observe(recording: Recording, config: Config, replayed: Replay | None = None
     goals = made[-1][0].scene.goals
     assert goals is not None
     path = RecordedPath.from_samples(samples, goals, recording.goal)
-    found = [make_observation(step, hand, path, adapted) for step, hand, adapted in made if hand.stamp_ns <= path.end_ns]
+    found = [make_observation(*each, path, with_plans=with_plans) for each in made if each[1].stamp_ns <= path.end_ns]
     if not found:
         raise RecordingError(f'{recording.name}: nothing was predicted before its goal was reached')
     return ObservedRecording(recording.name, tuple(found), path)
@@ -192,10 +191,10 @@ def observe_all(
     return [each for observed, _ in parts for each in observed], failed
 
 
-def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Config) -> Observation:
+def make_observation(step: Step, hand: HandState, config: Config, path: RecordedPath, *, with_plans: bool) -> Observation:
     """Return one prediction, with the hand that it was made from, beside what came.
 
-    path: the whole path of the hand; config: adapted to the operator, as for the prediction.
+    config: adapted to the operator, as for the prediction; path: the whole path of the hand; with_plans: as of `observe`.
     """
     prediction, goals = step.prediction, step.scene.goals
     assert prediction is not None and goals is not None
@@ -212,7 +211,7 @@ def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Co
         gaps=find_open_gaps(obstacles, row, direction, config.scene.hand_radius),
         direction=direction,
         goals=goals,
-        candidates=_tabulate_candidates(prediction, obstacles, hand, goals, config),
+        candidates=_tabulate_candidates(prediction, obstacles, hand, goals, config, with_plans=with_plans),
         most_likely=prediction.most_likely,
         truth=find_ground_truth(prediction.stamp_ns, path, obstacles, row, direction, goals),
         other=prediction.other,
@@ -220,12 +219,11 @@ def make_observation(step: Step, hand: HandState, path: RecordedPath, config: Co
 
 
 def _tabulate_candidates(
-    prediction: Prediction, obstacles: Obstacles, hand: HandState, goals: Array, config: Config
+    prediction: Prediction, obstacles: Obstacles, hand: HandState, goals: Array, config: Config, *, with_plans: bool
 ) -> CandidateTable:
-    predicted = prediction.candidates
-    solutions, narrow = [each.solution for each in predicted], replace_values(config, dict.fromkeys(WIDENINGS, 0.0))
-    unwidened = _tabulate_plans(predicted, hand, narrow)
-    widening = [_tabulate_plans(predicted, hand, replace_values(narrow, {each: 1.0})) - unwidened for each in WIDENINGS]
+    predicted, narrow = prediction.candidates, replace_values(config, dict.fromkeys(WIDENINGS, 0.0))
+    solutions = [each.solution for each in predicted]
+    widened = [narrow, *(replace_values(narrow, {each: 1.0}) for each in WIDENINGS)] if with_plans else []
     has_likelihood = np.array([each.has_likelihood for each in predicted])
     passages = measure_passages(solutions, obstacles)
     sides = tabulate_sides(passages)
@@ -252,8 +250,7 @@ def _tabulate_candidates(
             ]
         ),
         covariance=np.array([interpolate_steps(each.covariance[:, :2, :2], each.dt) for each in solutions]) + EXACT * np.eye(2),
-        unwidened=unwidened + EXACT * np.eye(2),
-        widening=np.array(widening),
+        plans=np.array([_tabulate_plans(predicted, hand, each) + EXACT * np.eye(2) for each in widened]),
         branch_times=compute_branch_times(passages),
         decisions=find_decisions(sides[has_likelihood], goal[has_likelihood], grown, hand, goals),
     )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.analysis.recordings import Recording
-from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.replay import Replay, keep_last_run
 from foc_ros.analysis.scenes import NO_GOAL
 from foc_ros.core.classes import compute_swept_angles
 from foc_ros.core.classes.rows import WALL, Rows, locate_rows
@@ -99,10 +99,9 @@ class RecordedHand:
 def read_hand(recording: Recording, config: Config) -> RecordedHand:
     """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
     replayed, samples = Replay(config), list[HandSample]()
-    for sample in (sample for _, sample in replayed.take(recording.items()) if sample is not None):
-        if samples and sample.stamp_ns <= samples[-1].stamp_ns:  # the recording begins anew
-            samples.clear()
-        samples.append(sample)
+    for _, sample in replayed.take(recording.items()):
+        if sample is not None:
+            keep_last_run(samples, sample)
     scene = replayed.pipeline.scene
     if scene.goals is None or not len(scene.goals):
         raise RecordingError(f'{recording.name}: {replayed.pipeline.not_ready_reason() or "no goal received"}')

@@ -117,7 +117,7 @@ def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
     config = replace_values(fit.config, thinned)
-    observed, failed = collect(partial(observe, config=config), list(recordings.items()), 'replay')
+    observed, failed = collect(partial(observe, config=config, with_plans=True), list(recordings.items()), 'replay')
     fit.failed.update(failed)
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')

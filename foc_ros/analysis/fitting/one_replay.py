@@ -137,8 +137,8 @@ def compute_mean_densities(observation: Observation, shares: Array, widenings: I
 
 def widen_covariances(observation: Observation, widenings: Iterable[Sequence[float]]) -> Array:
     """Return the covariance (q, k, 3, 2, 2) [m^2] of the candidates' positions at `HORIZONS_S` with each widening."""
-    added = np.tensordot(np.array(widenings) ** 2, observation.candidates.widening, 1)
-    return np.asarray(observation.candidates.unwidened + added)
+    plain, widened = observation.candidates.plans[0], observation.candidates.plans[1:]
+    return np.asarray(plain + np.tensordot(np.array(widenings) ** 2, widened - plain, 1))
 
 
 def compute_coverage(

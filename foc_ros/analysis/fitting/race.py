@@ -135,7 +135,7 @@ def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> 
     """Score the predictions of one setting in a recording; return its number and the scores."""
     number, given, config, thinned = item
     config = replace_values(config, thinned)
-    recording, found = observe(given, config), ReplayScores({}, {})
+    recording, found = observe(given, config, with_plans=True), ReplayScores({}, {})
     gaps = {observation.stamp_ns: question for observation, question in ask_all(recording, GAP)}
     for observation, question in ask_main(recording):
         shares, logs = [power_rule_shares(observation, rule) for rule in RULES], np.zeros(len(RULES))

@@ -29,6 +29,7 @@ HARMS = {'wrong_way_s': 'completion_s', 'wrong_way_effort': 'effort'}
 """What an operator needs more than alone where the likeliest way was wrong, nan elsewhere, and the measure that it is of."""
 COLUMNS = {
     'collision_rate': ('collisions [%]', 100.0, 1),
+    'arrival_rate': ('arrivals [%]', 100.0, 1),
     'completion_s': ('time [s]', 1.0, 2),
     'min_clearance_m': ('clearance [mm]', 1e3, 1),
     'path_m': ('path [m]', 1.0, 3),
@@ -109,13 +110,14 @@ class Trial(Record):
     """What happened in a trial, at each of its n time steps.
 
     position (n, 2) [m]; assistance, effort (n, 2): forces of assistance and operator [N]; is_wrong (n,): whether the rule took
-    another way than the intended one to be the likeliest.
+    another way than the intended one to be the likeliest; has_arrived: whether the hand came to rest at its goal in time.
     """
 
     position: Array
     assistance: Array
     effort: Array
     is_wrong: Array
+    has_arrived: bool
 
     def measure_clearances(self, task: Task) -> Array:
         """Return the distance of the hand from the nearest obstacle, (n,) [m]; infinite without obstacles."""
@@ -126,17 +128,18 @@ class Trial(Record):
 def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: Array) -> Trial:
     """Run a trial. noise (n, 2, 2): standard normal numbers for arm and measurement, the same ones for each rule of a pair."""
     arm, rule, rows = SimulatedArm(task.arm, task.path), assistance(task, config), []
-    was_away = False  # a movement that comes back to where it begins has not arrived there at its start
+    was_away = has_arrived = False  # a movement that comes back to where it begins has not arrived there at its start
     for step, (shaken, measured) in enumerate(noise):
         force = rule.update(step, arm.position + 3e-4 * measured)  # the standard deviation of a tracker [m]
         arm.move(force, shaken)
         rows.append((*arm.position, *force, *arm.force, float(rule.is_wrong)))
         is_away = np.hypot(*(arm.position - task.goal)) >= 0.01  # [m]
         was_away = was_away or is_away
-        if was_away and not is_away and np.hypot(*arm.velocity) < 0.05:  # [m/s]
+        has_arrived = was_away and not is_away and np.hypot(*arm.velocity) < 0.05  # [m/s]
+        if has_arrived:
             break
     table = np.array(rows)
-    return Trial(table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6])
+    return Trial(table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6], has_arrived)
 
 
 def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
@@ -152,7 +155,8 @@ def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
     opposing = DT * float(np.maximum(-along, 0.0).sum())
     return {
         'collision_rate': float(clearance < 0.0),
-        'completion_s': duration_s,
+        'arrival_rate': float(trial.has_arrived),
+        'completion_s': duration_s if trial.has_arrived else np.nan,
         'min_clearance_m': clearance if len(task.obstacles) else np.nan,
         'path_m': float(np.hypot(*np.diff(trial.position, axis=0).T).sum()),
         'effort': DT * float((trial.effort**2).sum()),

@@ -115,14 +115,14 @@ class Graph(Record):
         length = np.hypot(*(nodes.points[rows] - point).T)
         return Lines(point, scale, rows, length, count_crossings(point - outlines.centre, nodes.offsets[rows]))
 
-    def measure_rest(self, goal: Lines) -> list[float]:
+    def measure_lengths(self, goal: Lines) -> list[float]:
         """Return the length of the shortest path from each node to a goal [m], infinite if there is none."""
         first = np.append(self.first, self.first[-1] + len(goal.nodes))
         head, length = np.append(self.head, goal.nodes), np.append(self.length, goal.length)
         length = np.maximum(length, 1e-12)  # vertices of different outlines may coincide
         lines = csr_matrix((length, head, first), shape=(len(first) - 1, len(first) - 1))
-        rest: list[float] = dijkstra(lines, indices=len(first) - 2)[:-1].tolist()
-        return rest
+        lengths: list[float] = dijkstra(lines, indices=len(first) - 2)[:-1].tolist()
+        return lengths
 
 
 @lru_cache(maxsize=KEPT)

@@ -52,15 +52,15 @@ class Arrival(NamedTuple):
 class PathQuery:
     """Which paths to look for.
 
-    hand, goal: lines from both to the nodes of a graph; rest (v,): least length from each node to the goal [m]; named (k,): rows
-    of the obstacles in the names; velocity (2,): of the hand [m/s]; max_states: number that the search may look at; deadline:
-    after it, the search ends once it has found a path.
+    hand, goal: lines from both to the nodes of a graph; heuristic (v,): least length from each node to the goal [m]; named (k,):
+    rows of the obstacles in the names; velocity (2,): of the hand [m/s]; max_states: number that the search may look at;
+    deadline: after it, the search ends once it has found a path.
     """
 
     graph: Graph
     hand: Lines
     goal: Lines
-    rest: list[float]
+    heuristic: list[float]
     named: Rows
     velocity: Array
     max_states: int
@@ -74,16 +74,16 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
     search.
     """
     graph, goal, named, centre = query.graph, query.goal, query.named, query.graph.nodes.outlines.centre
-    lines, ends = _list_lines(graph, named.tobytes()), len(query.rest)
-    rest = [*query.rest, 0.0]
+    lines, ends = _list_lines(graph, named.tobytes()), len(query.heuristic)
+    heuristic = [*query.heuristic, 0.0]
     to_goal = dict(zip(goal.nodes.tolist(), zip(goal.length.tolist(), _encode(-goal.crossings, named), strict=True), strict=True))
     ones = sum(1 << BITS * row for row in range(len(named)))
     is_within = ones << BITS - 1
     bearing_change = compute_bearings(goal.point - centre[named]) - compute_bearings(query.hand.point - centre[named])
     frontier, entries = list[tuple[float, int, float, int, int, int]](), 0
     for node, key, code in _leave_hand(query):
-        if rest[node] < np.inf:
-            heappush(frontier, (key + rest[node], entries, key, node, NEUTRAL * ones + code, -1))
+        if heuristic[node] < np.inf:
+            heappush(frontier, (key + heuristic[node], entries, key, node, NEUTRAL * ones + code, -1))
             entries += 1
     seen, node_of, before, tied, found = set[tuple[int, int]](), list[int](), list[int](), list[Arrival](), 0
     # each named obstacle has two sides, so that there are at most 2^k classes
@@ -117,8 +117,8 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
             extended = code + crossed
             if extended & is_within != is_within or extended & extended >> 1 & extended >> 2 & ones:
                 continue  # it winds about an obstacle
-            if rest[other] < np.inf and (other, extended) not in seen:
-                heappush(frontier, (key + step + rest[other], entries, key + step, other, extended, state))
+            if heuristic[other] < np.inf and (other, extended) not in seen:
+                heappush(frontier, (key + step + heuristic[other], entries, key + step, other, extended, state))
                 entries += 1
     if tied:
         yield tied
@@ -155,8 +155,8 @@ def _is_taut(query: PathQuery, node: int, other: int) -> bool:
     hand, at, ahead = (hand_x, hand_y), places[node], (goal_x, goal_y) if other == len(places) else places[other]
     before, after = places[nodes.previous[node]], places[nodes.following[node]]
     is_left = _turn(hand, at, before) + _turn(hand, at, after) > 0.0
-    bend, rest = _turn(hand, at, ahead), _turn(at, ahead, after if is_left else before)
-    return min(bend, rest) >= -TAUT if is_left else max(bend, rest) <= TAUT
+    bend, next_bend = _turn(hand, at, ahead), _turn(at, ahead, after if is_left else before)
+    return min(bend, next_bend) >= -TAUT if is_left else max(bend, next_bend) <= TAUT
 
 
 def _turn(at: tuple[float, float], one: tuple[float, float], other: tuple[float, float]) -> float:

@@ -17,7 +17,7 @@ from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import find_holders, measure_offsets
 from foc_ros.core.obstacles.risk import centre_trajectories
-from foc_ros.core.solution import LEFT, RIGHT, Candidate, Way, label_class
+from foc_ros.core.solution import LEFT, RIGHT, Candidate, Signature, label_class
 from foc_ros.core.types import Array, as_readonly
 
 from .graph import Graph, Lines, Rows, build_graph
@@ -48,7 +48,7 @@ class PathClass(NamedTuple):
     known: Candidate | None = None
 
     @property
-    def way(self) -> Way:
+    def signature(self) -> Signature:
         """The obstacles in the name with their sides."""
         return frozenset(self.sides)
 
@@ -109,11 +109,11 @@ class SearchScene:
         """Yield each class to a goal once, in the order of their rank; after the deadline, the first one only."""
         rows = np.flatnonzero(self.names.blocks[goal])
         graph, hand = self._connect_hand(rows)
-        lines, rest = _join_goal(graph, *self._goals[goal].tolist())
+        lines, heuristic = _join_goal(graph, *self._goals[goal].tolist())
         named = np.flatnonzero(self.names.is_named[goal, rows])
         ids = [self._near.ids[row] for row in rows[named].tolist()]
         order = sorted(range(len(ids)), key=ids.__getitem__)
-        query = PathQuery(graph, hand, lines, rest, named, self._velocity, self._max_states, deadline)
+        query = PathQuery(graph, hand, lines, heuristic, named, self._velocity, self._max_states, deadline)
         # paths rank by their length to the nanometre: rounding errors do not decide between equal lengths
         for tied in find_shortest_paths(query, self.notes):
             classes = []
@@ -193,4 +193,4 @@ class SearchScene:
 def _join_goal(graph: Graph, x: float, y: float) -> tuple[Lines, list[float]]:
     """Return the lines from a goal to the nodes of a graph, and the length of the shortest path from each node to it [m]."""
     lines = graph.join(np.array([x, y]))
-    return lines, graph.measure_rest(lines)
+    return lines, graph.measure_lengths(lines)

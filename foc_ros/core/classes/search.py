@@ -17,7 +17,7 @@ from foc_ros.core.config import MOST_CANDIDATES, HomotopyConfig
 from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.solution import Candidate, Way, agrees
+from foc_ros.core.solution import Candidate, Signature, agrees
 from foc_ros.core.types import Array
 
 from .scene import PathClass, SearchScene
@@ -132,9 +132,12 @@ def search(
     count = max(config.max_candidates, min(len(goals), MOST_CANDIDATES))
     chosen = ranking.choose(count)
     candidates = scene.make_candidates(chosen)
-    ways, reached = {each.way for each in chosen}, {each.goal for each in chosen}
-    seen = {each.label: each for each in ranking.seen if each.goal not in reached or not any(each.way <= way for way in ways)}
-    unfollowed = scene.make_candidates(tuple(seen.values()))
+    signatures, reached = {each.signature for each in chosen}, {each.goal for each in chosen}
+    seen = {each.label: each for each in ranking.seen}
+    others = [
+        each for each in seen.values() if each.goal not in reached or not any(each.signature <= other for other in signatures)
+    ]
+    unfollowed = scene.make_candidates(tuple(others))
     notes = {name: number for name, number in scene.notes.items() if number}
     return Search(candidates, notes, next_goal, unfollowed, scene.list_named())
 
@@ -150,9 +153,9 @@ class _Ranking:
 
     def __init__(self, scene: SearchScene, previous: Sequence[Candidate], max_detour: float, deadline: Deadline) -> None:
         self._scene, self._max_detour, self._deadline = scene, max_detour, deadline
-        self._followed, self._ways = {each.label for each in previous}, defaultdict[int, set[Way]](set)
+        self._followed, self._signatures = {each.label for each in previous}, defaultdict[int, set[Signature]](set)
         for each in previous:
-            self._ways[each.goal].add(frozenset(each.sides))
+            self._signatures[each.goal].add(frozenset(each.sides))
         self._bests: list[PathClass] = []
         self._shortest: list[PathClass] = []
         self._others: list[Iterable[PathClass]] = []
@@ -211,14 +214,14 @@ class _Ranking:
         If the time ends, known classes of the previous prediction take the place of those that were not found again.
         """
         bests = sorted(self._bests, key=self._rank)[:count]
-        before = [(each.goal, each.way) for each in self._shortest]
+        before = [(each.goal, each.signature) for each in self._shortest]
         chosen, labels, room = list[tuple[float, str, PathClass]](), {each.label for each in bests}, count - len(bests)
 
         def add(found: PathClass) -> None:
-            is_repeated = any(goal != found.goal and agrees(found.way, way) for goal, way in before)
+            is_repeated = any(goal != found.goal and agrees(found.signature, other) for goal, other in before)
             factor = REPEAT if is_repeated else 1.0
             insort(chosen, (factor * self._rank(found)[0], found.label, found))
-            before.append((found.goal, found.way))
+            before.append((found.goal, found.signature))
             labels.add(found.label)
 
         is_late = room > 0 and self._deadline.has_passed
@@ -251,5 +254,5 @@ class _Ranking:
         return found
 
     def _rank(self, found: PathClass) -> tuple[float, str]:
-        is_followed = any(agrees(found.way, way) for way in self._ways[found.goal])
+        is_followed = any(agrees(found.signature, other) for other in self._signatures[found.goal])
         return found.key * (STAY if is_followed else 1.0), found.label

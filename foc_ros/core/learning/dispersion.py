@@ -166,10 +166,19 @@ def interpolate_factors(share: Array, config: CovarianceConfig) -> Array:
 
 
 def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) -> PredictedCandidate:
-    """Return a candidate whose covariance has the factors of config; that of motor noise and that of the height stay."""
+    """Return a candidate whose covariance has the factors of config; that of motor noise and that of the height stay.
+
+    The error of the position is f(t) times what it was, and those of velocity and acceleration are its derivatives.
+    """
     if config.near == config.far == 1.0:
         return candidate
     solution = candidate.solution
-    factors = interpolate_factors(compute_shares(np.linspace(0.0, 1.0, len(solution.mean))), config)
-    covariance = solution.covariance * factors[:, None, None] ** 2
+    growth = 2.0 * math.log(config.far / config.near) / float(solution.times[-1]) ** 2
+    rate = growth * solution.times[:, None, None] * np.eye(2)  # f' / f
+    errors = np.tile(np.eye(solution.mean.shape[1]), (len(rate), 1, 1))
+    errors[:, 2:4, :2] = rate
+    if errors.shape[1] >= 6:
+        errors[:, 4:6, 2:4], errors[:, 4:6, :2] = 2.0 * rate, rate**2 + growth * np.eye(2)
+    errors *= interpolate_factors(compute_shares(np.linspace(0.0, 1.0, len(rate))), config)[:, None, None]
+    covariance = errors @ solution.covariance @ errors.swapaxes(1, 2)
     return replace(candidate, solution=solution.with_covariance(covariance))

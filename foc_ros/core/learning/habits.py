@@ -12,9 +12,9 @@ If reaches to a goal are Poisson events, w_i is the posterior mean of their rate
 ratio is a gamma distribution with the mean 1 and the variance c.
 
 Two goals are the same if each is the only goal in the obstacle with the same id. Goals without such an obstacle are the same if
-they lie within 20 mm of each other.
+they lie within `SAME_M` of each other.
 
-Reaches are expected to end at the mean displacement from their goal of the n earlier ones, times n / (n + 3).
+Reaches are expected to end at the mean displacement from their goal of the n earlier ones, times n / (n + `PRIOR_REACHES`).
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ from .movements import find_goal_at_end
 MOST_LEFT_M = 0.1
 """Largest distance from its goal at which a reach may end [m]: hands touch objects at their edges. A short reach has to cover
 half of its way."""
+MOST_GOALS, SAME_M, PRIOR_REACHES = 64, 0.02, 3
+"""Number of goals that are remembered; distance within which two are the same [m]; number of reaches that the prior counts as."""
 
 
 class KnownGoal(NamedTuple):
@@ -102,7 +104,7 @@ class Habits(Record):
 
     def find_ends(self, goals: Array) -> Array:
         """Return where reaches to goals (g, 2) [m] are expected to end, (g, 2) [m]."""
-        return goals + self.missed / (self.reaches + 3)
+        return goals + self.missed / (self.reaches + PRIOR_REACHES)
 
     def _end(self, reach: PresentMovement, beta: float) -> Habits:
         """Return the habits after a reach, which counts if it ended at a goal."""
@@ -118,13 +120,13 @@ class Habits(Record):
         ]
         others = [each for each in self.known if all(each is not other for other in before)]
         missed = self.missed + reach.position - reach.goals[goal]
-        return Habits(tuple([*others, *now][-64:]), None, self.reaches + 1, missed)
+        return Habits(tuple([*others, *now][-MOST_GOALS:]), None, self.reaches + 1, missed)
 
     def _find(self, name: str | None, position: Array) -> KnownGoal:
         """Return what is known of a goal, nothing where it is new."""
         same = (each for each in self.known if each.name == name)
         if name is None:
-            same = (each for each in same if math.dist(each.position, position) <= 0.02)
+            same = (each for each in same if math.dist(each.position, position) <= SAME_M)
         return min(same, key=lambda each: math.dist(each.position, position), default=KnownGoal(name, position))
 
 

@@ -11,8 +11,8 @@ the goal in T_f(t) would be h = `AHEAD_S` later is compared with where the hand 
 A movement that has covered most of its distance to a goal counts with c = 1. In the present one, c is the distance of the hand
 from the onset relative to that of the goal, at most 1, and the goal is the one for which the least loss is smallest.
 
-With sigma of `duration.spread`, c of `PRECISION` and w = 3 nat for the arrival that `duration.arrival` does not name,
-the posterior of arrival and factor is
+With sigma of `duration.spread`, or `LEAST_SPREAD`, c of `PRECISION` and w = 3 nat for the arrival that `duration.arrival` does
+not name, the posterior of arrival and factor is
 
     log P = -(log f / sigma)^2 / 2 - w - c sum l_f.
 
@@ -50,6 +50,9 @@ FACTORS = as_readonly(np.exp(LOG_FACTORS))
 """Factors that are judged."""
 PRECISION = 31.0
 """By how much the logarithm of the probability falls per unit of the loss of a movement."""
+LEAST_SPREAD = 0.2
+"""Least standard deviation of the logarithm of the factor before the first movement: durations of one session may be alike, and a
+fit to it finds no spread."""
 AHEAD_S = 0.5
 """How far ahead positions are judged [s]."""
 SAMPLE_S = 0.1
@@ -154,7 +157,7 @@ class Pace(Record):
         if not self.is_known:
             return config.arrival, 1.0
         axes, row = (np.arange(len(ARRIVALS), dtype=float), LOG_FACTORS), ARRIVALS.index(config.arrival)
-        prior = GridPosterior.from_normal(axes, (np.inf, max(config.spread, 1e-3)))
+        prior = GridPosterior.from_normal(axes, (np.inf, max(config.spread, LEAST_SPREAD)))
         posterior = prior.add(-PRECISION * self.losses)
         if self.movements:
             is_other = np.array([[each != config.arrival] for each in ARRIVALS])

@@ -56,12 +56,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.classes import find_path_sides
-from foc_ros.core.classes.library import NEAR, STEP_S, Demonstration, is_same_demonstration
+from foc_ros.core.classes.library import NEAR, POINTS, STEP_S, Demonstration, is_same_demonstration
 from foc_ros.core.classes.rows import Decisions, find_decisions, tabulate_sides
 from foc_ros.core.classes.sides import measure_passages
 from foc_ros.core.likelihood import divide_among_groups
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.clearance import measure_clearance
+from foc_ros.core.obstacles.clearance import find_blocked, measure_clearance
 from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.prediction import PredictedCandidate
 from foc_ros.core.solution import Candidate, Solution
@@ -157,9 +157,8 @@ NO_LIBRARY = make_library(())
 
 
 def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals: Array) -> Evidence:
-    """Find the recordings that count: nearest first, at most MOST_NEAR, only those whose obstacles are where they were."""
-    scale = np.repeat([POSITION_STDDEV, VELOCITY_STDDEV], 2)
-    apart = (((library.states - hand.mean[:4]) / scale) ** 2).sum(axis=2)
+    """Find the recordings that count: the MOST_NEAR nearest whose obstacles are where they were and leave their paths free."""
+    apart = (((library.states - hand.mean[:4]) / np.repeat([POSITION_STDDEV, VELOCITY_STDDEV], 2)) ** 2).sum(axis=2)
     state = apart.argmin(axis=1)
     weight = np.exp(-0.5 * apart[np.arange(len(apart)), state])
     is_near, is_here = weight >= LEAST_WEIGHT, np.zeros(len(weight), dtype=np.bool_)
@@ -167,16 +166,20 @@ def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals
         is_here = library.find_here(hand.frame_id, obstacles)
     rows = np.argsort(-weight, kind='stable')
     rows = rows[(is_near & is_here)[rows]][:MOST_NEAR]
-    sides, passing_s = np.zeros((len(rows), len(obstacles)), dtype=np.int8), np.zeros((len(rows), len(obstacles)))
     column = {name: number for number, name in enumerate(obstacles.ids)}
+    near = [library.recordings[row] for row in rows]
+    known = obstacles.take(sorted({column[name] for each in near for name in each.ids}))
+    is_blocked = find_blocked(np.array([each.path for each in near]).reshape(len(near), POINTS, 2), known)
+    is_here[rows[is_blocked]] = False
+    rows = rows[~is_blocked]
+    sides, passing_s = np.zeros((len(rows), len(obstacles)), dtype=np.int8), np.zeros((len(rows), len(obstacles)))
     for number, row in enumerate(rows.tolist()):
         recording = library.recordings[row]
         columns = [column[name] for name in recording.ids]
         sides[number, columns] = recording.rest_sides[state[row]]
         passing_s[number, columns] = STEP_S * (recording.passing - state[row])
     is_at_goal = np.hypot(*(library.goals[:, None] - goals).transpose(2, 0, 1)) <= NEAR
-    recorded = is_at_goal[is_here].sum(axis=0)
-    return Evidence(weight[rows], rows, state[rows], sides, passing_s, is_at_goal[rows], recorded)
+    return Evidence(weight[rows], rows, state[rows], sides, passing_s, is_at_goal[rows], is_at_goal[is_here].sum(axis=0))
 
 
 def pool_recordings(

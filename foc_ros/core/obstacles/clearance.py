@@ -38,6 +38,16 @@ def is_free(path: Array, obstacles: Obstacles, dt: float) -> bool:
     return not bool((is_inside.any(axis=0) & ~is_inside[0] & ~is_inside[-1]).any())
 
 
+def find_blocked(paths: Array, obstacles: Obstacles) -> NDArray[np.bool_]:
+    """Tell which of the paths (r, m, 2) [m] through points that are close together are not free, (r,), as `is_free` does."""
+    extents = obstacles.radius + np.hypot(*obstacles.vertices.T).max(axis=0)
+    apart = np.hypot(*(paths[:, :, None] - obstacles.centre).transpose(3, 0, 1, 2))
+    near = obstacles.take(np.flatnonzero((apart < extents).any(axis=(0, 1))))
+    distances = measure_offsets(paths, near)[1].reshape(*paths.shape[:2], len(near)) - near.radius
+    is_inside = distances < -GRAZE_M
+    return np.asarray((is_inside.any(axis=1) & ~is_inside[:, 0] & ~is_inside[:, -1]).any(axis=1))
+
+
 def _measure_distances(path: Array, obstacles: Obstacles, dt: float) -> Array:
     """Return the distances (m, n) [m] of points along a path from obstacles that move on meanwhile, negative inside."""
     steps = len(path) - 1

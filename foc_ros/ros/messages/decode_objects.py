@@ -25,7 +25,7 @@ from foc_ros.core.obstacle_table import UNKNOWN_HEIGHTS, Obstacles, make_obstacl
 from foc_ros.core.obstacles.polygons import FLAT, make_hull_polygon
 from foc_ros.core.types import NANOSECONDS, Array
 
-from .decode_point_cloud import MAX_ROWS, DecodedCloud
+from .decode_point_cloud import MAX_ROWS
 from .decode_poses import MAX_COORDINATE, FrameLookup, check_coordinates, decode_frame, decode_point, decode_stamp, keep_frame
 from .plane import NO_TRANSFORM, Transform, compute_rotation, lift, make_heights, project
 
@@ -185,7 +185,10 @@ class ObjectTable:
         outlines: dict[str, Outline] = {}
         for each in self._find_existing(now_ns).values():
             outlines |= each.outlines
-        return _collect(outlines, radius_stddev)
+        if not outlines:
+            return make_obstacles()
+        centres, polygons, radii, heights = zip(*outlines.values(), strict=True)
+        return make_obstacles(centres, radii, radius_stddev, tuple(outlines), polygons=polygons, heights=heights)
 
     def count_expired(self, now_ns: int) -> int:
         """Return how many of the markers do not exist any more at a time [ns]."""
@@ -229,8 +232,8 @@ def _read_primitives(message: Any, dropped: Counter[str]) -> list[Solid]:
     return found
 
 
-def decode_detections(message: Any, plane: str, radius_stddev: float, look_up: FrameLookup = keep_frame) -> DecodedCloud:
-    """Decode the boxes of a Detection3DArray, the whole scene; the name of one is its id, or its row if it has none.
+def decode_detections(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> ObjectTable:
+    """Decode the boxes of a Detection3DArray, the whole scene, as one object; a box is named by its id, or its row without one.
 
     A detection with a number that is not finite is dropped and counted; of several with one id the last is used. Raises
     MessageError for a negative size, a box without an extent in the plane, a coordinate beyond MAX_COORDINATE, another frame than
@@ -254,7 +257,7 @@ def decode_detections(message: Any, plane: str, radius_stddev: float, look_up: F
         name = encode_name(each.id or row)
         dropped['duplicate_id'] += outlines.pop(name, None) is not None
         outlines[name] = outline(box, plane, f'{label}.bbox.size')
-    return DecodedCloud(_collect(outlines, radius_stddev), stamp_ns, frame_id, dict(+dropped))
+    return ObjectTable({'': Present(outlines)}, frame_id, stamp_ns, +dropped)
 
 
 def encode_name(*parts: object) -> str:
@@ -275,7 +278,7 @@ def _is_finite(pose: Any, size: Any, *, is_turned: bool) -> bool:
 
 def _read_pose(name: str, pose: Any, transform: Transform = NO_TRANSFORM) -> Transform:
     """Return a pose after a transform, if its numbers are within their bounds."""
-    check_coordinates(f'{name}.orientation', [*_read(pose.orientation), pose.orientation.w])
+    check_coordinates(f'{name}.orientation', [*_read(pose.orientation), pose.orientation.w], unit='')
     position = decode_point(pose.position, f'{name}.position', transform)
     return Transform(transform.rotation @ compute_rotation(pose.orientation), position)
 
@@ -286,10 +289,3 @@ def _read_sizes(name: str, lengths: Iterable[float], parts: Iterable[str] = ('.x
         if not 0.0 <= length <= MAX_COORDINATE:
             raise MessageError(f'{name}{part}', f'a size in [0, {MAX_COORDINATE:g}] m', f'{length:g}')
     return sizes
-
-
-def _collect(outlines: Mapping[str, Outline], radius_stddev: float) -> Obstacles:
-    if not outlines:
-        return make_obstacles()
-    centres, polygons, radii, heights = zip(*outlines.values(), strict=True)
-    return make_obstacles(centres, radii, radius_stddev, tuple(outlines), polygons=polygons, heights=heights)

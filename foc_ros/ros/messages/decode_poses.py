@@ -108,10 +108,10 @@ def decode_point(point: Any, field: str, transform: Transform) -> Array:
     return position
 
 
-def check_coordinates(field: str, values: Iterable[float]) -> None:
-    """Raise MessageError for the first of x, y, z, w that is not finite or beyond MAX_COORDINATE."""
+def check_coordinates(field: str, values: Iterable[float], unit: str = ' [m]') -> None:
+    """Raise MessageError for the first of x, y, z, w that is not finite or beyond MAX_COORDINATE; an orientation has no unit."""
     for axis, value in zip('xyzw', values, strict=False):
         if not math.isfinite(value):
-            raise MessageError(f'{field}.{axis}', 'a finite number [m]', value)
+            raise MessageError(f'{field}.{axis}', f'a finite number{unit}', value)
         if abs(value) > MAX_COORDINATE:
-            raise MessageError(f'{field}.{axis}', f'a coordinate within {MAX_COORDINATE:g} m of the origin', f'{value:g}')
+            raise MessageError(f'{field}.{axis}', f'a number from -{MAX_COORDINATE:g} to {MAX_COORDINATE:g}{unit}', f'{value:g}')

@@ -32,46 +32,46 @@ class SampleHeader:
     plane: str
 
 
-def encode_wrench(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> Any:
+def encode_wrench(output: GuidanceOutput, header: SampleHeader, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/WrenchStamped without torque."""
-    header = make_header(types, sample.stamp_ns, sample.frame_id)
-    return types.fill('geometry_msgs/msg/WrenchStamped', (header, encode_force(output, sample, types)))
+    stamped = make_header(types, header.stamp_ns, header.frame_id)
+    return types.fill('geometry_msgs/msg/WrenchStamped', (stamped, encode_force(output, header, types)))
 
 
-def encode_force(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> Any:
+def encode_force(output: GuidanceOutput, header: SampleHeader, types: MessageTypes) -> Any:
     """Encode the force as a geometry_msgs/Wrench without torque and without a stamp, as drivers of haptic devices take it."""
-    return types.make('geometry_msgs/msg/Wrench', force=lift(output.force, 0.0, sample.plane))
+    return types.make('geometry_msgs/msg/Wrench', force=lift(output.force, 0.0, header.plane))
 
 
-def encode_reference(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> Any:
+def encode_reference(output: GuidanceOutput, header: SampleHeader, types: MessageTypes) -> Any:
     """Encode the reference as a geometry_msgs/PoseStamped, whose orientation means nothing."""
-    return encode_hand_pose(types, sample.stamp_ns, sample.frame_id, lift(output.reference, sample.height, sample.plane))
+    return encode_hand_pose(types, header.stamp_ns, header.frame_id, lift(output.reference, header.height, header.plane))
 
 
-def encode_stiffness(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> Any:
+def encode_stiffness(output: GuidanceOutput, header: SampleHeader, types: MessageTypes) -> Any:
     """Encode the stiffness [N/m] as a std_msgs/Float64MultiArray of 3 x 3."""
-    axes = lift(np.eye(2), 0.0, sample.plane)
+    axes = lift(np.eye(2), 0.0, header.plane)
     return encode_array(types, axes.T @ output.stiffness @ axes, (('row', 3, 9), ('column', 3, 3)))
 
 
-def blend_twist(output: GuidanceOutput, sample: SampleHeader, command: Any, types: MessageTypes) -> Any:
+def blend_twist(output: GuidanceOutput, header: SampleHeader, command: Any, types: MessageTypes) -> Any:
     """Return a geometry_msgs/TwistStamped command with the part in the plane blended; the rest of it is kept.
 
     Raises InputError for a command in another frame, and for a number that is not finite.
     """
     frame_id, linear = decode_frame(command.header), command.twist.linear
-    if frame_id != sample.frame_id:
-        raise MessageError('header.frame_id', f'the working frame {sample.frame_id!r}', repr(frame_id))
-    velocity, across = project([linear.x, linear.y, linear.z], sample.plane)
-    blended = lift(output.blend_command(velocity), across, sample.plane)
+    if frame_id != header.frame_id:
+        raise MessageError('header.frame_id', f'the working frame {header.frame_id!r}', repr(frame_id))
+    velocity, across = project([linear.x, linear.y, linear.z], header.plane)
+    blended = lift(output.blend_command(velocity), across, header.plane)
     return types.fill('geometry_msgs/msg/TwistStamped', (command.header, (blended, command.twist.angular)))
 
 
-def encode_guidance_markers(output: GuidanceOutput, sample: SampleHeader, types: MessageTypes) -> list[Any]:
+def encode_guidance_markers(output: GuidanceOutput, header: SampleHeader, types: MessageTypes) -> list[Any]:
     """Encode the force as an arrow from the hand, of 2 cm for each newton, and the reference as a sphere of 8 mm."""
-    start = lift(output.position, sample.height, sample.plane)
-    points = np.stack([start, start + 0.02 * lift(output.force, 0.0, sample.plane)])
-    reference = encode_reference(output, sample, types)
+    start = lift(output.position, header.height, header.plane)
+    points = np.stack([start, start + 0.02 * lift(output.force, 0.0, header.plane)])
+    reference = encode_reference(output, header, types)
     shared = {'ns': 'guidance', 'header': reference.header, 'lifetime': (1, 0), 'color': COLOUR}
     arrow = {'type': ARROW, 'scale': (0.004, 0.008, 0.0), 'pose': ((0.0, 0.0, 0.0), NO_ROTATION), 'points': points}
     sphere = {'id': 1, 'type': SPHERE, 'scale': (0.008, 0.008, 0.008), 'pose': reference.pose}
