@@ -300,8 +300,9 @@ def test_a_class_waits_for_the_next_prediction_only_if_it_is_unlikely(position, 
     )
     waiting = [row for row, each in enumerate(brief) if each.status is Status.ESTIMATED]
     assert waiting, 'the scene is no test'
-    behind = np.log([each.cost for each in whole]) - np.log(min(each.cost for each in whole))
-    assert (now.config.likelihood.beta * behind[waiting] > 4.0).all()
+    rule = now.config.likelihood  # costs and missing safety, as likelihoods compare them
+    behind = np.array([rule.beta * np.log(each.cost) + rule.shortfall * each.solution.safety_shortfall for each in whole])
+    assert (behind[waiting] - behind.min() > 4.0).all()
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])
