@@ -59,6 +59,14 @@ def locate(times: Array, steps: int) -> tuple[NDArray[np.intp], Array]:
     return step, times - step
 
 
+def interpolate_linear(values: Array, at: Array) -> Array:
+    """Return values (m, ...) at times (m,) [steps], linear between those at steps 0..N, (N + 1, ...)."""
+    step, share = locate(at, len(values) - 1)
+    share = share.reshape(-1, *(1,) * (values.ndim - 1))
+    found: Array = (1.0 - share) * values[step] + share * values[step + 1]
+    return found
+
+
 def interpolate_position(mean: Array, dt: float, times: Array) -> Array:
     """Return the mean position (..., 2) [m] at times (...) [s] from states (N + 1, n) at steps of dt [s]."""
     step, share = locate(times / dt, len(mean) - 1)

@@ -30,6 +30,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .interpolation import interpolate_linear
 from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
@@ -296,12 +297,13 @@ def take_remainder(solution: Solution, age_s: float, position: Array, reason: st
     if left_s <= solution.dt:
         return None
     begin, motor = age_s / solution.dt, solution.motor_covariance
-    mean, covariance = resample(solution.mean, begin), as_readonly(resample(solution.covariance, begin))
+    at = np.linspace(begin, steps, steps + 1)
+    mean, covariance = interpolate_linear(solution.mean, at), as_readonly(interpolate_linear(solution.covariance, at))
     aside, fall = position - mean[0, :2], fall_as_minimum_jerk(np.linspace(0.0, 1.0, steps + 1)[:, None])
     for order in range(mean.shape[1] // 2):
         mean[:, 2 * order : 2 * order + 2] += fall[order] * (aside / left_s**order)
     if motor is not None:
-        motor = as_readonly(resample(motor, begin))
+        motor = as_readonly(interpolate_linear(motor, at))
     during = (begin + (steps - begin) * (np.arange(steps) + 0.5) / steps).astype(np.intp)
     control = as_readonly(solution.control[np.minimum(during, steps - 1)])
     message, effort = f'{reason}; the answer is from {age_s:.3g} s ago', float((control**2).sum())
@@ -310,13 +312,3 @@ def take_remainder(solution: Solution, age_s: float, position: Array, reason: st
         expected *= effort / solution.effort
     rest = replace(solution, mean=as_readonly(mean), covariance=covariance, motor_covariance=motor, control=control)
     return replace(rest, effort=effort, expected=expected, dt=left_s / steps, message=message)
-
-
-def resample(states: Array, begin: float) -> Array:
-    """Return states (N + 1, ...), such as means or covariances, from the step `begin` on, at N steps."""
-    steps = len(states) - 1
-    at = np.linspace(begin, steps, steps + 1)
-    row = np.minimum(at.astype(np.intp), steps - 1)
-    share = (at - row).reshape(-1, *(1,) * (states.ndim - 1))
-    rest: Array = (1.0 - share) * states[row] + share * states[row + 1]
-    return rest

@@ -34,8 +34,7 @@ def measure_clearance(path: Array, obstacles: Obstacles, dt: float) -> float:
 
 def is_free(path: Array, obstacles: Obstacles, dt: float) -> bool:
     """Tell whether a path (N + 1, 2) [m] leads through no obstacle but those that hold its first or its last point; dt [s]."""
-    is_inside = _measure_distances(path, obstacles, dt) < -GRAZE_M
-    return not bool((is_inside.any(axis=0) & ~is_inside[0] & ~is_inside[-1]).any())
+    return not bool(_is_blocked(_measure_distances(path, obstacles, dt)))
 
 
 def find_blocked(paths: Array, obstacles: Obstacles) -> NDArray[np.bool_]:
@@ -44,8 +43,14 @@ def find_blocked(paths: Array, obstacles: Obstacles) -> NDArray[np.bool_]:
     apart = np.hypot(*(paths[:, :, None] - obstacles.centre).transpose(3, 0, 1, 2))
     near = obstacles.take(np.flatnonzero((apart < extents).any(axis=(0, 1))))
     distances = measure_offsets(paths, near)[1].reshape(*paths.shape[:2], len(near)) - near.radius
+    return _is_blocked(distances)
+
+
+def _is_blocked(distances: Array) -> NDArray[np.bool_]:
+    """Tell whether one of n obstacles holds points of a path, but neither the first nor the last; distances (..., m, n) [m]."""
     is_inside = distances < -GRAZE_M
-    return np.asarray((is_inside.any(axis=1) & ~is_inside[:, 0] & ~is_inside[:, -1]).any(axis=1))
+    is_between = is_inside.any(axis=-2) & ~is_inside[..., 0, :] & ~is_inside[..., -1, :]
+    return np.asarray(is_between.any(axis=-1))
 
 
 def _measure_distances(path: Array, obstacles: Obstacles, dt: float) -> Array:

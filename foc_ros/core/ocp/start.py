@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foc_ros.core.interpolation import interpolate_position
+from foc_ros.core.interpolation import interpolate_linear, interpolate_position
 from foc_ros.core.solution import Solution
 from foc_ros.core.types import Array
 
@@ -20,10 +20,10 @@ HELD = 3e-3
 """Distance from the places where an earlier solution touched obstacles, relative to the scene, that counts as much as a change of
 the control by its own size."""
 ERROR_EFFORT = np.array([[720.0, 360.0, 60.0], [360.0, 192.0, 36.0], [60.0, 36.0, 9.0]])
-"""Effort with which a triple integrator loses an error e of its position, velocity and acceleration within T: e'Me / T^5, for an
-error in units of T."""
+"""Least effort e'Me / T^5 that removes the errors of a triple integrator within a time T. In e, the error of the velocity is
+multiplied by T, and that of the acceleration by T^2."""
 TRIED, PARTS = 0.5, 4
-"""Share of an earlier movement on which the hand is looked for, and points of each step at which it is."""
+"""The hand is looked for on this first part of an earlier movement, at so many points of each step."""
 JITTER = 1e-13
 """Softness of the goal: its rows, of unit length, may depend on each other."""
 
@@ -62,9 +62,8 @@ def cold_start(guess: Array) -> Start:
 def warm_start(previous: Solution, problem: Problem) -> Start:
     """Start at an earlier solution, from where the hand is on it now, at the pace with which it ends at the new time.
 
-    A movement that takes longer than was thought has the same path, and with a pace r of its time a control r^3 times as large:
-    the derivative of the position of the order of the control. From the state of the hand, the least change of the control leads
-    to the places where the earlier solution touched obstacles.
+    A movement at r times its pace has the same path. Its velocity is r times as large, its jerk r^3 times, and a force about r^2
+    times. The least change of this control leads the hand to the places where the earlier solution touched obstacles.
     """
     steps, dt, gain = problem.horizon.steps, problem.horizon.dt, problem.horizon.gain
     begin_s = _find_hand(previous, problem)
@@ -88,15 +87,13 @@ def warm_start(previous: Solution, problem: Problem) -> Start:
 
 
 def _find_hand(previous: Solution, problem: Problem) -> float:
-    """Return the time of an earlier movement [s] from which on the hand needs least effort to go on as it does.
+    """Return the time [s] of the state of an earlier movement to which the hand gets with the least effort.
 
     It is not the time that has passed: a hand at rest is at the beginning, for as long as it rests.
     """
     count, new_s = len(previous.control), problem.horizon.dt * problem.horizon.steps
     at = np.linspace(0.0, TRIED * count, int(TRIED * count) * PARTS + 1)
-    step = np.minimum(at.astype(np.intp), count - 1)
-    share = (at - step)[:, None]
-    states = (1.0 - share) * previous.mean[step] + share * previous.mean[step + 1]
+    states = interpolate_linear(previous.mean, at)
     orders = states.shape[1] // 2
     pace, order = (previous.dt * (count - at) / new_s)[:, None, None], np.arange(orders)[:, None]
     errors = states[:, : 2 * orders].reshape(-1, orders, 2) * pace**order - problem.initial_mean[: 2 * orders].reshape(orders, 2)
@@ -109,13 +106,10 @@ def resample(previous: Solution, begin_s: float, dt: float, steps: int) -> tuple
     """Return path (steps + 1, 2) and stacked control (2 steps,) of a solution at new steps of dt [s], from a time of it on."""
     count = len(previous.control)
     at = np.minimum((begin_s + dt * np.arange(steps + 1)) / previous.dt, count)
-    step = np.minimum(at.astype(np.intp), count - 1)
-    share = (at - step)[:, None]
-    path: Array = (1.0 - share) * previous.path[step] + share * previous.path[step + 1]
     # the mean over each new step: the integral of the control, which is linear within the old steps
     total = np.concatenate((np.zeros((1, 2)), np.cumsum(previous.control, axis=0)))
-    control = (1.0 - share) * total[step] + share * total[step + 1]
-    return path, (np.diff(control, axis=0) * (previous.dt / dt)).T.ravel()
+    control = np.diff(interpolate_linear(total, at), axis=0) * (previous.dt / dt)
+    return interpolate_linear(previous.path, at), control.T.ravel()
 
 
 def follow(problem: Problem, times: Array, places: Array, weight: float, control: Array | None = None) -> Array:
