@@ -10,13 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.errors import SceneError
-from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.core.obstacle_table import make_obstacles, tabulate_edges
 from foc_ros.core.obstacles.geometry import (
     SMALLEST_DISTANCE,
     find_limits,
     find_offset,
     measure_offsets,
-    tabulate_edges,
     trace_obstacle,
 )
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles, make_box_polygon, make_hull_polygon

@@ -17,8 +17,8 @@ from reach_helpers import bowed, one_obstacle, reach, solved
 from scipy.interpolate import CubicHermiteSpline
 
 from foc_ros.core.config import FocConfig
-from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.obstacles.geometry import Edges, find_offset
+from foc_ros.core.obstacle_table import Edges, make_obstacles
+from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.obstacles.risk import RiskBound, compute_safety_factor, eta_of_k, size_moments
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp import gradients
@@ -144,7 +144,7 @@ def measure_factors(problem, control, points=100):
     factors = []
     for row in range(len(problem.obstacles)):
         centre = problem.obstacles.centre[row] + times[:, None] * problem.drift[row]
-        at = find_offset(*(position - centre).T, Edges(*(each[row] for each in problem.edges)))
+        at = find_offset(*(position - centre).T, Edges(*(each[row] for each in problem.obstacles.edges)))
         fixed = problem.obstacles.centre_covariance[row]
         nx, ny = at.normal_x, at.normal_y
         along = nx * nx * (xx + fixed[0, 0]) + ny * ny * (yy + fixed[1, 1]) + 2 * nx * ny * (xy + fixed[0, 1])

@@ -78,12 +78,12 @@ def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier
 
 
 def find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list[dict[str, int]]:
-    """Return the sides on which the path of each problem passes its obstacles, for all paths of a problem at once."""
+    """Return the sides on which the path of each problem passes its obstacles, for all paths among the same obstacles at once."""
     found: dict[int, dict[str, int]] = {}
-    for problem in {id(each): each for each in problems}.values():
-        rows = [row for row, each in enumerate(problems) if each is problem]
-        together = np.stack([paths[row] for row in rows])
-        found |= zip(rows, find_sides(together, problem.obstacles, problem.centre_trajectories), strict=True)
+    for obstacles in {id(each.obstacles): each.obstacles for each in problems}.values():
+        rows = [row for row, each in enumerate(problems) if each.obstacles is obstacles]
+        centres = np.stack([problems[row].centre_trajectories for row in rows])
+        found |= zip(rows, find_sides(np.stack([paths[row] for row in rows]), obstacles, centres), strict=True)
     return [found[row] for row in range(len(problems))]
 
 

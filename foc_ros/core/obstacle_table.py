@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +16,34 @@ from foc_ros.core.types import Array, Record, as_readonly
 
 UNKNOWN_HEIGHTS = as_readonly(np.array([-np.inf, np.inf]))
 """Lowest and highest point of an obstacle whose height is not known [m]: it blocks at every height."""
+
+
+class Edges(NamedTuple):
+    """The edges of convex polygons about their centres, padded to one number V of edges by edges without length.
+
+    x, y: where each edge begins [m]; along_x, along_y: from there to its end [m]; inverse_square: 1 / length^2 [1/m^2], 0 without
+    length; is_solid: whether the polygon has an inside. The last axis of all is that of the edges.
+    """
+
+    x: Array
+    y: Array
+    along_x: Array
+    along_y: Array
+    inverse_square: Array
+    is_solid: NDArray[np.bool_]
+
+    def take(self, key: Any) -> Edges:
+        """Return the edges at an index of the axes before the last one."""
+        return Edges(self.x[key], self.y[key], self.along_x[key], self.along_y[key], self.inverse_square[key], self.is_solid[key])
+
+
+def tabulate_edges(vertices: Array, corners: NDArray[Any]) -> Edges:
+    """Return the edges of polygons (..., V) with vertices (..., V, 2) [m], of which the first `corners` (...) are used."""
+    begin = np.where((np.arange(vertices.shape[-2]) < corners[..., None])[..., None], vertices, vertices[..., :1, :])
+    along = np.roll(begin, -1, axis=-2) - begin
+    square = (along**2).sum(axis=-1)
+    inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
+    return Edges(begin[..., 0], begin[..., 1], along[..., 0], along[..., 1], inverse, (corners > 2)[..., None])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,10 +74,15 @@ class Obstacles(Record):
         names = ', '.join(self.ids[:5]) + (', ...' if len(self) > 5 else '')
         return f'<Obstacles: {len(self)}{names and f" ({names})"}>'
 
+    @cached_property
+    def edges(self) -> Edges:
+        """The edges of the polygons, (n, V)."""
+        return tabulate_edges(self.vertices, self.corners)
+
     def take(self, rows: NDArray[np.intp] | list[int]) -> Obstacles:
         """Return the obstacles of the given rows, in that order."""
         index = np.asarray(rows, dtype=np.intp)
-        columns = {name: column[index] for name, column in vars(self).items() if name != 'ids'}
+        columns = {each.name: getattr(self, each.name)[index] for each in fields(self)[1:]}
         return Obstacles(tuple(self.ids[i] for i in index), **columns)
 
     @property

@@ -16,7 +16,7 @@ from .classes.library import GuessTiming, recall_demonstrations
 from .config import Config
 from .deadline import NEVER, Deadline
 from .goals import compare_goals, find_other_share
-from .learning.dispersion import scale_covariance
+from .learning.dispersion import scale_covariances
 from .learning.learnt import NOTHING, Knowledge
 from .learning.recordings import Library, pool_recordings
 from .obstacle_table import Obstacles, make_obstacles
@@ -93,7 +93,7 @@ def predict(
         stamp_ns,
         hand.frame_id,
         hand.height,
-        tuple(scale_covariance(each, config.covariance) for each in predicted),
+        scale_covariances(predicted, config.covariance),
         None if best is None else best.label,
         notes=dict(found.notes) | {name: count for name, count in notes.items() if count},
         solve_s=time.perf_counter() - began,

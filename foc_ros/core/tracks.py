@@ -310,5 +310,5 @@ def take_remainder(solution: Solution, age_s: float, position: Array, reason: st
     expected = solution.expected
     if expected is not None and solution.effort > 0.0:
         expected *= effort / solution.effort
-    rest = replace(solution, mean=as_readonly(mean), covariance=covariance, motor_covariance=motor, control=control)
-    return replace(rest, effort=effort, expected=expected, dt=left_s / steps, message=message)
+    known = {'mean': as_readonly(mean), 'covariance': covariance, 'motor_covariance': motor, 'control': control}
+    return replace(solution, **known, effort=effort, expected=expected, dt=left_s / steps, message=message)

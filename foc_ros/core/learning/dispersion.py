@@ -165,20 +165,27 @@ def interpolate_factors(share: Array, config: CovarianceConfig) -> Array:
     return factors
 
 
-def scale_covariance(candidate: PredictedCandidate, config: CovarianceConfig) -> PredictedCandidate:
-    """Return a candidate whose covariance has the factors of config; that of motor noise and that of the height stay.
+def scale_covariances(candidates: Sequence[PredictedCandidate], config: CovarianceConfig) -> tuple[PredictedCandidate, ...]:
+    """Return candidates whose covariances have the factors of config; those of motor noise and of the height stay.
 
     The error of the position is f(t) times what it was, and those of velocity and acceleration are its derivatives.
     """
-    if config.near == config.far == 1.0:
-        return candidate
-    solution = candidate.solution
-    growth = 2.0 * math.log(config.far / config.near) / float(solution.times[-1]) ** 2
-    rate = growth * solution.times[:, None, None] * np.eye(2)  # f' / f
-    errors = np.tile(np.eye(solution.mean.shape[1]), (len(rate), 1, 1))
-    errors[:, 2:4, :2] = rate
-    if errors.shape[1] >= 6:
-        errors[:, 4:6, 2:4], errors[:, 4:6, :2] = 2.0 * rate, rate**2 + growth * np.eye(2)
-    errors *= interpolate_factors(compute_shares(np.linspace(0.0, 1.0, len(rate))), config)[:, None, None]
-    covariance = errors @ solution.covariance @ errors.swapaxes(1, 2)
-    return replace(candidate, solution=solution.with_covariance(covariance))
+    if config.near == config.far == 1.0 or not candidates:
+        return tuple(candidates)
+    solutions = [each.solution for each in candidates]
+    total = np.stack([each.covariance for each in solutions])
+    count, states = total.shape[1:3]
+    end_s = np.array([float(each.times[-1]) for each in solutions])[:, None, None, None]
+    times = np.linspace(0.0, 1.0, count)[:, None, None]
+    growth = 2.0 * math.log(config.far / config.near) / end_s**2
+    rate = growth * end_s * times * np.eye(2)  # f' / f
+    errors = np.tile(np.eye(states), (*rate.shape[:2], 1, 1))
+    errors[..., 2:4, :2] = rate
+    if states >= 6:
+        errors[..., 4:6, 2:4], errors[..., 4:6, :2] = 2.0 * rate, rate**2 + growth * np.eye(2)
+    errors *= interpolate_factors(compute_shares(times), config)
+    scaled = errors @ total @ errors.swapaxes(-1, -2)
+    return tuple(
+        replace(each, solution=each.solution.with_covariance(covariance.copy()))
+        for each, covariance in zip(candidates, scaled, strict=True)
+    )

@@ -10,35 +10,16 @@ inside it, and n = d / D points away from the obstacle. Where q is a vertex n tu
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foc_ros.core.obstacle_table import Obstacles
+from foc_ros.core.obstacle_table import Edges, Obstacles
 from foc_ros.core.types import Array
 
 SMALLEST_DISTANCE = 1e-13
 """Distance [m] below which a point counts as on the polygon, where its normal is not defined: rounding."""
-
-
-class Edges(NamedTuple):
-    """The edges of convex polygons about their centres, padded to one number V of edges by edges without length.
-
-    x, y: where each edge begins [m]; along_x, along_y: from there to its end [m]; inverse_square: 1 / length^2 [1/m^2], 0 without
-    length; is_solid: whether the polygon has an inside. The last axis of all is that of the edges.
-    """
-
-    x: Array
-    y: Array
-    along_x: Array
-    along_y: Array
-    inverse_square: Array
-    is_solid: NDArray[np.bool_]
-
-    def take(self, key: Any) -> Edges:
-        """Return the edges at an index of the axes before the last one."""
-        return Edges(self.x[key], self.y[key], self.along_x[key], self.along_y[key], self.inverse_square[key], self.is_solid[key])
 
 
 class Offset(NamedTuple):
@@ -48,15 +29,6 @@ class Offset(NamedTuple):
     normal_x: Array
     normal_y: Array
     is_on_edge: NDArray[np.bool_]
-
-
-def tabulate_edges(vertices: Array, corners: NDArray[Any]) -> Edges:
-    """Return the edges of polygons (..., V) with vertices (..., V, 2) [m], of which the first `corners` (...) are used."""
-    begin = np.where((np.arange(vertices.shape[-2]) < corners[..., None])[..., None], vertices, vertices[..., :1, :])
-    along = np.roll(begin, -1, axis=-2) - begin
-    square = (along**2).sum(axis=-1)
-    inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
-    return Edges(begin[..., 0], begin[..., 1], along[..., 0], along[..., 1], inverse, (corners > 2)[..., None])
 
 
 def find_offset(x: Array, y: Array, edges: Edges) -> Offset:
@@ -119,7 +91,7 @@ def measure_offsets(points: Array, obstacles: Obstacles, centres: Array | None =
         of a circle is at its radius.
     """
     relative = np.reshape(points, (-1, 1, 2)) - (obstacles.centre[None] if centres is None else centres)
-    found = find_offset(relative[..., 0], relative[..., 1], tabulate_edges(obstacles.vertices, obstacles.corners))
+    found = find_offset(relative[..., 0], relative[..., 1], obstacles.edges)
     offsets = np.stack((found.normal_x, found.normal_y), axis=-1) * found.distance[..., None]
     return offsets, found.distance
 

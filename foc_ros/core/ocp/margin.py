@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.interpolation import hermite, hermite_quintic, pair_steps
-from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
+from foc_ros.core.obstacle_table import Edges, tabulate_edges
+from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.plant.response import fall_as_minimum_jerk
 from foc_ros.core.types import Array
 
@@ -157,18 +158,20 @@ class Margins:
 
     def _set_obstacles(self, tau: Array) -> None:
         """Stack the obstacles of the problems; rows that a problem does not have never count."""
-        tables = [each.obstacles for each in self.problems]
-        size, width = len(tables), max(each.vertices.shape[1] for each in tables)
+        tables = {id(each.obstacles): each.obstacles for each in self.problems}
+        row_of = {key: row for row, key in enumerate(tables)}
+        rows = [row_of[id(each.obstacles)] for each in self.problems]
+        width = max(each.vertices.shape[1] for each in tables.values())
 
         def stack(read: str, *shape: int) -> Array:
-            stacked = np.zeros((size, self.count, *shape))
-            for row, table in enumerate(tables):
+            stacked = np.zeros((len(tables), self.count, *shape))
+            for row, table in enumerate(tables.values()):
                 values = getattr(table, read)
                 part = tuple(slice(n) for n in values.shape)
                 stacked[row][part] = values
-            return stacked
+            return stacked[rows]
 
-        self.counts = np.arange(self.count) < np.array([len(each) for each in tables])[:, None]
+        self.counts = np.arange(self.count) < np.array([len(each.obstacles) for each in self.problems])[:, None]
         self.is_polygon = stack('corners') > 1.0
         self.centre, self.drift = stack('centre', 2), stack('velocity', 2) * self.step_s[:, None, None]
         covariance = stack('centre_covariance', 2, 2)

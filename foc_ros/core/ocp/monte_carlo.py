@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foc_ros.core.obstacles.geometry import Edges, find_offset
+from foc_ros.core.obstacle_table import Edges
+from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.plant.covariance import stack_noise
 from foc_ros.core.types import Array
 
@@ -68,7 +69,7 @@ def _clear(problem: Problem, control: Array, samples: int, generator: np.random.
     clear: Array = np.empty((samples, len(obstacles), steps), dtype=np.bool_)
     for row in range(len(obstacles)):
         relative = positions - problem.centres[row] - drift[:, row, None]
-        edges = Edges(*(each[row] for each in problem.edges))
+        edges = Edges(*(each[row] for each in problem.obstacles.edges))
         distance = find_offset(relative[..., 0], relative[..., 1], edges).distance
         clear[:, row] = distance >= np.abs(radius[:, row, None])
     return clear

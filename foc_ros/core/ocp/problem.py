@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import Edges, find_offset, tabulate_edges
+from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.obstacles.risk import CANTELLI, RiskBound, centre_trajectories, compute_safety_factor, size_moments
 from foc_ros.core.plant.covariance import stack_noise
-from foc_ros.core.plant.plants import Horizon, find_states_at_goal, variance_weights
+from foc_ros.core.plant.plants import Horizon, apply_impulse_response, find_states_at_goal, variance_weights
 from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.types import Array, Record, as_readonly
 
@@ -94,11 +94,6 @@ class Problem(Record):
         return max(math.hypot(x, y), SMALLEST_EXTENT, float(self.obstacles.radius.max(initial=0.0)))
 
     @cached_property
-    def edges(self) -> Edges:
-        """The edges of the polygons of the obstacles, (m, V)."""
-        return tabulate_edges(self.obstacles.vertices, self.obstacles.corners)
-
-    @cached_property
     def free(self) -> Array:
         """Mean state at steps 0..N without control, (N + 1, n)."""
         return self.horizon.powers @ self.initial_mean
@@ -132,7 +127,7 @@ class Problem(Record):
         if self.recovery_s <= 0 or not len(self.obstacles):
             return np.zeros(len(self.obstacles), dtype=np.bool_)
         x, y = (self.initial_mean[:2] - self.obstacles.centre).T
-        found = find_offset(x, y, self.edges)
+        found = find_offset(x, y, self.obstacles.edges)
         normal = np.stack((found.normal_x, found.normal_y), axis=1)
         covariance = self.initial_covariance[:2, :2] + self.obstacles.centre_covariance
         variance = np.einsum('ji,jik,jk->j', normal, covariance, normal)
@@ -163,7 +158,7 @@ class Problem(Record):
         weighted: Array = variance_weights(self.horizon.states, *weights) * self.noise_variance
         return weighted
 
-    @property
+    @cached_property
     def goal_rows(self) -> tuple[Array, Array, Array]:
         """Rows (r, 2N), targets (r,) and softness (r,) that bring the mean to the goal.
 
@@ -192,10 +187,16 @@ class Problem(Record):
         length = np.sqrt((rows[is_fixed] ** 2).sum(axis=1))
         return rows[is_fixed] / length[:, None], targets[is_fixed] / length
 
+    @cached_property
+    def least_effort(self) -> float:
+        """The effort of a movement to the goal without obstacles, [m^2/s^6] for the triple integrator."""
+        rows, targets = self.fixed_goal
+        shares = np.linalg.lstsq(rows @ rows.T, targets, rcond=None)[0]
+        return float(targets @ shares) / self.horizon.gain**2
+
     def states(self, control: Array) -> Array:
         """Return the mean state of a stacked control (2N,) at steps 0..N, (N + 1, n)."""
-        moved = self.free.copy()
-        moved[1:] += self.horizon.response @ np.asarray(control, dtype=float)
+        moved: Array = self.free + apply_impulse_response(self.horizon.states, np.asarray(control, dtype=float)).T
         return moved
 
     def positions(self, control: Array) -> Array:

@@ -161,8 +161,7 @@ def _expect(problem: Problem, effort: float, shortfall: float, gain: float) -> t
 
     The effort does not fall below that of a movement without obstacles.
     """
-    free = np.linalg.lstsq(*problem.fixed_goal, rcond=None)[0] / problem.horizon.gain
-    least, preference = float(free @ free), problem.preference
+    least, preference = problem.least_effort, problem.preference
     if preference.is_hard or preference.beta == 0.0:
         return max(effort * math.exp(-gain), min(least, effort)), 0.0
     rate = preference.shortfall / preference.beta
@@ -206,7 +205,7 @@ def compute_violation(problem: Problem, mean: Array, tau: float, parts: int) -> 
     times = np.arange(1, parts * problem.horizon.steps + 1) / parts
     path = sample_curve(mean[:, :2], mean[:, 2:4], problem.horizon.dt, parts)[1:]
     relative = path[:, None] - problem.obstacles.centre - times[:, None, None] * problem.drift
-    missing = np.sqrt(problem.size[0] + tau) - find_offset(relative[..., 0], relative[..., 1], problem.edges).distance
+    missing = np.sqrt(problem.size[0] + tau) - find_offset(relative[..., 0], relative[..., 1], problem.obstacles.edges).distance
     moment, row = np.unravel_index(int(missing.argmax()), missing.shape)
     deepest = float(missing[moment, row])
     return (deepest, (int(row), float(times[moment]))) if deepest > NO_VIOLATION else (0.0, None)
