@@ -310,5 +310,14 @@ def take_remainder(solution: Solution, age_s: float, position: Array, reason: st
     expected = solution.expected
     if expected is not None and solution.effort > 0.0:
         expected *= effort / solution.effort
-    known = {'mean': as_readonly(mean), 'covariance': covariance, 'motor_covariance': motor, 'control': control}
-    return replace(solution, **known, effort=effort, expected=expected, dt=left_s / steps, message=message)
+    return replace(
+        solution,
+        mean=as_readonly(mean),
+        covariance=covariance,
+        motor_covariance=motor,
+        control=control,
+        effort=effort,
+        expected=expected,
+        dt=left_s / steps,
+        message=message,
+    )
