@@ -191,7 +191,7 @@ class Solution(Record):
     multipliers: (obstacle id, step, value) of the active constraints, with `lv`, `hc` and `optimal` at fractions of a step; the
     value is the growth of J_aug for each metre more of required distance [m/s^6]; equivalent_weights: tau [m^2] and lambda
     [1/s^6] of each active constraint. expected: the effort that is expected where time ran out, None elsewhere.
-    qp_solves: number of QPs solved; iterations: of `algorithm1`, None for the others; solve_s: wall time [s].
+    qp_solves: number of QPs solved; iterations: of `algorithm1`, None for the others; solve_s: wall time of the strategy [s].
     """
 
     status: Status

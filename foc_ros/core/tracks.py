@@ -245,11 +245,10 @@ class Tracks(Record):
         likelihoods = {each.way: each.likelihood for each in predicted}
         present = []
         for track, found in zip(matched, solved, strict=True):
-            seen = Track(track.number, found.candidate, stamp_ns, likelihoods.get(track.number, 0.0))
-            is_new = found.has_likelihood and not found.age_s
+            is_new, has_failed = found.has_likelihood and not found.age_s, not found.has_likelihood
             newest = (found.solution, stamp_ns, found.sides) if is_new else (track.solution, track.solved_ns, track.sides)
-            known = replace(seen, solution=newest[0], solved_ns=newest[1], sides=newest[2])
-            present.append(replace(known, has_failed=not found.has_likelihood))
+            share = likelihoods.get(track.number, 0.0)
+            present.append(Track(track.number, found.candidate, stamp_ns, share, *newest, has_failed))
         return tuple(present), tuple(replace(each, likelihood=likelihoods.get(each.number, 0.0)) for each in absent)
 
     def _find_recent(self, stamp_ns: int) -> list[Track]:

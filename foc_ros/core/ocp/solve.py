@@ -82,9 +82,8 @@ def solve_problems(
         is_list = isinstance(results, list) and len(results) == len(group)
         if not is_list or not all(isinstance(each, StrategyResult) for each in results):
             raise InputError(f'strategy {settings.strategy}', 'a list of StrategyResult, one for each problem', repr(results))
-        solutions = _evaluate(group, results)
         share_s = (time.perf_counter() - began) / len(rows)
-        solved |= {row: replace(each, solve_s=share_s) for row, each in zip(rows, solutions, strict=True)}
+        solved |= zip(rows, _evaluate(group, results, share_s), strict=True)
     return [solved[row] for row in range(len(problems))]
 
 
@@ -101,17 +100,17 @@ def find_least_safety_factor(problem: Problem, control: Array) -> tuple[float, i
     return float(k[0]), int(obstacle[0]), float(moment[0])
 
 
-def _evaluate(problems: Sequence[Problem], results: Sequence[StrategyResult]) -> list[Solution]:
-    """Return the solutions of problems with the same response, with the least safety factors over all times."""
+def _evaluate(problems: Sequence[Problem], results: Sequence[StrategyResult], solve_s: float) -> list[Solution]:
+    """Return the solutions of problems with the same response, with the least safety factors over all times; solve_s [s]."""
     minima: Sequence[tuple[float, int, float] | None] = [each.minimum for each in results]
     if None in minima:
         margins = Margins(problems, np.zeros(len(problems)), is_chance=True)
         control = np.stack([each.control * problem.horizon.gain for problem, each in zip(problems, results, strict=True)])
         minima = list(zip(*(each.tolist() for each in find_least_factors(margins, control)), strict=True))
-    return [_evaluate_one(*each) for each in zip(problems, results, minima, strict=True)]  # type: ignore[arg-type]
+    return [_evaluate_one(*each, solve_s) for each in zip(problems, results, minima, strict=True)]  # type: ignore[arg-type]
 
 
-def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float, int, float]) -> Solution:
+def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float, int, float], solve_s: float) -> Solution:
     (k, row, moment), risk, control = minimum, problem.risk, result.control
     eta, status, message = risk.find_probability(k), result.status, result.message
     if status is Status.SOLVED and result.aims_at_eta and eta < problem.eta - ETA_TOLERANCE:
@@ -153,6 +152,7 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
         expected=expected,
         qp_solves=result.qp_solves,
         iterations=result.iterations,
+        solve_s=solve_s,
     )
 
 
