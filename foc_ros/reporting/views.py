@@ -17,7 +17,7 @@ import numpy as np
 
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import GRAZE_M
-from foc_ros.core.obstacles.geometry import find_offset, tabulate_edges
+from foc_ros.core.obstacles.geometry import find_edges, find_offset
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
@@ -154,8 +154,7 @@ def describe_ghosts(snapshot: Prediction) -> list[tuple[str, float | None]]:
     offsets = curves[..., None, :] - (blocking.centre + times[..., None, None] * blocking.velocity)
     x, y = offsets[..., 0], offsets[..., 1]
     near, depths = np.nonzero(np.hypot(x, y) < blocking.extent), np.full(x.shape, -np.inf)
-    edges = tabulate_edges(blocking.vertices, blocking.corners).take(near[2])
-    depths[near] = blocking.radius[near[2]] - find_offset(x[near], y[near], edges).distance
+    depths[near] = blocking.radius[near[2]] - find_offset(x[near], y[near], find_edges(blocking).take(near[2])).distance
     is_inside = depths > GRAZE_M
     between = np.maximum.accumulate(~is_inside, axis=0) & np.maximum.accumulate(~is_inside[::-1], axis=0)[::-1]
     is_entered = is_inside & between

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import TURN, find_offset, tabulate_edges
+from foc_ros.core.obstacles.geometry import TURN, find_edges, find_offset
 from foc_ros.core.obstacles.risk import centre_trajectories
 from foc_ros.core.solution import LEFT, RIGHT, Solution
 from foc_ros.core.types import Array, Record
@@ -173,8 +173,7 @@ def measure_passages(solutions: Sequence[Solution], obstacles: Obstacles) -> Pas
     path, dt = np.stack([each.path for each in solutions]), np.array([each.dt for each in solutions])
     drift = dt[:, None, None, None] * obstacles.velocity
     offset = path[:, :, None] - centre_trajectories(obstacles.centre, drift, path.shape[1] - 1)
-    edges = tabulate_edges(obstacles.vertices, obstacles.corners)
-    distance = find_offset(offset[..., 0], offset[..., 1], edges).distance
+    distance = find_offset(offset[..., 0], offset[..., 1], find_edges(obstacles)).distance
     return Passages(dt, sweep(offset), distance, distance[:, -1] >= obstacles.radius)
 
 

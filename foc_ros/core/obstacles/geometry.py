@@ -10,6 +10,7 @@ inside it, and n = d / D points away from the obstacle. Where q is a vertex n tu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +58,12 @@ def tabulate_edges(vertices: Array, corners: NDArray[Any]) -> Edges:
     square = (along**2).sum(axis=-1)
     inverse = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
     return Edges(begin[..., 0], begin[..., 1], along[..., 0], along[..., 1], inverse, (corners > 2)[..., None])
+
+
+@lru_cache(maxsize=32)
+def find_edges(obstacles: Obstacles) -> Edges:
+    """Return the edges of the polygons of obstacles; those of the last tables are kept."""
+    return tabulate_edges(obstacles.vertices, obstacles.corners)
 
 
 def find_offset(x: Array, y: Array, edges: Edges) -> Offset:
@@ -119,7 +126,7 @@ def measure_offsets(points: Array, obstacles: Obstacles, centres: Array | None =
         of a circle is at its radius.
     """
     relative = np.reshape(points, (-1, 1, 2)) - (obstacles.centre[None] if centres is None else centres)
-    found = find_offset(relative[..., 0], relative[..., 1], tabulate_edges(obstacles.vertices, obstacles.corners))
+    found = find_offset(relative[..., 0], relative[..., 1], find_edges(obstacles))
     offsets = np.stack((found.normal_x, found.normal_y), axis=-1) * found.distance[..., None]
     return offsets, found.distance
 
