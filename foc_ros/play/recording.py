@@ -29,6 +29,7 @@ from foc_ros.io.outputs import make_folder
 from foc_ros.io.topics import TYPES
 from foc_ros.reporting.page import Table
 from foc_ros.reporting.report import ReportCollector
+from foc_ros.reporting.views import build_snapshot
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, SampleHeader
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import MessageTypes
@@ -79,12 +80,12 @@ class Recording:
         if self._trial is not None:
             self._trial.append((role, raw, now_ns))
 
-    def add_prediction(self, prediction: Prediction, snapshot: Prediction) -> None:
-        """Record a prediction, and keep its snapshot for the report."""
+    def add_prediction(self, prediction: Prediction) -> None:
+        """Record a prediction, and keep a snapshot of it for the report."""
         # at 20 Hz: the page of an hour would be too large otherwise
         shown = self._shown.snapshots
-        if not shown or snapshot.stamp_ns - shown[-1].stamp_ns >= NANOSECONDS // 20:
-            shown.append(snapshot)
+        if not shown or prediction.stamp_ns - shown[-1].stamp_ns >= NANOSECONDS // 20:
+            shown.append(build_snapshot(prediction))
         # markers and path say nothing more
         self._add_outputs(encode_outputs(prediction, 'xy', self._types, ('prediction', 'likelihoods')))
 

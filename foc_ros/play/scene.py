@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -18,8 +19,9 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.fields import Fields
 from foc_ros.reporting.encode import encode_candidates, encode_unsolved
-from foc_ros.reporting.views import build_snapshot, list_unsolved
+from foc_ros.reporting.views import list_unsolved
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_obstacles
+from foc_ros.ros.messages.ranking import order_candidates
 from foc_ros.ros.messages.types import MessageTypes
 
 FRAME = 'play'
@@ -147,11 +149,10 @@ def make_random_scene(random: np.random.Generator, goals: Sequence[PlacedPoint])
 class View(NamedTuple):
     """A prediction for the page.
 
-    snapshot: as pictures show it; candidates: as the page draws them, those without a likelihood last.
+    prediction: with the candidate first that is called most likely; candidates: as the page draws them, in the same order.
     """
 
     prediction: Prediction
-    snapshot: Prediction
     candidates: list[dict[str, Any]]
 
 
@@ -160,12 +161,12 @@ def view_prediction(prediction: Prediction) -> View:
 
     A candidate has, besides what `reporting.encode` says, its class number (way), goal and likelihood, None where it is unknown.
     """
-    snapshot = build_snapshot(prediction)
-    shown, lost = snapshot.candidates_with_likelihood, list_unsolved(snapshot)
+    shown, lost = order_candidates(prediction), list_unsolved(prediction)
+    ordered = replace(prediction, candidates=(*shown, *lost))
     views: list[dict[str, Any]] = [
         {'way': each.way, 'goal': each.candidate.goal, 'likelihood': round(each.likelihood, 4), **encoded}
-        for each, encoded in zip(shown, encode_candidates(snapshot), strict=True)
+        for each, encoded in zip(shown, encode_candidates(ordered), strict=True)
     ]
     no_likelihood = {'way': None, 'likelihood': None}
-    views += [{'goal': each.candidate.goal, **no_likelihood, **encode_unsolved(snapshot, each)} for each in lost]
-    return View(prediction, snapshot, views)
+    views += [{'goal': each.candidate.goal, **no_likelihood, **encode_unsolved(ordered, each)} for each in lost]
+    return View(ordered, views)

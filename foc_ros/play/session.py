@@ -276,18 +276,17 @@ class Session:
                 self._say('force', force=force.round(4).tolist())
 
     def _receive_prediction(self, view: scene.View) -> None:
-        snapshot = view.snapshot
-        stamp_ns = snapshot.stamp_ns
+        prediction, stamp_ns = view.prediction, view.prediction.stamp_ns
         hand = next((hand for stamp, hand in reversed(self._hands) if stamp == stamp_ns), None)
-        self._record(lambda recording: recording.add_prediction(view.prediction, snapshot))
-        if self._tasks is not None and snapshot.most_likely is not None:
-            self._tasks.note_most_likely(stamp_ns * 1e-9, snapshot.candidates[0].way)
+        if self._tasks is not None and prediction.most_likely is not None:
+            self._tasks.note_most_likely(stamp_ns * 1e-9, prediction.candidates[0].way)
         if hand is not None and not self._is_blind:
-            slots = self._slots.assign([each.way for each in snapshot.candidates_with_likelihood])
+            slots = self._slots.assign([each.way for each in prediction.candidates_with_likelihood])
             # those without a likelihood, which are last, have no slot
             candidates = [each | {'slot': slot} for each, slot in zip_longest(view.candidates, slots)]
-            shares = {'unknown': round(snapshot.unknown, 4), 'other': round(snapshot.other, 4)}
+            shares = {'unknown': round(prediction.unknown, 4), 'other': round(prediction.other, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)
+        self._record(lambda recording: recording.add_prediction(prediction))  # afterwards: the page does not wait for it
 
     # what the page is told
 

@@ -26,7 +26,7 @@ from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK
 from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
 
-from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghost
+from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghosts
 
 try:
     import matplotlib as mpl
@@ -184,7 +184,7 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     """
     goals, entered = len(snapshot.goal_positions), set[str]()
     order = {each.label: f'candidate {row:04d}' for row, each in enumerate(snapshot.candidates)}
-    views = [(each, *describe_ghost(snapshot, each)) for each in snapshot.candidates]
+    views = [(each, *ghost) for each, ghost in zip(snapshot, describe_ghosts(snapshot), strict=True)]
     paths = [each for each, reason, _ in views if not reason]
     count = sum(each.likelihood < NOTED for each in paths)
     more = f'{count} more path{"s, each" if count > 1 else ""} below {100 * NOTED:.0f} %'

@@ -19,10 +19,10 @@ from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import find_limits
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import NANOSECONDS, Array
-from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve
+from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, find_drawn_curves
 
 from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Bounds, Span, compute_bounds, compute_ellipse_axes
-from .views import LIKELY, CandidateTracks, HandTrajectory, choose_moment, count_likely_paths, describe_ghost, list_unsolved
+from .views import LIKELY, CandidateTracks, HandTrajectory, choose_moment, count_likely_paths, describe_ghosts, list_unsolved
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
 """Units [m], [m/s], [s]."""
@@ -133,28 +133,34 @@ def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
     most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard deviation, and the angle of
     the greater one [degrees].
     """
-    shown, encoded = snapshot.candidates_with_likelihood, list[dict[str, Any]]()
-    for each, ratio in zip(shown, compute_cost_ratios(shown), strict=True):
-        path, (ghost, ghost_at), is_first = each.solution.path, describe_ghost(snapshot, each), not encoded
-        points, marks = select_evenly(len(path), PATH_POINTS), select_evenly(len(path), ELLIPSES_PER_CANDIDATE + 1)[1:]
-        is_widened, is_likely = each.solution.motor_covariance is not None, is_first or each.likelihood >= LIKELY
-        encoded.append(
-            {
-                'label': each.label,
-                'description': describe_candidate(each, len(snapshot.goal_positions)),
-                'ghost': ghost,
-                'ghost_at': None if ghost_at is None else round(ghost_at, 2),
-                'ratio': round_number(ratio),
-                'eta': round_number(each.eta),
-                'compromised': not each.is_solved,
-                **_encode_points(find_drawn_curve(each), PATH_POINTS),
-                't': _quantise_differences(each.times[points], TIME),
-                'v': _quantise_differences(np.linalg.norm(each.mean[points, 2:4], axis=1), SPEED),
-                'motor': _encode_ellipses(path[marks], each.motor_covariance[marks]) if is_likely else [],
-                'total': _encode_ellipses(path[marks], each.covariance[marks]) if is_first and is_widened else [],
-            }
-        )
-    return encoded
+    shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
+    if not shown:
+        return []
+    mean, times = np.stack([each.mean for each in shown]), np.stack([each.times for each in shown])
+    points, marks = select_evenly(mean.shape[1], PATH_POINTS), select_evenly(mean.shape[1], ELLIPSES_PER_CANDIDATE + 1)[1:]
+    ellipses = _encode_ellipses(mean[:, marks, :2], np.stack([each.motor_covariance[marks, :2, :2] for each in shown]))
+    is_widened = shown[0].solution.motor_covariance is not None
+    columns = {
+        **_encode_points(find_drawn_curves(shown).swapaxes(0, 1), PATH_POINTS),
+        't': _quantise_differences(times[:, points], TIME),
+        'v': _quantise_differences(np.linalg.norm(mean[:, points, 2:4], axis=-1), SPEED),
+    }
+    described = zip(shown, compute_cost_ratios(shown), describe_ghosts(snapshot), strict=False)  # the first of all candidates
+    return [
+        {
+            'label': each.label,
+            'description': describe_candidate(each, goals),
+            'ghost': ghost,
+            'ghost_at': None if ghost_at is None else round(ghost_at, 2),
+            'ratio': round_number(ratio),
+            'eta': round_number(each.eta),
+            'compromised': not each.is_solved,
+            **{name: values[row] for name, values in columns.items()},
+            'motor': ellipses[row] if row == 0 or each.likelihood >= LIKELY else [],
+            'total': _encode_ellipses(mean[0, marks, :2], each.covariance[marks, :2, :2]) if row == 0 and is_widened else [],
+        }
+        for row, (each, ratio, (ghost, ghost_at)) in enumerate(described)
+    ]
 
 
 def encode_unsolved(snapshot: Prediction, candidate: PredictedCandidate) -> dict[str, Any]:
@@ -163,7 +169,7 @@ def encode_unsolved(snapshot: Prediction, candidate: PredictedCandidate) -> dict
         'label': candidate.label,
         'description': describe_candidate(candidate, len(snapshot.goal_positions)),
         'reason': candidate.reason,
-        'ghost': describe_ghost(snapshot, candidate)[0],
+        'ghost': candidate.status.value.replace('_', ' '),
     }
     return texts | _encode_points(find_drawn_curve(candidate), PATH_POINTS // 2)
 
@@ -191,23 +197,22 @@ def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.i
     return rows
 
 
-def _encode_ellipses(centres: Array, covariance: Array) -> list[list[int]]:
-    greater, smaller, angle = compute_ellipse_axes(covariance)
-    lengths = np.column_stack([centres, greater, smaller])
-    return [[*_quantise(each, LENGTH), round(degrees)] for each, degrees in zip(lengths, angle.tolist(), strict=True)]
+def _encode_ellipses(centres: Array, covariance: Array) -> list[Any]:
+    values = np.stack((centres[..., 0], centres[..., 1], *compute_ellipse_axes(covariance)), axis=-1)
+    return _quantise(values, np.array([LENGTH, LENGTH, LENGTH, LENGTH, 1.0]))
 
 
-def _encode_points(path: Array, most: int) -> dict[str, list[int]]:
-    points = path[select_evenly(len(path), most)]
-    return {'x': _quantise_differences(points[:, 0], LENGTH), 'y': _quantise_differences(points[:, 1], LENGTH)}
+def _encode_points(path: Array, most: int) -> dict[str, list[Any]]:
+    points = path[..., select_evenly(path.shape[-2], most), :]
+    return {'x': _quantise_differences(points[..., 0], LENGTH), 'y': _quantise_differences(points[..., 1], LENGTH)}
 
 
-def _quantise(values: Array, unit: float) -> list[int]:
-    whole: list[int] = np.rint(values / unit).astype(np.int64).tolist()
+def _quantise(values: Array, unit: Array | float) -> list[Any]:
+    whole: list[Any] = np.rint(values / unit).astype(np.int64).tolist()
     return whole
 
 
-def _quantise_differences(values: Array, unit: float) -> list[int]:
-    """Return the first value and then the differences, in whole units."""
-    differences: list[int] = np.diff(np.rint(values / unit).astype(np.int64), prepend=0).tolist()
+def _quantise_differences(values: Array, unit: float) -> list[Any]:
+    """Return the first values and then the differences along the last axis, in whole units."""
+    differences: list[Any] = np.diff(np.rint(values / unit).astype(np.int64), prepend=0).tolist()
     return differences

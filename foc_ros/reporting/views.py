@@ -17,13 +17,13 @@ import numpy as np
 
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import GRAZE_M
-from foc_ros.core.obstacles.geometry import measure_offsets
+from foc_ros.core.obstacles.geometry import find_offset
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 from foc_ros.ros.messages.decode_poses import decode_frame, decode_stamp
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STATUSES, UNKNOWN
-from foc_ros.ros.messages.ranking import find_drawn_curve, order_candidates
+from foc_ros.ros.messages.ranking import find_drawn_curves, order_candidates
 
 COLOURS, SLOTS = 6, 12
 """Numbers of colours, and of the letters that tell candidates apart: the letters beyond F have the same colours again."""
@@ -34,7 +34,7 @@ ONSET_SPEED, PAUSE_S, LEAST_M = 0.05, 0.15, 0.03
 
 
 def build_snapshot(prediction: Prediction) -> Prediction:
-    """Return a prediction as pictures and pages show it; raises FocError if it holds a number that is not finite.
+    """Return a prediction as pictures and reports show it; raises FocError if it holds a number that is not finite.
 
     The candidate that is called most likely comes first, and of the states only positions and velocities are kept: all of them
     would fill the memory with a long recording.
@@ -115,8 +115,8 @@ def is_late(snapshot: Prediction) -> bool:
 
 def count_likely_paths(snapshot: Prediction) -> float:
     """Return the number of likely paths, without estimates and ghosts: exp of the entropy of likelihoods of at least LIKELY."""
-    likely = [each for each in snapshot if each.likelihood >= LIKELY and not each.is_estimated]
-    shares = np.array([each.likelihood for each in likely if not describe_ghost(snapshot, each)[0]])
+    seen = [each for each, (ghost, _) in zip(snapshot, describe_ghosts(snapshot), strict=True) if not ghost]
+    shares = np.array([each.likelihood for each in seen if each.likelihood >= LIKELY and not each.is_estimated])
     shares /= max(shares.sum(), LIKELY)
     return float(np.exp(-(shares * np.log(shares)).sum())) if len(shares) else 0.0
 
@@ -137,29 +137,32 @@ def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -
     return max(on_the_way or settled, key=lambda row: count_likely_paths(during[row]))
 
 
-def describe_ghost(snapshot: Prediction, candidate: PredictedCandidate) -> tuple[str, float | None]:
-    """Return why a path is no proper prediction, and at which share of the path that is, None if nowhere in particular.
+def describe_ghosts(snapshot: Prediction) -> list[tuple[str, float | None]]:
+    """Return why the path of each candidate is no proper prediction, and at which share of it, None if nowhere in particular.
 
     It could not be solved, or leads through an obstacle; otherwise the reason is ''. The obstacles have their mean sizes and move
     on at their velocities. The beginning of a path within an obstacle that the hand is in does not count, nor its end within one
     that is its goal, nor do depths of less than GRAZE_M.
     """
-    if not candidate.has_likelihood:
-        return candidate.status.value.replace('_', ' '), None
-    curve, blocking = find_drawn_curve(candidate), snapshot.blocking_obstacles
-    if not len(blocking) or not len(curve):
-        return '', None
-    times = np.linspace(candidate.times[0], candidate.times[-1], len(curve))
-    centres = blocking.centre + times[:, None, None] * blocking.velocity
-    depths = blocking.radius - measure_offsets(curve, blocking, centres)[1]
+    reasons = ['' if each.has_likelihood else each.status.value.replace('_', ' ') for each in snapshot]
+    places: list[float | None] = [None] * len(reasons)
+    shown, blocking = snapshot.candidates_with_likelihood, snapshot.blocking_obstacles  # these candidates are the first ones
+    if not shown or not len(blocking):
+        return list(zip(reasons, places, strict=True))
+    curves = find_drawn_curves(shown)
+    times = np.linspace(0.0, [each.times[-1] for each in shown], len(curves))
+    offsets = curves[..., None, :] - (blocking.centre + times[..., None, None] * blocking.velocity)
+    x, y = offsets[..., 0], offsets[..., 1]
+    near, depths = np.nonzero(np.hypot(x, y) < blocking.extent), np.full(x.shape, -np.inf)
+    depths[near] = blocking.radius[near[2]] - find_offset(x[near], y[near], blocking.edges.take(near[2])).distance
     is_inside = depths > GRAZE_M
     between = np.maximum.accumulate(~is_inside, axis=0) & np.maximum.accumulate(~is_inside[::-1], axis=0)[::-1]
-    entered = np.argwhere(is_inside & between)
-    if not len(entered):
-        return '', None
-    first = int(entered[0, 1])
-    deepest = np.argmax(np.where(between[:, first], depths[:, first], -np.inf))
-    return f'leads through obstacle {blocking.ids[first]}', float(deepest / (len(curve) - 1))
+    is_entered = is_inside & between
+    for row in np.flatnonzero(is_entered.any(axis=(0, 2))).tolist():
+        first = int(np.argwhere(is_entered[:, row])[0, 1])
+        deepest = np.argmax(np.where(between[:, row, first], depths[:, row, first], -np.inf))
+        reasons[row], places[row] = f'leads through obstacle {blocking.ids[first]}', float(deepest / (len(curves) - 1))
+    return list(zip(reasons, places, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

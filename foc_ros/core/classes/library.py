@@ -21,7 +21,7 @@ from foc_ros.core.obstacles.clearance import is_free
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, label_class
 from foc_ros.core.types import Array, HandState, Record
 
-from .guess import compute_path_lengths, timed
+from .guess import compute_path_lengths, time_paths
 from .search import Search
 from .sides import find_path_sides
 
@@ -141,14 +141,14 @@ def recall_demonstrations(
             rest = _deform(demonstration.path, hand.mean[:2], goals[goal])
             if rest is None or not is_free(rest, obstacles, 0.0):
                 continue
-            guess = timed(rest, hand.mean[2:4], timing.durations_s[goal], timing.steps)
+            (guess,), (length,) = time_paths([rest], hand.mean[2:4], [timing.durations_s[goal]], timing.steps)
             sides = find_path_sides(guess, obstacles)
             if not sides.keys() >= set(names[goal]) or any(shown.get(name, side) != side for name, side in sides.items()):
                 continue
             label, named = _name(goal, names[goal], sides)
             if label not in labels:
                 labels.add(label)
-                recalled.append(Candidate(label, goal, named, guess, float(compute_path_lengths(rest)[-1])))
+                recalled.append(Candidate(label, goal, named, guess, length))
     if not recalled:
         return found.candidates
 

@@ -79,8 +79,8 @@ def find_names(
 
 def _find_named(outlines: Outlines, obstacles: Obstacles, hand: Array, goals: Array, blocks: Flags, slack: Array) -> Flags:
     """Return which obstacles are named on the way to each goal, (g, n); outlines shrink if they hold the hand or the goal."""
-    scales = [np.minimum(outlines.measure_scale(hand), outlines.measure_scale(goal)) for goal in goals]
-    scale, is_named = np.reshape(scales, blocks.shape), np.zeros_like(blocks)
+    own, is_named = outlines.measure_scale(hand), np.zeros_like(blocks)
+    scale = np.reshape([np.minimum(own, outlines.measure_scale(goal)) for goal in goals], blocks.shape)
     goal, row = np.nonzero(blocks & (scale > MIN_SIZE))
     polygons, corners = scale[goal, row][:, None, None] * obstacles.vertices[row], obstacles.corners[row]
     ends = hand - obstacles.centre[row], goals[goal] - obstacles.centre[row]

@@ -115,9 +115,9 @@ def find_shortest_paths(query: PathQuery, notes: Counter[str]) -> Iterator[list[
             following = [each for each in following if _is_taut(query, node, each[0])]
         for other, step, crossed in following:
             extended = code + crossed
-            if extended & is_within != is_within or extended & extended >> 1 & extended >> 2 & ones:
+            if crossed and (extended & is_within != is_within or extended & extended >> 1 & extended >> 2 & ones):
                 continue  # it winds about an obstacle
-            if heuristic[other] < np.inf and (other, extended) not in seen:
+            if (other, extended) not in seen:
                 heappush(frontier, (key + step + heuristic[other], entries, key + step, other, extended, state))
                 entries += 1
     if tied:
@@ -132,8 +132,8 @@ def _leave_hand(query: PathQuery) -> Iterator[tuple[int, float, int]]:
     """
     points, outlines, hand, goal = query.graph.nodes.points, query.graph.nodes.outlines, query.hand, query.goal
     nodes, length, ends, crossings = hand.nodes, hand.length, points[hand.nodes], hand.crossings
-    direct = outlines.shrink(np.minimum(hand.scale, goal.scale)).block(hand.point[None], goal.point[None])
-    if not direct[0]:
+    shrunk = outlines.shrink(np.minimum(hand.scale, goal.scale))
+    if not shrunk.cut(hand.point[None], goal.point[None]).any():
         nodes, ends = np.append(nodes, len(points)), np.vstack([ends, goal.point])
         length = np.append(length, np.hypot(*(goal.point - hand.point)))
         crossings = np.vstack([crossings, count_crossings(hand.point - outlines.centre, goal.point - outlines.centre)])
@@ -170,7 +170,7 @@ def _collect_points(query: PathQuery, node_of: list[int], before: list[int]) -> 
     while state >= 0:
         nodes.append(node_of[state])
         state = before[state]
-    return np.vstack([query.hand.point, query.graph.nodes.points[nodes[::-1]], query.goal.point])
+    return np.concatenate((query.hand.point[None], query.graph.nodes.points[nodes[::-1]], query.goal.point[None]))
 
 
 @lru_cache(maxsize=64)

@@ -116,7 +116,7 @@ def find_decisions(
     turns_back = np.zeros(sides.shape, dtype=np.bool_)
     turns_back[:, 1:] = (sides[:, 1:] == LEFT) & (sides[:, :-1] == RIGHT) & (row[1:] == row[:-1])
     begins = np.flatnonzero(np.diff(row, prepend=WALL))
-    far_end = np.maximum.reduceat(_find_extents(obstacles.take(order), direction)[1], begins)
+    far_end = np.maximum.reduceat(_find_extents(obstacles, direction)[1][order], begins)
     is_passed = (goals @ direction)[goal][:, None] >= far_end
     woven = (np.logical_or.reduceat(turns_back, begins, axis=1) & is_passed).sum(axis=1)
     is_next = row == row[0]

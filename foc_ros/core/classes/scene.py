@@ -21,7 +21,7 @@ from foc_ros.core.solution import LEFT, RIGHT, Candidate, Signature, label_class
 from foc_ros.core.types import Array, as_readonly
 
 from .graph import Graph, Lines, Rows, build_graph
-from .guess import compute_path_lengths, timed
+from .guess import compute_path_lengths, time_paths
 from .names import find_names, take_near
 from .outlines import outline_obstacles
 from .paths import PathQuery, find_shortest_paths
@@ -133,11 +133,10 @@ class SearchScene:
         Where obstacles move, a class is that in which the hand passes them when it is there: its guess decides, and of several
         classes that become the same one the first is returned.
         """
-        made: dict[str, Candidate] = {}
-        for each in classes:
-            guess = as_readonly(timed(each.points, self._velocity, self._duration_s[each.goal], self._steps))
-            length = float(compute_path_lengths(each.points)[-1])
-            candidate = each.known or Candidate(each.label, each.goal, each.sides, guess, length)
+        made, durations_s = dict[str, Candidate](), [self._duration_s[each.goal] for each in classes]
+        guesses, lengths = time_paths([each.points for each in classes], self._velocity, durations_s, self._steps)
+        for each, guess, length in zip(classes, guesses, lengths, strict=True):
+            candidate = each.known or Candidate(each.label, each.goal, each.sides, as_readonly(guess), length)
             if each.known is None and self._now.velocity.any():
                 candidate = self._name_when_passed(candidate, self._duration_s[each.goal] / self._steps)
             made.setdefault(candidate.label, candidate)
@@ -147,9 +146,10 @@ class SearchScene:
         """Return obstacles with their centres where a hand that moves straight to a goal comes nearest to them."""
         if not obstacles.velocity.any():
             return obstacles
-        offsets, nearest_s = [], []
-        for goal, duration_s in zip(self._goals, self._duration_s, strict=True):
-            dt, path = duration_s / self._steps, timed(np.stack((self._hand, goal)), self._velocity, duration_s, self._steps)
+        offsets, nearest_s, straight = [], [], [np.stack((self._hand, goal)) for goal in self._goals]
+        paths, _ = time_paths(straight, self._velocity, self._duration_s, self._steps)
+        for path, duration_s in zip(paths, self._duration_s, strict=True):
+            dt = duration_s / self._steps
             offset = path[:, None] - centre_trajectories(obstacles.centre, obstacles.velocity * dt, self._steps)
             change = np.diff(offset, axis=0)
             share = -(offset[:-1] * change).sum(axis=2) / np.maximum((change**2).sum(axis=2), np.finfo(float).tiny)

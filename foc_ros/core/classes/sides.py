@@ -173,8 +173,7 @@ def measure_passages(solutions: Sequence[Solution], obstacles: Obstacles) -> Pas
     path, dt = np.stack([each.path for each in solutions]), np.array([each.dt for each in solutions])
     drift = dt[:, None, None, None] * obstacles.velocity
     offset = path[:, :, None] - centre_trajectories(obstacles.centre, drift, path.shape[1] - 1)
-    edges = obstacles.edges
-    distance = find_offset(offset[..., 0], offset[..., 1], edges).distance
+    distance = find_offset(offset[..., 0], offset[..., 1], obstacles.edges).distance
     return Passages(dt, sweep(offset), distance, distance[:, -1] >= obstacles.radius)
 
 

@@ -94,11 +94,11 @@ def _multiply(one: Array, other: Array) -> Array:
     return np.stack((one[:, 0] * other[:, 0], one[:, 1] * other[:, 1], mixed), axis=1)
 
 
-def compute_curve(path: Array, velocity: Array, dt: float) -> Array:
-    """Return m > 50 points (m, 2) [m] on the mean path, which looks smooth then: the steps and, where needed, some between.
+def compute_curve(path: Array, velocity: Array, dt: Array | float) -> Array:
+    """Return m > 50 points (m, ..., 2) [m] on mean paths, which look smooth then: the steps and, where needed, some between.
 
-    path, velocity (N + 1, 2) [m, m/s]: at steps dt [s] apart. Equal parts of a step lie between two points. A path of more steps,
-    or of one point, is returned as it is.
+    path, velocity (N + 1, ..., 2) [m, m/s]: at steps dt (..., 1) [s] apart. Equal parts of a step lie between two points. Paths
+    of more steps, or of one point, are returned as they are.
     """
     steps = len(path) - 1
     parts = -(-50 // max(steps, 1))
@@ -107,8 +107,8 @@ def compute_curve(path: Array, velocity: Array, dt: float) -> Array:
     return sample_curve(path, velocity, dt, parts)
 
 
-def sample_curve(path: Array, velocity: Array, dt: float, parts: int) -> Array:
-    """Return the mean path at equal parts of its steps, (parts N + 1, 2) [m], for positions and velocities as above."""
+def sample_curve(path: Array, velocity: Array, dt: Array | float, parts: int) -> Array:
+    """Return mean paths at equal parts of their steps, (parts N + 1, ..., 2) [m], for positions and velocities as above."""
     ends = pair_steps(np.stack((path, dt * velocity), axis=1))
-    points: Array = (hermite(np.arange(parts) / parts) @ ends).reshape(-1, 2)
+    points: Array = (hermite(np.arange(parts) / parts) @ ends.reshape(len(ends), 4, -1)).reshape(-1, *path.shape[1:])
     return np.concatenate((points, path[-1:]))

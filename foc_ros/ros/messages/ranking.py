@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -58,3 +59,9 @@ def find_drawn_curve(outcome: PredictedCandidate) -> Array:
     if not len(solution.mean) or not np.isfinite(solution.mean).all():
         return outcome.candidate.guess
     return compute_curve(solution.path, solution.mean[:, 2:4], solution.dt)
+
+
+def find_drawn_curves(outcomes: Sequence[PredictedCandidate]) -> Array:
+    """Return the mean paths of k candidates with a likelihood as smooth curves (m, k, 2) [m]; k > 0."""
+    mean, dt = np.stack([each.mean for each in outcomes], axis=1), np.array([[each.solution.dt] for each in outcomes])
+    return compute_curve(mean[..., :2], mean[..., 2:4], dt)
