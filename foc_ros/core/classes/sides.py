@@ -112,26 +112,24 @@ def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = N
 
 def find_sides(paths: Array, obstacles: Obstacles, centres: Array) -> list[dict[str, int]]:
     """Return for each of the paths (b, m, 2) [m] what `find_path_sides` returns; together they take little longer than one."""
-    offset = paths[:, :, None] - centres
+    offset, edges = paths[:, :, None] - centres, find_edges(obstacles)
     angles = sweep(offset)
-    is_passed = is_between(obstacles.vertices, obstacles.corners, offset[:, 0], offset[:, -1], 0.0) | (np.abs(angles) > np.pi)
+    is_passed = is_between(edges.x, edges.y, offset[:, 0], offset[:, -1], 0.0) | (np.abs(angles) > np.pi)
     sides = np.where(angles < 0.0, LEFT, RIGHT).tolist()
     return [{obstacles.ids[row]: of[row] for row in np.flatnonzero(each)} for of, each in zip(sides, is_passed, strict=True)]
 
 
-def is_between(vertices: Array, corners: NDArray[np.intp], begin: Array, end: Array, slack: Array | float) -> NDArray[np.bool_]:
+def is_between(x: Array, y: Array, begin: Array, end: Array, slack: Array | float) -> NDArray[np.bool_]:
     """Tell which polygons have a point whose foot on a line lies between the ends of the line, by more than a slack.
 
-    vertices (n, V, 2), begin, end (n, 2): of the polygons and the lines, relative to the centres [m]; corners (n,): number of
-    vertices; slack (n,): least distance of the foot from both ends [m].
+    x, y (n, V): vertices of the polygons, some of them more than once; begin, end (..., n, 2): of the lines, all relative to the
+    centres [m]; slack (n,): least distance of the foot from both ends [m].
     """
     line = end - begin
     square = (line**2).sum(axis=-1)
     margin = slack * np.sqrt(square)
-    foot = ((vertices - begin[..., None, :]) * line[..., None, :]).sum(axis=-1)
-    is_corner = np.arange(vertices.shape[1]) < corners[:, None]
-    first, last = np.where(is_corner, foot, np.inf).min(axis=-1), np.where(is_corner, foot, -np.inf).max(axis=-1)
-    flags: NDArray[np.bool_] = (margin < last) & (first < square - margin)
+    foot = (x - begin[..., :1]) * line[..., :1] + (y - begin[..., 1:]) * line[..., 1:]
+    flags: NDArray[np.bool_] = (margin < foot.max(axis=-1)) & (foot.min(axis=-1) < square - margin)
     return flags
 
 
