@@ -14,7 +14,7 @@ import numpy as np
 
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import cull_obstacles
-from foc_ros.core.obstacles.geometry import find_edges, measure_offsets
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import Candidate
 from foc_ros.core.types import Array
 
@@ -82,7 +82,7 @@ def _find_named(outlines: Outlines, obstacles: Obstacles, hand: Array, goals: Ar
     own, is_named = outlines.measure_scale(hand), np.zeros_like(blocks)
     scale = np.reshape([np.minimum(own, outlines.measure_scale(goal)) for goal in goals], blocks.shape)
     goal, row = np.nonzero(blocks & (scale > MIN_SIZE))
-    size, edges = scale[goal, row][:, None], find_edges(obstacles).take(row)
+    size, edges = scale[goal, row][:, None], obstacles.edges.take(row)
     ends = hand - obstacles.centre[row], goals[goal] - obstacles.centre[row]
     is_beside = is_between(size * edges.x, size * edges.y, *ends, slack[goal, row])
     goal, row = goal[is_beside], row[is_beside]

@@ -112,7 +112,7 @@ def find_path_sides(path: Array, obstacles: Obstacles, centres: Array | None = N
 
 def find_sides(paths: Array, obstacles: Obstacles, centres: Array) -> list[dict[str, int]]:
     """Return for each of the paths (b, m, 2) [m] what `find_path_sides` returns; together they take little longer than one."""
-    offset, edges = paths[:, :, None] - centres, find_edges(obstacles)
+    offset, edges = paths[:, :, None] - centres, obstacles.edges
     angles = sweep(offset)
     is_passed = is_between(edges.x, edges.y, offset[:, 0], offset[:, -1], 0.0) | (np.abs(angles) > np.pi)
     sides = np.where(angles < 0.0, LEFT, RIGHT).tolist()
