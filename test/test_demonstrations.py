@@ -4,6 +4,7 @@
 
 import json
 import os
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from foc_ros.cli.main import main
 from foc_ros.core.classes import find_path_sides, search
 from foc_ros.core.classes.library import STEP_S, GuessTiming, recall_demonstrations, record_demonstration
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
-from foc_ros.core.errors import FocError, RecordingError
+from foc_ros.core.errors import FocError, FocWarning, RecordingError
 from foc_ros.core.learning.learnt import Knowledge
 from foc_ros.core.learning.recordings import NO_LIBRARY, PRIOR_COUNT, PRIOR_COUNT_GOAL, make_library
 from foc_ros.core.obstacle_table import make_obstacles
@@ -276,8 +277,15 @@ def test_learn_writes_a_library_that_a_predictor_uses_in_its_frame_or_without_on
         predictor = foc_ros.Predictor(Config(budget_s=0.0, frame_id=frame), library=library)
         predictor.set_goals([(0.3, 0.0)])
         predictor.set_obstacles([obstacle])
-        for share in np.linspace(0.0, 0.2, 11):
-            prediction = predictor.update(share, (0.3 * share, 0.0))
+        expected = (
+            pytest.warns(FocWarning, match="in the frame 'world', the working frame is 'arm'")
+            if frame == 'arm'
+            else nullcontext()
+        )
+        with expected as issued:
+            for share in np.linspace(0.0, 0.2, 11):
+                prediction = predictor.update(share, (0.3 * share, 0.0))
+        assert issued is None or len(issued) == 1
         shares.append({each.label: each.likelihood for each in prediction}['goal0:+0'])
     assert shares[1] == shares[2] > shares[0] + 0.02, 'the recordings pass on the left'
     assert shares[3] == shares[0], 'in another frame they say nothing'
@@ -315,6 +323,26 @@ def test_a_reach_is_learned_once(bag, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)['summary']['learned'] == 0
     assert file.read_text() == held
     assert run(bag, library=str(file)) == 0
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        ({'frame_id': 'arm'}, "they are in the frame 'arm', the working frame is 'world'"),
+        ({'ids': ('cup',)}, "they pass obstacles that the scene does not have: 'cup'"),
+        ({'centre': np.array([[0.2, 0.1]])}, ''),
+    ],
+    ids=['frame', 'ids', 'places'],
+)
+def test_a_library_of_no_use_is_told_once(bag, tmp_path, capsys, change, words):
+    run(bag, '--learn', str(tmp_path / 'ways.json'))
+    (way,) = load_library(str(tmp_path / 'ways.json'))
+    file = tmp_path / 'others.json'
+    save_library(file, [replace(way, **change)] * 2)
+    capsys.readouterr()
+    assert run(bag, library=str(file)) == 0
+    told = f'foc_ros replay: {file}: none of its paths counts: {words}\n' if words else ''
+    assert capsys.readouterr().err.replace('\r', '') == told
 
 
 def test_another_library_in_the_parameters_is_refused(bag, tmp_path, capsys):
