@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from foc_ros.__main__ import main as run_program
 from foc_ros.cli import main as command_line
 from foc_ros.core.errors import InputError
 from foc_ros.io import terminal
@@ -199,12 +200,13 @@ def ends(monkeypatch):
 )
 def test_exit_codes(ends, capsys, outcome, code, line):
     ends(outcome)
-    assert command_line.main(['end']) == code
+    assert run_program(['end']) == code
     assert capsys.readouterr() == ('', line)
 
 
 LOUD = """
 import sys
+from foc_ros.__main__ import main as run_program
 from foc_ros.cli import main as command_line
 @command_line.app.command
 def loud():

@@ -3,21 +3,17 @@
 """The program `foc_ros`.
 
 Exit codes: 0 done; 2 the input is wrong, and a line on standard error for each error names field, value and bound; 3 no candidate
-could be solved; 130 after an interrupt and 141 if the reader of standard output has closed it, both as in a shell. If standard
-output cannot be written, for example because its disk is full, the code is 2.
+could be solved; 141 if the reader of standard output has closed it, as in a shell. If standard output cannot be written, for
+example because its disk is full, the code is 2.
 """
 
 from __future__ import annotations
 
 import os
-import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
-from types import FrameType
-from typing import Any
 
 from cyclopts import CycloptsError
 
@@ -28,7 +24,6 @@ from .options import app
 
 MOVED = {'paper': 'the studies of the paper are an example now: python examples/paper/paper.py'}
 """Commands of earlier releases, and what took their place."""
-INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -46,11 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments) or ['--help']
     program = ' '.join(['foc_ros', *given[:1]])
     try:
-        with handle_interrupts(), print_warnings(program):
+        with print_warnings(program):
             code = _run(given, program)
             sys.stdout.flush()
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except OSError as error:
         try:
             sys.stdout.flush()
@@ -86,28 +79,3 @@ def _reject(program: str, messages: Sequence[str]) -> int:
         line = ' '.join(message.split())
         print(f'{program}: {"".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)}', file=sys.stderr)
     return 2
-
-
-@contextmanager
-def handle_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGINT within the context; during an import, end the process at once with `INTERRUPTED`.
-
-    Some extension modules lose an exception that is raised while they import another one. An import has nothing to clean up.
-    """
-    before: Callable[..., Any] | int | None = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler:
-        yield
-        return
-
-    def interrupt(_: int, frame: FrameType | None) -> None:
-        while frame is not None:
-            if frame.f_globals.get('__name__') == 'importlib._bootstrap':
-                os._exit(INTERRUPTED)
-            frame = frame.f_back
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGINT, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
