@@ -23,7 +23,14 @@ from foc_ros.core.classes.library import STEP_S, GuessTiming, recall_demonstrati
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
 from foc_ros.core.errors import FocError, FocWarning, RecordingError
 from foc_ros.core.learning.learnt import Knowledge
-from foc_ros.core.learning.recordings import NO_LIBRARY, PRIOR_COUNT, PRIOR_COUNT_GOAL, make_library
+from foc_ros.core.learning.recordings import (
+    NO_LIBRARY,
+    PRIOR_COUNT,
+    PRIOR_COUNT_GOAL,
+    compute_goal_factors,
+    find_evidence,
+    make_library,
+)
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predict import predict
@@ -183,6 +190,20 @@ def test_recordings_tell_goals_apart_by_where_they_led_and_not_by_how_many_there
     known = find_odds([there] * 3 + [elsewhere] * 2, moving) / find_odds([], moving)
     prior, near = PRIOR_COUNT_GOAL, 3 / 5
     assert known == pytest.approx((prior * near + 3) / (prior + 3) / (prior * near / (prior + 2)), rel=0.02)
+
+
+def test_recordings_of_ways_that_are_closed_now_say_nothing_of_goals():
+    """Neither when the hand begins as they do, nor when it has left them."""
+    goals, post = np.array([[0.3, 0.1], [0.3, -0.1]]), [(0.2, 0.1)]
+    share = np.linspace(0.0, 1.0, 65)[:, None]
+    closed, free = (record(share * goal, make_obstacles(post, 0.01)) for goal in goals)
+    away = replace(HAND, mean=np.array([*free.states[20], 0.0, 0.0]), onset_ns=0)
+    for hand in (HAND, away):
+        known, same = (
+            find_evidence(make_library(each), hand, make_obstacles(post, 0.05), goals) for each in ([closed, free], [free])
+        )
+        assert known.recorded.tolist() == same.recorded.tolist() == [0, 1]
+        assert compute_goal_factors(known) == pytest.approx(compute_goal_factors(same))
 
 
 MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)

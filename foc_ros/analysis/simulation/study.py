@@ -26,8 +26,8 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
 HARMS = {'wrong_way_s': 'duration_s', 'wrong_way_effort': 'effort'}
-"""What an operator needs more than alone where the likeliest way was wrong, nan elsewhere, and the measure that it is of: at least
-so much where the hand did not arrive before the trial ended."""
+"""What an operator needs more than alone where the likeliest way was wrong, nan elsewhere, and the measure that it is of. It is
+at least so much where the hand did not arrive before the trial ended."""
 COLUMNS = {
     'collision_rate': ('collisions [%]', 100.0, 1),
     'arrival_rate': ('arrivals [%]', 100.0, 1),
