@@ -206,7 +206,6 @@ def test_exit_codes(ends, capsys, outcome, code, line):
 
 LOUD = """
 import sys
-from foc_ros.__main__ import main as run_program
 from foc_ros.cli import main as command_line
 @command_line.app.command
 def loud():
@@ -242,6 +241,14 @@ def test_a_full_standard_output_gives_2_and_one_line_and_a_closed_one_changes_no
     with Path(FULL).open('w') as full:
         assert printed_to(MANY_LINES, stdout=full) == (2, 'foc_ros loud: [Errno 28] No space left on device\n')
     assert printed_to(A_LINE, preexec_fn=lambda: os.close(1)) == (0, '')
+    assert printed_to('return 2 - sys.stdin.isatty()', preexec_fn=lambda: os.closerange(0, 3))[0] == 2
+
+
+@pytest.mark.parametrize('width', ['0', '1', 'wide'])
+def test_help_is_shown_in_a_terminal_of_any_width(width):
+    help_of = [sys.executable, '-m', 'foc_ros', 'warm-up', '--help']
+    shown = subprocess.run(help_of, env={**os.environ, 'COLUMNS': width}, capture_output=True, timeout=20, check=False, text=True)
+    assert (shown.returncode, shown.stderr) == (0, '') and 'Do nothing' in ' '.join(shown.stdout.split())
 
 
 def test_a_wide_table_is_divided_and_loses_nothing(capsys):

@@ -10,6 +10,7 @@ example because its disk is full, the code is 2.
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Sequence
 from io import TextIOWrapper
@@ -24,15 +25,24 @@ from .options import app
 
 MOVED = {'paper': 'the studies of the paper are an example now: python examples/paper/paper.py'}
 """Commands of earlier releases, and what took their place."""
+NARROWEST = 20
+"""Width of a terminal [characters] for which help is formatted at least: less than 3 would take endless time and memory."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, without one the help, and return the exit code; arguments: those of the process by default."""
-    if sys.stdout is None:  # the process was started with its standard output closed
-        sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
+    for number, (name, mode) in enumerate((('stdin', 'r'), ('stdout', 'w'), ('stderr', 'w'))):
+        try:
+            os.fstat(number)
+        except OSError:  # it was closed when the process started; the next file would get its number
+            setattr(sys, name, Path(os.devnull).open(mode, encoding='utf-8'))  # noqa: SIM115  it stays open
+            os.set_inheritable(number, True)  # noqa: FBT003
     if arguments is None:
         if sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
             os.execv(sys.executable, [sys.executable, '-X', 'utf8', *sys.orig_argv[1:]])  # noqa: S606
+        columns = shutil.get_terminal_size().columns
+        if 'COLUMNS' in os.environ or columns < NARROWEST:
+            os.environ['COLUMNS'] = str(max(columns, NARROWEST))
         # matrices are small: threads of a linear algebra library would only wait for each other
         os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
         os.environ['MPLBACKEND'] = 'agg'  # pictures are files; the backend of a notebook or of a desktop may not exist here
