@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from io import TextIOWrapper
 from pathlib import Path
 
@@ -36,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.fstat(number)
         except OSError:  # it was closed when the process started; the next file would get its number
             setattr(sys, name, Path(os.devnull).open(mode, encoding='utf-8'))  # noqa: SIM115  it stays open
-            os.set_inheritable(number, True)  # noqa: FBT003
+            os.set_inheritable(number, True)
     if arguments is None:
         if sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
             os.execv(sys.executable, [sys.executable, '-X', 'utf8', *sys.orig_argv[1:]])  # noqa: S606
@@ -85,7 +86,8 @@ def list_commands() -> list[str]:
 
 def _reject(program: str, messages: Sequence[str]) -> int:
     """Print each message in one line; a character from a file that would control the terminal is escaped. Return the code."""
-    for message in messages:
-        line = ' '.join(message.split())
-        print(f'{program}: {"".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)}', file=sys.stderr)
+    with suppress(OSError):  # the disk of standard error may be full
+        for message in messages:
+            line = ' '.join(message.split())
+            print(f'{program}: {"".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)}', file=sys.stderr)
     return 2
