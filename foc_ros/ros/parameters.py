@@ -136,7 +136,7 @@ def dump_parameter_file(config: Config) -> str:
 
 
 def write_parameter_file(option: str, file: Path, config: Config) -> None:
-    """Write a parameter file completely or not at all; raises InputError, which names the option of the command, where that is impossible."""
+    """Write a parameter file, or nothing; raises InputError, which names the option of the command, where that is impossible."""
     try:
         write_whole(file, dump_parameter_file(config))
     except OSError as error:
