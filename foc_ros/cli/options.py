@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Group, Parameter, Token
 from cyclopts.types import ExistingPath
-from cyclopts.validators import Number
 
 import foc_ros
 from foc_ros.analysis.simulation import ASSISTANCE, OPERATORS
@@ -69,6 +68,18 @@ def names(known: tuple[str, ...]) -> Parameter:
     return Parameter(converter=read, n_tokens=1, metavar='A,B')
 
 
+def whole(low: int, high: int) -> Parameter:
+    """Return the parameter of a whole number in a range; cyclopts alone would round any other number."""
+
+    def read(_: object, tokens: Sequence[Token]) -> int:
+        text = tokens[0].value
+        if not re.fullmatch(r'[+-]?\d{1,18}', text, re.ASCII) or not low <= int(text) <= high:
+            raise InputError(str(tokens[0].keyword), f'a whole number in [{low}, {high}]', text)
+        return int(text)
+
+    return Parameter(converter=read, n_tokens=1)
+
+
 def _read_address(text: str) -> str:
     if not re.fullmatch(r'(\w+://)?[^\s/]+:\d{1,5}', text):
         raise InputError('--scheduler', 'the address of a Dask scheduler, as in tcp://host:8786', text)
@@ -105,10 +116,10 @@ Remaps = Annotated[
     tuple[tuple[str, str], ...],
     Parameter(converter=_read_remaps, n_tokens=1, allow_repeating=True, metavar='INPUT:=TOPIC', show_default=False),
 ]
-Samples = Annotated[int, Parameter(validator=Number(gte=1, lte=10_000_000))]
-Port = Annotated[int, Parameter(validator=Number(gte=0, lte=65535))]
-Trials = Annotated[int, Parameter(validator=Number(gte=1, lte=100_000))]
-Seed = Annotated[int, Parameter(validator=Number(gte=0, lte=100_000))]
+Samples = Annotated[int, whole(1, 10_000_000)]
+Port = Annotated[int, whole(0, 65535)]
+Trials = Annotated[int, whole(1, 100_000)]
+Seed = Annotated[int, whole(0, 100_000)]
 Operators = Annotated[tuple[str, ...], names(OPERATORS)]
 Assistance = Annotated[tuple[str, ...], names(ASSISTANCE)]
 Allowed = Annotated[tuple[str, ...], names(('eta', 'positions'))]
@@ -169,7 +180,7 @@ class Study:
     params: Params = DEFAULTS
     json: Json = False
     report: Path | None = None
-    workers: Annotated[int, Parameter(validator=Number(gte=1, lte=1024))] | None = None
+    workers: Annotated[int, whole(1, 1024)] | None = None
     scheduler: Annotated[str, _read(_read_address)] | None = None
 
     def check(self, page: str) -> None:
