@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program: exit codes, errors in one line, no unnecessary imports, and output that fits into 80 columns."""
 
+import io
 import json
 import os
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 
 from foc_ros.__main__ import main as run_program
 from foc_ros.cli import main as command_line
+from foc_ros.cli.options import confirm
 from foc_ros.core.errors import InputError
 from foc_ros.io import terminal
 from foc_ros.io.terminal import COLUMNS, show_table
@@ -212,6 +214,14 @@ def loud():
     {}
 sys.exit(command_line.main(["loud"]))
 """
+@pytest.mark.parametrize(('typed', 'agrees'), [('y\n', True), ('\n', False), ('', False)], ids=['yes', 'Enter', 'Ctrl-D'])
+def test_a_question_at_a_terminal_is_answered_or_left(monkeypatch, typed, agrees):
+    monkeypatch.setattr(sys, 'stdin', io.StringIO(typed))
+    for each in (sys.stdin, sys.stdout):
+        monkeypatch.setattr(each, 'isatty', lambda: True)
+    assert confirm('Write it?') is agrees
+
+
 FULL = '/dev/full'
 A_LINE, MANY_LINES = 'print("x")', 'for _ in range(100000): print("x" * 100)'
 A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 1000)'

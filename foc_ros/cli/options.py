@@ -236,4 +236,8 @@ def confirm(question: str) -> bool:
     """Return whether a terminal, if there is one, agrees."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return False
-    return input(f'{question} [y/N] ').strip().lower() in ('y', 'yes')
+    try:
+        return input(f'{question} [y/N] ').strip().lower() in ('y', 'yes')
+    except EOFError:  # Ctrl-D
+        print()
+        return False
