@@ -214,6 +214,8 @@ def loud():
     {}
 sys.exit(command_line.main(["loud"]))
 """
+
+
 @pytest.mark.parametrize(('typed', 'agrees'), [('y\n', True), ('\n', False), ('', False)], ids=['yes', 'Enter', 'Ctrl-D'])
 def test_a_question_at_a_terminal_is_answered_or_left(monkeypatch, typed, agrees):
     monkeypatch.setattr(sys, 'stdin', io.StringIO(typed))
