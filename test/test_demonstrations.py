@@ -381,9 +381,14 @@ def test_a_library_of_no_use_is_told_once(bag, tmp_path, capsys, change, words):
     assert capsys.readouterr().err.replace('\r', '') == told
 
 
-def test_another_library_in_the_parameters_is_refused(bag, tmp_path, capsys):
+def test_another_library_in_the_parameters_is_refused(bag, tmp_path, capsys, monkeypatch):
     assert run(bag, '--learn', str(tmp_path / 'ways.json'), library=str(tmp_path / 'other.json')) == 2
     assert '--learn: expected no other class library in homotopy.library' in capsys.readouterr().err
+    monkeypatch.chdir(tmp_path)
+    assert run(bag, '--learn', 'ways.json') == 0
+    assert run(bag, '--learn', 'ways.json', library=str(tmp_path / 'ways.json')) == 0, 'it is the same'
+    assert run(bag, '--learn', 'new', '--operator', str(tmp_path / 'new')) == 2
+    assert '--operator: expected another file than that of --learn' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('text', ['{"ways": [{}]}', '{', 'x' * 6_000_000])

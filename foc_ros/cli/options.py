@@ -142,14 +142,16 @@ class Learning:
     operator: Path | None = None
 
     def check(self, config: Config) -> None:
-        """Raise InputError for a file that cannot be written, and for two class libraries."""
+        """Raise InputError for a file that cannot be written, for two class libraries, and for one file of two kinds."""
         if self.learn is not None:
             check_file('--learn', self.learn)
         if self.operator is not None:
             check_new_or_earlier('--operator', self.operator, load_parameter_file)
         library = config.homotopy.library
-        if self.learn is not None and library and Path(library) != self.learn:
+        if self.learn is not None and library and Path(library).resolve() != self.learn.resolve():
             raise InputError('--learn', 'no other class library in homotopy.library', library)
+        if self.learn is not None and self.operator is not None and self.operator.resolve() == self.learn.resolve():
+            raise InputError('--operator', 'another file than that of --learn', self.operator)
 
     def prepare(self, config: Config) -> Config:
         """Return the config with which movements are learnt, in addition to those of a class library that exists."""
