@@ -14,7 +14,7 @@ import pytest
 from foc_ros.__main__ import main as run_program
 from foc_ros.cli import main as command_line
 from foc_ros.cli.options import confirm
-from foc_ros.core.errors import InputError
+from foc_ros.core.errors import InputError, warn
 from foc_ros.io import terminal
 from foc_ros.io.terminal import COLUMNS, show_table
 
@@ -222,6 +222,18 @@ def test_a_question_at_a_terminal_is_answered_or_left(monkeypatch, typed, agrees
     for each in (sys.stdin, sys.stdout):
         monkeypatch.setattr(each, 'isatty', lambda: True)
     assert confirm('Write it?') is agrees
+
+
+def test_a_warning_does_not_control_the_terminal(capsys):
+    def end():
+        warn('/a/\x1b[2J.mcap: not read')
+
+    command_line.app.command(end, name='ending')
+    try:
+        assert command_line.main(['ending']) == 0
+    finally:
+        del command_line.app['ending']
+    assert capsys.readouterr().err == 'foc_ros ending: /a/\\x1b[2J.mcap: not read\n'
 
 
 FULL = '/dev/full'

@@ -134,20 +134,12 @@ def _leave_out_copies(bags: Iterable[Path]) -> Iterator[Path]:
     for bag in bags:
         files = [path for path in sorted(bag.iterdir()) if is_bag_file(path)] if bag.is_dir() else [bag]
         known = of_sizes.setdefault(tuple(path.stat().st_size for path in files), [])
-        same = next((each for each in known if all(map(_is_same_file, files, each))), None)
+        same = next((each for each in known if all(map(partial(cmp, shallow=False), files, each))), None)
         if same is None:
             known.append(files)
             yield bag
         else:
             warn(f'{bag}: left out, because it is a copy of {same[0]}')
-
-
-def _is_same_file(one: Path, other: Path) -> bool:
-    """Tell whether two files have the same bytes; one that cannot be read is the same as no other."""
-    try:
-        return cmp(one, other, shallow=False)
-    except OSError:
-        return False
 
 
 def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recording]]:

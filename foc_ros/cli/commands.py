@@ -20,10 +20,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from foc_ros.core.errors import FocError, InputError
+from foc_ros.core.errors import FocError, InputError, print_messages
 from foc_ros.io.outputs import REPORT_FILES, check_folder, check_page, check_picture
 
-from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Json, Learning, Params, Port, Remaps, Samples, app, warn_all
+from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Json, Learning, Params, Port, Remaps, Samples, app
 
 
 @app.command(group=TRY)
@@ -126,7 +126,7 @@ def solve(scene: Existing, /, *, json: Json = False, monte_carlo: Samples | None
         return 0
     reasons = '; '.join(f'{each.description}: {each.reason}' for each in prediction)
     lost = f'no candidate could be solved: {reasons}' if reasons else 'no path was found between the start and any goal'
-    warn_all('solve', [lost])
+    print_messages('foc_ros solve', [lost])
     return 3
 
 
@@ -204,8 +204,8 @@ def replay(
                 show_address(report / 'index.html')
     losses = list(filter(None, [played.describe_losses(), played.intake.describe_still_hand()]))
     if summary.counts['solved']:
-        warn_all('replay', losses)
+        print_messages('foc_ros replay', losses)
         return 0
     reason = '; '.join([*losses, played.pipeline.not_ready_reason() or 'see the candidates not solved'])
-    warn_all('replay', [f'no prediction has a solved candidate: {reason}'])
+    print_messages('foc_ros replay', [f'no prediction has a solved candidate: {reason}'])
     return 3

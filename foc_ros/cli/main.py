@@ -13,13 +13,12 @@ import os
 import shutil
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from io import TextIOWrapper
 from pathlib import Path
 
 from cyclopts import CycloptsError
 
-from foc_ros.core.errors import FocError, list_messages, print_warnings
+from foc_ros.core.errors import FocError, list_messages, print_messages, print_warnings
 
 from . import commands, studies  # noqa: F401  they declare the commands of the program
 from .options import app
@@ -60,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         except OSError:  # the interpreter would write what is left again at exit and print an error
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141 if isinstance(error, BrokenPipeError) else _reject(program, [str(error)])
+        return 141 if isinstance(error, BrokenPipeError) else print_messages(program, [str(error)])
     return code
 
 
@@ -74,20 +73,11 @@ def _run(given: list[str], program: str) -> int:
         return int(command(*bound.args, **bound.kwargs) or 0)
     except CycloptsError as error:
         error.verbose = False
-        return _reject(program, [str(error)])
+        return print_messages(program, [str(error)])
     except FocError as error:
-        return _reject(program, list_messages(error))
+        return print_messages(program, list_messages(error))
 
 
 def list_commands() -> list[str]:
     """Return the names of all commands."""
     return [name for name in app if not name.startswith('-')]
-
-
-def _reject(program: str, messages: Sequence[str]) -> int:
-    """Print each message in one line; a character from a file that would control the terminal is escaped. Return the code."""
-    with suppress(OSError):  # the disk of standard error may be full
-        for message in messages:
-            line = ' '.join(message.split())
-            print(f'{program}: {"".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)}', file=sys.stderr)
-    return 2

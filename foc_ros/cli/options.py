@@ -226,14 +226,6 @@ class Study:
 PLAIN = Study()
 
 
-def warn_all(command: str, messages: Iterable[str]) -> int:
-    """Print what went wrong; return the exit code 2 if anything did."""
-    lines = list(messages)
-    for line in lines:
-        print(f'foc_ros {command}: {line}', file=sys.stderr)
-    return 2 if lines else 0
-
-
 def confirm(question: str) -> bool:
     """Return whether a terminal, if there is one, agrees."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
