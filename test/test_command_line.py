@@ -224,9 +224,10 @@ def test_a_question_at_a_terminal_is_answered_or_left(monkeypatch, typed, agrees
     assert confirm('Write it?') is agrees
 
 
-def test_a_warning_does_not_control_the_terminal(capsys):
+def test_a_warning_is_told_once_and_does_not_control_the_terminal(capsys):
     def end():
-        warn('/a/\x1b[2J.mcap: not read')
+        for _ in range(3):
+            warn('/a/\x1b[2J.mcap: not read')
 
     command_line.app.command(end, name='ending')
     try:

@@ -381,6 +381,15 @@ def test_a_library_of_no_use_is_told_once(bag, tmp_path, capsys, change, words):
     assert capsys.readouterr().err.replace('\r', '') == told
 
 
+def test_a_library_of_no_use_is_told_once_for_all_recordings(tmp_path, capsys):
+    write_reaches(tmp_path, [0.3, 0.3])
+    file, parameters = tmp_path / 'ways.json', tmp_path / 'parameters.yaml'
+    save_library(file, [replace(ABOVE, frame_id='arm')])
+    parameters.write_text(PARAMETERS % file)
+    assert main(['evaluate', str(tmp_path), '--params', str(parameters), '--workers', '1']) == 0
+    assert capsys.readouterr().err.count('none of its paths counts') == 1
+
+
 def test_another_library_in_the_parameters_is_refused(bag, tmp_path, capsys, monkeypatch):
     assert run(bag, '--learn', str(tmp_path / 'ways.json'), library=str(tmp_path / 'other.json')) == 2
     assert '--learn: expected no other class library in homotopy.library' in capsys.readouterr().err

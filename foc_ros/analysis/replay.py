@@ -232,5 +232,5 @@ def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration
         unused = losses or replayed.pipeline.not_ready_reason()
         raise RecordingError(f'{recording.name}: {movements.refusal or unused or standing}')
     if losses:
-        warn(losses)
+        warn(f'{recording.name}: {losses}')
     return movements.learnt

@@ -86,10 +86,12 @@ def print_messages(program: str, messages: Iterable[str]) -> int:
 
 @contextmanager
 def print_warnings(program: str) -> Iterator[None]:
-    """Print each warning as `print_messages` does, without its place in the code."""
+    """Print each warning as `print_messages` does, without its place in the code, and equal ones once."""
+    told = set[str]()
 
     def show(message: Warning | str, *_: object, **__: object) -> None:
-        print_messages(program, [str(message)])
+        print_messages(program, {str(message)} - told)
+        told.add(str(message))
 
     with warnings.catch_warnings():
         warnings.simplefilter('always', FocWarning)
