@@ -2,21 +2,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program `foc_ros`, also as `python -m foc_ros COMMAND`.
 
-The node needs ROS and a numeric library or two; the other commands need more. What of it is missing is said in one sentence.
+An interrupt ends it with the exit code 130, as in a shell, even in an import. The node needs ROS and a numeric library or two;
+the other commands need more. What of it is missing is said in one sentence.
 """
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
+from types import FrameType
+from typing import Any
 
 COMMANDS_NEED = ('cyclopts', 'joblib', 'mcap', 'pydantic', 'rich', 'rosbags')
 """Packages of the commands that the node does without."""
+INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; arguments: those of the process by default, without its name."""
+    try:
+        with handle_interrupts():
+            return _run(arguments)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     missing = [name for name in COMMANDS_NEED if find_spec(name) is None]
     if not missing:
         from .cli.main import main as run
@@ -30,6 +45,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = ' '.join(missing)
     print(f'foc_ros: this command needs packages that are not installed: pip install {names}', file=sys.stderr)
     return 2
+
+
+@contextmanager
+def handle_interrupts() -> Iterator[None]:
+    """Raise KeyboardInterrupt on SIGINT within the context; during an import, end the process at once with `INTERRUPTED`.
+
+    Some extension modules lose an exception that is raised while they import another one. An import has nothing to clean up.
+    """
+    before: Callable[..., Any] | int | None = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler:
+        yield
+        return
+
+    def interrupt(_: int, frame: FrameType | None) -> None:
+        while frame is not None:
+            if frame.f_globals.get('__name__') == 'importlib._bootstrap':
+                os._exit(INTERRUPTED)
+            frame = frame.f_back
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 if __name__ == '__main__':

@@ -14,7 +14,7 @@ from foc_ros.core import prediction as core_prediction
 from foc_ros.core.classes.library import Demonstration
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
-from foc_ros.core.errors import FocError, InputError, SceneError
+from foc_ros.core.errors import FocError, InputError, SceneError, warn
 from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, guide
 from foc_ros.core.hand.kalman import describe_jump
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
@@ -128,7 +128,7 @@ class Predictor:
         holds by the clock as in the node; with 0 the answers do not depend on the machine.
     library : path or sequence of demonstrations, optional
         Demonstrated paths that `foc_ros learn` or `foc_ros replay --learn` wrote; by default the file that `homotopy.library`
-        names. They count in their frame, or in any if the config names no `frame_id`.
+        names. They count in their frame, or in any if the config names no `frame_id`. `FocWarning` is issued if none can.
 
     Examples
     --------
@@ -146,6 +146,7 @@ class Predictor:
     def __init__(self, config: Config | None = None, library: str | Path | Sequence[Demonstration] | None = None) -> None:
         self.config = check_config(config)
         source: object = self.config.homotopy.library if library is None else library
+        self._library = str(source) if isinstance(source, (str, Path)) else 'library'
         if isinstance(source, (str, Path)):
             from foc_ros.io.class_library import load_library
 
@@ -238,9 +239,11 @@ class Predictor:
             assert before is not None
             raise describe_jump('position', before, sample, self.config.estimator)
         self._obstacles = None
-        prediction = pipeline.predict(Deadline(self.config.budget_s or None))
+        doubt, prediction = pipeline.library_doubt, pipeline.predict(Deadline(self.config.budget_s or None))
         if prediction is None:
             raise FocError(str(pipeline.last_refusal))
+        if pipeline.library_doubt and pipeline.library_doubt != doubt:
+            warn(f'{self._library}: {pipeline.library_doubt}')
         named = prediction.with_goal_names(self._goal_names) if self._goal_names else prediction
         return Prediction(**vars(named))
 

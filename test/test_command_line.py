@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program: exit codes, errors in one line, no unnecessary imports, and output that fits into 80 columns."""
 
+import io
 import json
 import os
 import subprocess
@@ -10,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from foc_ros.__main__ import main as run_program
 from foc_ros.cli import main as command_line
-from foc_ros.core.errors import InputError
+from foc_ros.cli.options import confirm
+from foc_ros.core.errors import InputError, warn
 from foc_ros.io import terminal
 from foc_ros.io.terminal import COLUMNS, show_table
 
@@ -38,7 +41,7 @@ def test_the_program_exits_with_the_code_of_its_command():
         (['convert'], 'foc_ros convert: Command "convert" parameter CSV requires an argument.'),
         (['replay', '.', '--prams', 'a'], 'foc_ros replay: Unknown option: --prams. Did you mean --params?\n'),
         (['replay', '.', 'more'], "foc_ros replay: Unused Tokens: ['more']."),
-        (['evaluate', '.', '--workers', '0'], 'foc_ros evaluate: Invalid value "0" for --workers. Must be >= 1.'),
+        (['evaluate', '.', '--workers', '0'], 'foc_ros evaluate: --workers: expected a whole number in [1, 1024], got 0'),
         (['replay', '.', '--json=maybe'], 'foc_ros replay: Invalid value for --json: unable to convert "maybe" into bool.'),
         (['evaluate', '.', '--workers', '2', '--scheduler', 'host:8786'], 'foc_ros evaluate: --scheduler: expected either '),
         (['replay', '.', '--output', 'a', '--output', 'b'], 'foc_ros replay: Parameter --output specified multiple times.'),
@@ -118,14 +121,14 @@ SCHEDULER = '--scheduler: expected the address of a Dask scheduler, as in tcp://
 WRONG = [
     (['solve', 'scene.yaml'], WRONG_SCENE),
     (['solve', 'scene.yaml', '--plot', 'a.gif'], ['--plot: expected a name that ends in .png, .pdf, .svg, got a.gif']),
-    (['solve', 'scene.yaml', '--monte-carlo', '0'], ['Invalid value "0" for --monte-carlo. Must be >= 1.']),
-    (['solve', 'scene.yaml', '--monte-carlo', 'x'], ['Invalid value for --monte-carlo: unable to convert "x" into int.']),
+    (['solve', 'scene.yaml', '--monte-carlo', '0'], ['--monte-carlo: expected a whole number in [1, 10000000], got 0']),
+    (['solve', 'scene.yaml', '--monte-carlo', 'x'], ['--monte-carlo: expected a whole number in [1, 10000000], got x']),
     (['solve', 'scene.yaml', '--plot', 'no/a.png'], ['--plot: expected a file in a directory that exists, got no/a.png']),
     (['simulate', '--operators', 'noisi,x'], [f'{NAMES} (did you mean noisy?), got noisi', f'{NAMES}, got x']),
     (['simulate', '--assistance', 'magic'], ['--assistance: expected names of none, foc, got magic']),
     (['simulate', '--operators', 'human_paths'], [PEOPLE]),
-    (['simulate', '--trials', '0'], ['Invalid value "0" for --trials. Must be >= 1.']),
-    (['simulate', '--seed', '-1'], ['Invalid value "-1" for --seed. Must be >= 0.']),
+    (['simulate', '--trials', '1.6'], ['--trials: expected a whole number in [1, 100000], got 1.6']),
+    (['simulate', '--seed', '-1'], ['--seed: expected a whole number in [0, 100000], got -1']),
     (['simulate', '--report', 'scene.yaml'], ['--report: expected a folder, got scene.yaml, which is a file']),
     (['replay', 'bag.mcap', '--remap', 'hand_pos:=/a'], [f'{INPUTS} (did you mean hand_pose?), got hand_pos']),
     (['replay', 'bag.mcap', '--remap', 'hand_pose:='], ['--remap: expected INPUT:=TOPIC, got hand_pose:=']),
@@ -199,7 +202,7 @@ def ends(monkeypatch):
 )
 def test_exit_codes(ends, capsys, outcome, code, line):
     ends(outcome)
-    assert command_line.main(['end']) == code
+    assert run_program(['end']) == code
     assert capsys.readouterr() == ('', line)
 
 
@@ -211,6 +214,29 @@ def loud():
     {}
 sys.exit(command_line.main(["loud"]))
 """
+
+
+@pytest.mark.parametrize(('typed', 'agrees'), [('y\n', True), ('\n', False), ('', False)], ids=['yes', 'Enter', 'Ctrl-D'])
+def test_a_question_at_a_terminal_is_answered_or_left(monkeypatch, typed, agrees):
+    monkeypatch.setattr(sys, 'stdin', io.StringIO(typed))
+    for each in (sys.stdin, sys.stdout):
+        monkeypatch.setattr(each, 'isatty', lambda: True)
+    assert confirm('Write it?') is agrees
+
+
+def test_a_warning_is_told_once_and_does_not_control_the_terminal(capsys):
+    def end():
+        for _ in range(3):
+            warn('/a/\x1b[2J.mcap: not read')
+
+    command_line.app.command(end, name='ending')
+    try:
+        assert command_line.main(['ending']) == 0
+    finally:
+        del command_line.app['ending']
+    assert capsys.readouterr().err == 'foc_ros ending: /a/\\x1b[2J.mcap: not read\n'
+
+
 FULL = '/dev/full'
 A_LINE, MANY_LINES = 'print("x")', 'for _ in range(100000): print("x" * 100)'
 A_TABLE = 'from foc_ros.io.terminal import show_table; show_table(("a", "b"), [("c", "d")] * 1000)'
@@ -240,6 +266,14 @@ def test_a_full_standard_output_gives_2_and_one_line_and_a_closed_one_changes_no
     with Path(FULL).open('w') as full:
         assert printed_to(MANY_LINES, stdout=full) == (2, 'foc_ros loud: [Errno 28] No space left on device\n')
     assert printed_to(A_LINE, preexec_fn=lambda: os.close(1)) == (0, '')
+    assert printed_to('return 2 - sys.stdin.isatty()', preexec_fn=lambda: os.closerange(0, 3))[0] == 2
+
+
+@pytest.mark.parametrize('width', ['0', '1', 'wide'])
+def test_help_is_shown_in_a_terminal_of_any_width(width):
+    help_of = [sys.executable, '-m', 'foc_ros', 'warm-up', '--help']
+    shown = subprocess.run(help_of, env={**os.environ, 'COLUMNS': width}, capture_output=True, timeout=20, check=False, text=True)
+    assert (shown.returncode, shown.stderr) == (0, '') and 'Do nothing' in ' '.join(shown.stdout.split())
 
 
 def test_a_wide_table_is_divided_and_loses_nothing(capsys):

@@ -101,6 +101,7 @@ def test_other_fields_and_padding_are_skipped():
     organised = decode(table, height=2, width=3, row_step=3 * 16 + 5, data=lines).obstacles
     assert organised.centre[:, 0].tolist() == [*range(6)]
     assert len(decode(table, row_step=0).obstacles) == 6, 'a single line needs no row_step'
+    assert len(decode(table, row_step=101, data=table.tobytes() + b'\xff' * 5).obstacles) == 6, 'and may end with a padding'
 
 
 @both_kinds

@@ -15,6 +15,8 @@ import pytest
 from play_helpers import has_ended, until
 from rosbags.highlevel import AnyReader
 
+from foc_ros.cli.main import main
+
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -119,3 +121,11 @@ def test_a_node_that_dies_is_told(tmp_path):
     assert demo.returncode == 1
     (line,) = errors.splitlines()
     assert line.startswith('foc_ros demo: the node ended with exit code -9: ')
+
+
+def test_an_unknown_middleware_is_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv('RMW_IMPLEMENTATION', 'rmw_of_nobody')
+    assert main(['demo', '--output', str(tmp_path / 'out')]) == 2
+    printed, errors = capsys.readouterr()
+    assert printed == '' and not (tmp_path / 'out').exists()
+    assert errors.startswith('foc_ros demo: RMW_IMPLEMENTATION: expected a middleware that is installed, got rmw_of_nobody: ')

@@ -3,34 +3,32 @@
 """Demonstrations are recorded with the obstacles that they pass, and recalled if the scene is the same."""
 
 import json
-import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from bag_helpers import messages, write_bag
-from evaluation_samples import write_tables
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import foc_ros
-from foc_ros.analysis.replay import Replay
-from foc_ros.cli.main import main
 from foc_ros.core.classes import find_path_sides, search
 from foc_ros.core.classes.library import STEP_S, GuessTiming, recall_demonstrations, record_demonstration
 from foc_ros.core.config import Config, HomotopyConfig, replace_values
-from foc_ros.core.errors import FocError, RecordingError
+from foc_ros.core.errors import FocError
 from foc_ros.core.learning.learnt import Knowledge
-from foc_ros.core.learning.recordings import NO_LIBRARY, PRIOR_COUNT, PRIOR_COUNT_GOAL, make_library
+from foc_ros.core.learning.recordings import (
+    NO_LIBRARY,
+    PRIOR_COUNT,
+    PRIOR_COUNT_GOAL,
+    compute_goal_factors,
+    find_evidence,
+    make_library,
+)
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
 from foc_ros.core.types import HandState
-from foc_ros.io import class_library
-from foc_ros.io.bags import BagReader
 from foc_ros.io.class_library import load_library, save_library
-from foc_ros.ros.parameters import load_parameter_file
 
 OBSTACLES = make_obstacles([[0.15, 0.0], [0.15, 0.06], [0.15, -0.06]], 0.015)
 GOAL = np.array([[0.3, 0.0]])
@@ -183,6 +181,20 @@ def test_recordings_tell_goals_apart_by_where_they_led_and_not_by_how_many_there
     assert known == pytest.approx((prior * near + 3) / (prior + 3) / (prior * near / (prior + 2)), rel=0.02)
 
 
+def test_recordings_of_ways_that_are_closed_now_say_nothing_of_goals():
+    """Neither when the hand begins as they do, nor when it has left them."""
+    goals, post = np.array([[0.3, 0.1], [0.3, -0.1]]), [(0.2, 0.1)]
+    share = np.linspace(0.0, 1.0, 65)[:, None]
+    closed, free = (record(share * goal, make_obstacles(post, 0.01)) for goal in goals)
+    away = replace(HAND, mean=np.array([*free.states[20], 0.0, 0.0]), onset_ns=0)
+    for hand in (HAND, away):
+        known, same = (
+            find_evidence(make_library(each), hand, make_obstacles(post, 0.05), goals) for each in ([closed, free], [free])
+        )
+        assert known.recorded.tolist() == same.recorded.tolist() == [0, 1]
+        assert compute_goal_factors(known) == pytest.approx(compute_goal_factors(same))
+
+
 MOVING = replace(HAND, mean=np.array([*ABOVE.states[20], 0.0, 0.0]), onset_ns=0)
 """The hand of a recording one second after it began, half a second after the onset."""
 
@@ -253,116 +265,3 @@ def test_without_a_recording_that_agrees_it_is_the_model(library):
         assert one.label == other.label and one.likelihood == other.likelihood
         np.testing.assert_array_equal(one.mean, other.mean)
         np.testing.assert_array_equal(one.covariance, other.covariance)
-
-
-def write_reaches(folder, ends):
-    share = np.linspace(0.0, 1.0, 51)
-    paths = [np.column_stack([end * share, 0.03 * np.sin(np.pi * share)]) for end in ends]
-    write_tables(folder, {f'r{k}': (share, path) for k, path in enumerate(paths)}, [(0.3, 0.0)], [(0.15, 0.0, 0.015)])
-
-
-def test_learn_writes_a_library_that_a_predictor_uses_in_its_frame_or_without_one(tmp_path):
-    write_reaches(tmp_path, [0.3, 0.3])
-    file, shares = tmp_path / 'ways.json', []
-    assert main(['learn', str(tmp_path), '--output', str(file)]) == 0
-    recordings = load_library(str(file))
-    assert len(recordings) == 2
-    for each in recordings:
-        assert 0.5 < STEP_S * len(each.states) < 1.5
-        assert np.diff(each.states[:, 0]).min() > -1e-3
-        assert each.states[-1, :2] == pytest.approx([0.3, 0.0], abs=0.02)
-    obstacle = foc_ros.Circle((0.15, 0.0), 0.015, name='0')
-    for frame, library in (('', ()), ('', file), ('world', file), ('arm', file)):
-        predictor = foc_ros.Predictor(Config(budget_s=0.0, frame_id=frame), library=library)
-        predictor.set_goals([(0.3, 0.0)])
-        predictor.set_obstacles([obstacle])
-        for share in np.linspace(0.0, 0.2, 11):
-            prediction = predictor.update(share, (0.3 * share, 0.0))
-        shares.append({each.label: each.likelihood for each in prediction}['goal0:+0'])
-    assert shares[1] == shares[2] > shares[0] + 0.02, 'the recordings pass on the left'
-    assert shares[3] == shares[0], 'in another frame they say nothing'
-
-
-def test_a_recording_that_does_not_reach_its_goal_is_named(tmp_path, capsys):
-    write_reaches(tmp_path, [0.3, 0.1])
-    assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 2
-    assert 'r1: expected a movement' in capsys.readouterr().err
-    assert len(load_library(str(tmp_path / 'ways.json'))) == 1
-
-
-PARAMETERS = '/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 20, homotopy.library: "%s"}}'
-
-
-def run(bag, *options, library=''):
-    parameters = bag.parent / 'parameters.yaml'
-    parameters.write_text(PARAMETERS % library)
-    return main(['replay', str(bag), '--params', str(parameters), *options])
-
-
-@pytest.fixture
-def bag(tmp_path):
-    return write_bag(tmp_path / 'reach', messages(seconds=1.02))
-
-
-def test_a_reach_is_learned_once(bag, tmp_path, capsys):
-    file = tmp_path / 'ways.json'
-    assert run(bag, '--learn', str(file), '--json') == 0
-    assert json.loads(capsys.readouterr().out)['summary']['learned'] == 1
-    (demonstration,) = load_library(str(file))
-    held = file.read_text()
-    assert demonstration.ids and np.hypot(*(demonstration.path[-1] - demonstration.path[0])) > 0.1
-    assert run(bag, '--learn', str(file), '--json') == 0
-    assert json.loads(capsys.readouterr().out)['summary']['learned'] == 0
-    assert file.read_text() == held
-    assert run(bag, library=str(file)) == 0
-
-
-def test_another_library_in_the_parameters_is_refused(bag, tmp_path, capsys):
-    assert run(bag, '--learn', str(tmp_path / 'ways.json'), library=str(tmp_path / 'other.json')) == 2
-    assert '--learn: expected no other class library in homotopy.library' in capsys.readouterr().err
-
-
-@pytest.mark.parametrize('text', ['{"ways": [{}]}', '{', 'x' * 6_000_000])
-@pytest.mark.parametrize('use', ['learn', 'load'])
-def test_a_library_that_cannot_be_used_is_exit_2_in_one_line(bag, tmp_path, capsys, use, text):
-    file = tmp_path / 'ways.json'
-    file.write_text(text)
-    options = {'learn': (['--learn', str(file)], ''), 'load': ([], str(file))}[use]
-    assert run(bag, *options[0], library=options[1]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ''
-    assert str(file) in captured.err and captured.err.count('\n') == 1
-    assert file.read_text() == text
-
-
-def test_a_library_behind_a_link_is_written_there_and_a_device_stays(tmp_path):
-    file, link, device = tmp_path / 'ways.json', tmp_path / 'link.json', tmp_path / 'pipe'
-    save_library(file, [])
-    link.symlink_to(file)
-    way = record_demonstration('world', np.array([[0.0, 0.0], [0.3, 0.0]]), make_obstacles([[0.1, 1.0]], 0.01))
-    save_library(link, [way])
-    assert link.is_symlink() and len(load_library(str(file))) == 1
-    os.mkfifo(device)
-    with pytest.raises(RecordingError, match='pipe: cannot be written: it is no regular file'):
-        save_library(device, [way])
-    assert device.is_fifo()
-
-
-def test_a_full_library_stays_as_it_was(bag, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(class_library, 'MOST_WAYS', 3)
-    file, far = tmp_path / 'ways.json', make_obstacles([[0.1, 1.0]], 0.01)
-    save_library(file, [record_demonstration('other', np.array([[0.0, y], [0.3, y]]), far) for y in (0.0, 0.1, 0.2)])
-    held = file.read_bytes()
-    assert run(bag, '--learn', str(file)) == 2
-    assert 'ways: expected at most 3, got 4 with the new ones' in capsys.readouterr().err
-    assert file.read_bytes() == held
-
-
-def test_the_parameters_of_the_operator_are_written(bag, tmp_path):
-    file = tmp_path / 'operator.yaml'
-    assert run(bag, '--operator', str(file)) == 0
-    replayed = Replay(load_parameter_file(bag.parent / 'parameters.yaml'))
-    with BagReader(bag) as reader:
-        assert sum(step.prediction is not None for step in replayed.steps(reader)) > 0
-    assert load_parameter_file(file) == replayed.pipeline.adapted_config
-    assert run(bag, '--operator', '/nowhere/operator.yaml') == 2

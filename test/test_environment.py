@@ -75,7 +75,7 @@ LIMIT_S = 60.0
 
 def test_an_import_is_left_at_once(tmp_path):
     (tmp_path / 'endless.py').write_text('import signal\nsignal.raise_signal(signal.SIGINT)\nwhile True: pass\n')
-    command = [sys.executable, '-c', 'from foc_ros.cli.main import handle_interrupts\nwith handle_interrupts(): import endless']
+    command = [sys.executable, '-c', 'from foc_ros.__main__ import handle_interrupts\nwith handle_interrupts(): import endless']
     environment = os.environ | {'PYTHONPATH': f'{tmp_path}{os.pathsep}{ROOT}'}
     ended = subprocess.run(command, env=environment, capture_output=True, timeout=LIMIT_S, check=False)
     assert (ended.returncode, ended.stderr) == (130, b'')
@@ -85,7 +85,7 @@ def test_an_import_is_left_at_once(tmp_path):
 def test_a_command_is_interrupted_at_any_moment(turn):
     """The moments lie in the imports, in the solve and in the sampling after it."""
     command = ['solve', 'doc/examples/scene.yaml', '--monte-carlo', '10000000']
-    program = f'import sys\nfrom foc_ros.cli.main import main\nprint(flush=True)\nsys.exit(main({command}))'
+    program = f'import sys\nfrom foc_ros.__main__ import main\nprint(flush=True)\nsys.exit(main({command}))'
     pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
     with subprocess.Popen([sys.executable, '-c', program], cwd=ROOT, **pipes) as process:
         assert process.stdout.readline() == '\n'

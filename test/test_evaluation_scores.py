@@ -133,6 +133,8 @@ def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse():
     assert found['difference'] == pytest.approx(0.2) and found['worse_tenths'] == [1]
     assert 0.0 < found['interval'][0] < 0.2 < found['interval'][1]
     assert compare_scores(ours, ours._replace(correct=np.zeros(40)), is_share=True)['difference'] == 1.0
+    one = ours._replace(recording=np.full(40, 3.0))
+    assert compare_scores(one, one._replace(log_likelihood=change), is_share=False)['interval'] is None
 
 
 @pytest.mark.parametrize(
@@ -141,6 +143,7 @@ def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse():
         ([0.1, 0.3], 'foc is better than uniform (+0.2 nat, worse in tenths 1).'),
         ([-0.1, 0.3], 'foc is not distinguishable from uniform (+0.2 nat, worse in tenths 1).'),
         ([-0.4, -0.1], 'foc is worse than uniform (+0.2 nat, worse in tenths 1).'),
+        (None, 'foc is by one recording not distinguishable from uniform (+0.2 nat, worse in tenths 1).'),
     ],
 )
 def test_the_verdict_is_by_the_interval(interval, words):

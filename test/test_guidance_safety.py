@@ -101,6 +101,31 @@ def test_every_dead_man_condition_releases_the_hand_within_the_ramp_and_a_blende
     assert np.hypot(*np.diff(blended, axis=0).T).max() <= 0.1 * PERIOD / settings.ramp_s * (1 + 1e-9)
 
 
+@pytest.mark.parametrize(
+    ('before', 'now'),
+    [
+        ({}, {'slew': 1.0}),
+        ({'ramp_s': 0.5}, {'ramp_s': 0.01, 'slew': 10.0}),
+        ({'authority': 1.0, 'ramp_s': 0.5}, {'authority': 0.0, 'ramp_s': 0.1}),
+    ],
+    ids=['slew', 'ramp', 'authority'],
+)
+@pytest.mark.parametrize('ticks', [0, 4], ids=['with the release', 'during the release'])
+def test_a_release_takes_no_longer_than_the_ramp_when_parameters_are_lowered(before, now, ticks):
+    config = Config(guidance=GuidanceConfig(hold_s=5.0, k_max=5000.0, tank=10.0, clearance=0.0, **before))
+    state, given = build_guiding_state(config)
+    for _ in range(ticks):
+        given = replace(given, t=given.t + PERIOD, is_released=True)
+        _, state = guide(config, state, given)
+    lowered, begin, sizes = Config(guidance=replace(config.guidance, **now)), given.t, []
+    while given.t < begin + lowered.guidance.ramp_s - 1e-9:
+        given = replace(given, t=given.t + PERIOD, is_released=True)
+        output, state = guide(lowered, state, given)
+        sizes.append((float(np.hypot(*output.force)), output.authority))
+    assert sizes[0][0] > 0.0 and sizes[0][1] > 0.0, 'the force falls steadily'
+    assert sizes[-1] == (0.0, 0.0) and (np.diff(sizes, axis=0) <= 0.0).all()
+
+
 SAMPLES, PERIOD = 12, 0.005
 HANDS = ('still', 'walks', 'flees', 'shakes', 'attacks', 'circles')
 

@@ -5,8 +5,10 @@
 import math
 import re
 from itertools import islice
+from pathlib import Path as File
 
 import ros_required  # noqa: F401
+import numpy as np
 import pytest
 from message_helpers import SECOND, cloud, marker, marker_array, obstacle_table, pose_array, pose_stamped
 from nav_msgs.msg import Path
@@ -20,6 +22,9 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from foc_ros.core import pipeline as computation
+from foc_ros.core.classes.library import record_demonstration
+from foc_ros.core.obstacle_table import make_obstacles
+from foc_ros.io.class_library import save_library
 from foc_ros.ros import node as module
 from foc_ros.ros.endpoints import describe_incompatible_subscriptions
 
@@ -284,3 +289,19 @@ def test_a_subscription_that_cannot_receive_an_output_is_named(ros):
     for name, text in zip(policies, texts, strict=True):
         assert text.startswith(f'{name} cannot hear /foc/path, incompatible QoS: ')
         assert text.endswith('(see qos_overrides./foc/path.publisher)')
+
+
+def test_a_class_library_of_no_use_is_named_until_one_of_its_paths_can_count(ros, tmp_path):
+    file, log = str(tmp_path / 'ways.json'), Log()
+    path = np.linspace((0.0, 0.0), (0.3, 0.0), 40)
+    save_library(File(file), [record_demonstration('world', path, make_obstacles([[0.15, 0.02]], 0.03, ids=('cup/0',)))])
+    bench = begin(ros, homotopy__library=file)
+    with pytest.MonkeyPatch.context() as patch:
+        bench.move(hand_path(2))
+        patch.setattr(bench.node, 'get_logger', lambda: log)
+        status = bench.health()
+    words = f"{file}: none of its paths counts: they pass obstacles that the scene does not have: 'cup/0'"
+    assert status.level == WARN and status.message == words and log.lines == [words]
+    bench.deliver('obstacle_markers', marker_array(TYPES, marker(TYPES, (0.15, 0.3, 0.0), ns='cup', stamp_ns=10 * SECOND)))
+    bench.move(hand_path(4)[2:])
+    assert bench.health().message == 'predicting'

@@ -74,7 +74,7 @@ def start_workers(tmp_path):
     script = f"""if __name__ == '__main__':
         import worker_tasks
         from foc_ros.analysis.parallel import open_workers, run
-        from foc_ros.cli.main import handle_interrupts
+        from foc_ros.__main__ import handle_interrupts
         with handle_interrupts(), open_workers(2):
             list(run(worker_tasks.wait_here, [(name, {str(tmp_path)!r}) for name in 'ab']))"""
     pipes = {'stderr': subprocess.PIPE, 'text': True, 'start_new_session': True}

@@ -6,15 +6,16 @@ import dataclasses
 import itertools
 import re
 import warnings
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foc_ros.core.config import Config, list_parameters, replace_values
-from foc_ros.core.errors import FocError, FocWarning, ParameterError
+from foc_ros.core.errors import FocError, FocWarning, InputError, ParameterError
 from foc_ros.ros import parameters as module
-from foc_ros.ros.parameters import check_parameter_files, dump_parameter_file, load_parameter_file
+from foc_ros.ros.parameters import check_parameter_files, dump_parameter_file, load_parameter_file, write_parameter_file
 
 
 def load(folder, text):
@@ -197,3 +198,18 @@ def test_a_node_reads_the_file_that_replay_reads(tmp_path):
     file.write_text(dump_parameter_file(config), 'utf-8')
     with graph(['--ros-args', '--params-file', str(file)]) as ros:
         assert declare_parameters(make_node(ros)) == config == load_parameter_file(file)
+
+
+@pytest.mark.parametrize('before', ['an earlier one', None])
+def test_a_full_disk_leaves_the_earlier_file_or_none(tmp_path, monkeypatch, before):
+    def write_a_part(self, text, **_):
+        self.write_bytes(text.encode()[:10])
+        raise OSError(28, 'No space left on device')
+
+    file = tmp_path / 'operator.yaml'
+    if before is not None:
+        file.write_text(before)
+    monkeypatch.setattr(Path, 'write_text', write_a_part)
+    with pytest.raises(InputError, match=r'--output: expected a file that can be written, got .*: No space left on device'):
+        write_parameter_file('--output', file, Config())
+    assert [each.read_text() for each in tmp_path.iterdir()] == ([] if before is None else [before])

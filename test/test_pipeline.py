@@ -92,9 +92,11 @@ def seen(intake):
 
 
 def test_markers_from_before_the_working_frame_was_known_are_forgotten_if_they_are_in_another_one(intake):
-    show(intake, marker(BAGS, id=1, frame_id='camera'))
-    move(intake, 1.0)
-    show(intake, marker(BAGS, id=2))
+    show(intake, marker(BAGS, id=1, frame_id='camera', lifetime=0.5), marker(BAGS, id=3, frame_id='camera'))
+    for seconds in (1.0, 1.1, 1.6, 1.7, 1.8):
+        move(intake, seconds)
+    assert seen(intake) == () and intake.counts == {'obstacles_wrong_frame': 1}, 'also where a lifetime ends'
+    show(intake, marker(BAGS, id=2, stamp_ns=2 * NANOSECONDS))
     assert seen(intake) == ('a/2',)
 
 

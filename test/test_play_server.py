@@ -146,7 +146,7 @@ def test_a_wrong_option_is_refused_in_one_line(tmp_path, capsys):
     with (tmp_path / 'file').open('w'):
         pass
     for arguments, error in (
-        (['--port', '70000'], 'Invalid value "70000" for --port. Must be <= 65535.'),
+        (['--port', '70000'], '--port: expected a whole number in [0, 65535], got 70000'),
         (['--host', '203.0.113.1', '--port', '0'], '--host and --port: expected a free port of this computer'),
         (['--host', 'a..b', '--port', '0'], '--host and --port: expected a free port of this computer'),
         (['--data', str(tmp_path / 'file'), '--port', '0'], '--data: expected a folder'),

@@ -75,17 +75,22 @@ def test_the_hand_of_an_operator_is_as_large_as_the_parameters_say(tmp_path, cap
 
 
 class Misled(Assistance):
-    """Takes a wrong way to be the likeliest, and draws back."""
+    """Takes a wrong way to be the likeliest, and draws back with a force [N]."""
+
+    force: np.ndarray
 
     def compute_force(self, step, position, velocity, acceleration):
         self.is_wrong = True
-        return np.array([-0.3, 0.0])
+        return self.force
 
 
-def test_a_wrong_way_costs_what_the_operator_needs_more_than_alone():
+@pytest.mark.parametrize('force', [0.3, 3.0])
+def test_a_wrong_way_costs_what_the_operator_needs_more_than_alone_also_if_the_hand_never_arrives(force):
     ((_, pair),) = make_pairs(['noisy'], ['misled'], 1, 3)
-    measures = run_pair(pair, QUICK, {'none': Assistance, 'misled': Misled}).measures
-    for harm, name in (('wrong_way_s', 'completion_s'), ('wrong_way_effort', 'effort')):
+    rule = type('Rule', (Misled,), {'force': np.array([-force, 0.0])})
+    measures = run_pair(pair, QUICK, {'none': Assistance, 'misled': rule}).measures
+    assert measures['misled']['arrival_rate'] == (force < 1.0)
+    for harm, name in (('wrong_way_s', 'duration_s'), ('wrong_way_effort', 'effort')):
         assert measures['misled'][harm] == measures['misled'][name] - measures['none'][name] > 0.0
         assert np.isnan(measures['none'][harm])
 

@@ -101,7 +101,7 @@ def run(function: Callable[[T], R], items: Sequence[tuple[str, T]]) -> Iterator[
     first = 0
     for number, result, texts in _run_unordered(function, [item for _, item in items]):
         for text in texts:
-            warn(f'{items[number][0]}: {text}')
+            warn(text)
         found[number] = result
         while first in found:
             yield items[first][0], found.pop(first)

@@ -89,10 +89,12 @@ class Replay:
             yield from self._release(role, math.inf)
 
     def steps(self, items: Iterable[Item]) -> Iterator[Step]:
-        """Process the messages in their order and yield the effect of each."""
+        """Process the messages in their order and yield the effect of each; warn at the end of a class library of no use."""
         for item, sample in self.take(items):
             prediction = self.pipeline.predict() if sample is not None and self.pipeline.is_due else None
             yield Step(item, sample, prediction, self.pipeline.scene)
+        if self.pipeline.library_doubt:
+            warn(f'{self.pipeline.config.homotopy.library}: {self.pipeline.library_doubt}')
 
     def forget_scene(self) -> None:
         """Forget scene, working frame, transforms and counts of refusals: another recording has its own."""
@@ -230,5 +232,5 @@ def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration
         unused = losses or replayed.pipeline.not_ready_reason()
         raise RecordingError(f'{recording.name}: {movements.refusal or unused or standing}')
     if losses:
-        warn(losses)
+        warn(f'{recording.name}: {losses}')
     return movements.learnt

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import asyncio
 import json as json_format
+import os
 import shutil
+import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,10 +20,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from foc_ros.core.errors import FocError
+from foc_ros.core.errors import FocError, InputError, print_messages
 from foc_ros.io.outputs import REPORT_FILES, check_folder, check_page, check_picture
 
-from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Json, Learning, Params, Port, Remaps, Samples, app, warn_all
+from .options import DEFAULTS, NO_LEARNING, PREDICT, TRY, Existing, Json, Learning, Params, Port, Remaps, Samples, app
 
 
 @app.command(group=TRY)
@@ -36,6 +38,11 @@ def demo(*, output: Path = Path('demo_output')) -> int:
     check_folder('--output', output)
     if find_spec('rclpy') is None:
         raise FocError('rclpy is not installed: run `make setup`, or source a ROS 2 installation, or install the extra `ros`')
+    # ROS ends the process that imports rclpy where its middleware is not installed
+    if name := os.environ.get('RMW_IMPLEMENTATION'):
+        tried = subprocess.run([sys.executable, '-c', 'import rclpy'], capture_output=True, check=False, text=True)
+        if tried.returncode:
+            raise InputError('RMW_IMPLEMENTATION', 'a middleware that is installed', f'{name}: {tried.stderr.strip()}')
     print('Welcome to foc_ros. A recorded hand moves among a box (obstacle 1), three posts (2, 3, 4) and a wall (5);')
     print('the node predicts where it goes, for 20 s. Then open the report:', output / 'report' / 'index.html', flush=True)
     from .demo import perform  # not before: its import takes seconds
@@ -119,7 +126,7 @@ def solve(scene: Existing, /, *, json: Json = False, monte_carlo: Samples | None
         return 0
     reasons = '; '.join(f'{each.description}: {each.reason}' for each in prediction)
     lost = f'no candidate could be solved: {reasons}' if reasons else 'no path was found between the start and any goal'
-    warn_all('solve', [lost])
+    print_messages('foc_ros solve', [lost])
     return 3
 
 
@@ -197,8 +204,8 @@ def replay(
                 show_address(report / 'index.html')
     losses = list(filter(None, [played.describe_losses(), played.intake.describe_still_hand()]))
     if summary.counts['solved']:
-        warn_all('replay', losses)
+        print_messages('foc_ros replay', losses)
         return 0
     reason = '; '.join([*losses, played.pipeline.not_ready_reason() or 'see the candidates not solved'])
-    warn_all('replay', [f'no prediction has a solved candidate: {reason}'])
+    print_messages('foc_ros replay', [f'no prediction has a solved candidate: {reason}'])
     return 3

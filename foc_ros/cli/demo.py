@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.core.config import Config
-from foc_ros.core.errors import InputError
+from foc_ros.core.errors import InputError, print_messages
 from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
@@ -37,8 +37,6 @@ from foc_ros.ros.intake import Intake
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, isolated_graph
 from foc_ros.ros.messages.decode_poses import decode_stamp
 from foc_ros.ros.messages.encode_prediction import OUTPUTS, STAMP
-
-from .options import warn_all
 
 RECORDING = Path(__file__).resolve().parents[1] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
@@ -120,7 +118,7 @@ def _play_and_report(items: list[Item], output: Path) -> int:
         if not recorder.snapshots and not stopped.is_set():
             raise NodeDiedError('the node sent no prediction')
     except NodeDiedError as error:
-        warn_all('demo', [str(error)])
+        print_messages('foc_ros demo', [str(error)])
         return 1
     if stopped.is_set():
         print(f'interrupted; the messages recorded so far are in {output / "bag"}')

@@ -3,41 +3,46 @@
 """The program `foc_ros`.
 
 Exit codes: 0 done; 2 the input is wrong, and a line on standard error for each error names field, value and bound; 3 no candidate
-could be solved; 130 after an interrupt and 141 if the reader of standard output has closed it, both as in a shell. If standard
-output cannot be written, for example because its disk is full, the code is 2.
+could be solved; 141 if the reader of standard output has closed it, as in a shell. If standard output cannot be written, for
+example because its disk is full, the code is 2.
 """
 
 from __future__ import annotations
 
 import os
-import signal
+import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
-from types import FrameType
-from typing import Any
 
 from cyclopts import CycloptsError
 
-from foc_ros.core.errors import FocError, list_messages, print_warnings
+from foc_ros.core.errors import FocError, list_messages, print_messages, print_warnings
 
 from . import commands, studies  # noqa: F401  they declare the commands of the program
 from .options import app
 
 MOVED = {'paper': 'the studies of the paper are an example now: python examples/paper/paper.py'}
 """Commands of earlier releases, and what took their place."""
-INTERRUPTED = 130
+NARROWEST = 20
+"""Width of a terminal [characters] for which help is formatted at least: less than 3 would take endless time and memory."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, without one the help, and return the exit code; arguments: those of the process by default."""
-    if sys.stdout is None:  # the process was started with its standard output closed
-        sys.stdout = Path(os.devnull).open('w', encoding='utf-8')  # noqa: SIM115  it stays open until the process ends
+    for number, (name, mode) in enumerate((('stdin', 'r'), ('stdout', 'w'), ('stderr', 'w'))):
+        try:
+            os.fstat(number)
+        except OSError:  # it was closed when the process started; the next file would get its number
+            setattr(sys, name, Path(os.devnull).open(mode, encoding='utf-8'))  # noqa: SIM115  it stays open
+            os.set_inheritable(number, True)
     if arguments is None:
         if sys.getfilesystemencoding() != 'utf-8':  # it could not even name the files that it is given
             os.execv(sys.executable, [sys.executable, '-X', 'utf8', *sys.orig_argv[1:]])  # noqa: S606
+        columns = shutil.get_terminal_size().columns
+        if 'COLUMNS' in os.environ or columns < NARROWEST:
+            os.environ['COLUMNS'] = str(max(columns, NARROWEST))
         # matrices are small: threads of a linear algebra library would only wait for each other
         os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
         os.environ['MPLBACKEND'] = 'agg'  # pictures are files; the backend of a notebook or of a desktop may not exist here
@@ -46,17 +51,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments) or ['--help']
     program = ' '.join(['foc_ros', *given[:1]])
     try:
-        with handle_interrupts(), print_warnings(program):
+        with print_warnings(program):
             code = _run(given, program)
             sys.stdout.flush()
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except OSError as error:
         try:
             sys.stdout.flush()
         except OSError:  # the interpreter would write what is left again at exit and print an error
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141 if isinstance(error, BrokenPipeError) else _reject(program, [str(error)])
+        return 141 if isinstance(error, BrokenPipeError) else print_messages(program, [str(error)])
     return code
 
 
@@ -70,44 +73,11 @@ def _run(given: list[str], program: str) -> int:
         return int(command(*bound.args, **bound.kwargs) or 0)
     except CycloptsError as error:
         error.verbose = False
-        return _reject(program, [str(error)])
+        return print_messages(program, [str(error)])
     except FocError as error:
-        return _reject(program, list_messages(error))
+        return print_messages(program, list_messages(error))
 
 
 def list_commands() -> list[str]:
     """Return the names of all commands."""
     return [name for name in app if not name.startswith('-')]
-
-
-def _reject(program: str, messages: Sequence[str]) -> int:
-    """Print each message in one line; a character from a file that would control the terminal is escaped. Return the code."""
-    for message in messages:
-        line = ' '.join(message.split())
-        print(f'{program}: {"".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)}', file=sys.stderr)
-    return 2
-
-
-@contextmanager
-def handle_interrupts() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGINT within the context; during an import, end the process at once with `INTERRUPTED`.
-
-    Some extension modules lose an exception that is raised while they import another one. An import has nothing to clean up.
-    """
-    before: Callable[..., Any] | int | None = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler:
-        yield
-        return
-
-    def interrupt(_: int, frame: FrameType | None) -> None:
-        while frame is not None:
-            if frame.f_globals.get('__name__') == 'importlib._bootstrap':
-                os._exit(INTERRUPTED)
-            frame = frame.f_back
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGINT, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)

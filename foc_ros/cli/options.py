@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Group, Parameter, Token
 from cyclopts.types import ExistingPath
-from cyclopts.validators import Number
 
 import foc_ros
 from foc_ros.analysis.simulation import ASSISTANCE, OPERATORS
@@ -69,6 +68,18 @@ def names(known: tuple[str, ...]) -> Parameter:
     return Parameter(converter=read, n_tokens=1, metavar='A,B')
 
 
+def whole(low: int, high: int) -> Parameter:
+    """Return the parameter of a whole number in a range; cyclopts alone would round any other number."""
+
+    def read(_: object, tokens: Sequence[Token]) -> int:
+        text = tokens[0].value
+        if not re.fullmatch(r'[+-]?\d{1,18}', text, re.ASCII) or not low <= int(text) <= high:
+            raise InputError(str(tokens[0].keyword), f'a whole number in [{low}, {high}]', text)
+        return int(text)
+
+    return Parameter(converter=read, n_tokens=1)
+
+
 def _read_address(text: str) -> str:
     if not re.fullmatch(r'(\w+://)?[^\s/]+:\d{1,5}', text):
         raise InputError('--scheduler', 'the address of a Dask scheduler, as in tcp://host:8786', text)
@@ -105,10 +116,10 @@ Remaps = Annotated[
     tuple[tuple[str, str], ...],
     Parameter(converter=_read_remaps, n_tokens=1, allow_repeating=True, metavar='INPUT:=TOPIC', show_default=False),
 ]
-Samples = Annotated[int, Parameter(validator=Number(gte=1, lte=10_000_000))]
-Port = Annotated[int, Parameter(validator=Number(gte=0, lte=65535))]
-Trials = Annotated[int, Parameter(validator=Number(gte=1, lte=100_000))]
-Seed = Annotated[int, Parameter(validator=Number(gte=0, lte=100_000))]
+Samples = Annotated[int, whole(1, 10_000_000)]
+Port = Annotated[int, whole(0, 65535)]
+Trials = Annotated[int, whole(1, 100_000)]
+Seed = Annotated[int, whole(0, 100_000)]
 Operators = Annotated[tuple[str, ...], names(OPERATORS)]
 Assistance = Annotated[tuple[str, ...], names(ASSISTANCE)]
 Allowed = Annotated[tuple[str, ...], names(('eta', 'positions'))]
@@ -131,14 +142,16 @@ class Learning:
     operator: Path | None = None
 
     def check(self, config: Config) -> None:
-        """Raise InputError for a file that cannot be written, and for two class libraries."""
+        """Raise InputError for a file that cannot be written, for two class libraries, and for one file of two kinds."""
         if self.learn is not None:
             check_file('--learn', self.learn)
         if self.operator is not None:
             check_new_or_earlier('--operator', self.operator, load_parameter_file)
         library = config.homotopy.library
-        if self.learn is not None and library and Path(library) != self.learn:
+        if self.learn is not None and library and Path(library).resolve() != self.learn.resolve():
             raise InputError('--learn', 'no other class library in homotopy.library', library)
+        if self.learn is not None and self.operator is not None and self.operator.resolve() == self.learn.resolve():
+            raise InputError('--operator', 'another file than that of --learn', self.operator)
 
     def prepare(self, config: Config) -> Config:
         """Return the config with which movements are learnt, in addition to those of a class library that exists."""
@@ -169,7 +182,7 @@ class Study:
     params: Params = DEFAULTS
     json: Json = False
     report: Path | None = None
-    workers: Annotated[int, Parameter(validator=Number(gte=1, lte=1024))] | None = None
+    workers: Annotated[int, whole(1, 1024)] | None = None
     scheduler: Annotated[str, _read(_read_address)] | None = None
 
     def check(self, page: str) -> None:
@@ -213,16 +226,12 @@ class Study:
 PLAIN = Study()
 
 
-def warn_all(command: str, messages: Iterable[str]) -> int:
-    """Print what went wrong; return the exit code 2 if anything did."""
-    lines = list(messages)
-    for line in lines:
-        print(f'foc_ros {command}: {line}', file=sys.stderr)
-    return 2 if lines else 0
-
-
 def confirm(question: str) -> bool:
     """Return whether a terminal, if there is one, agrees."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return False
-    return input(f'{question} [y/N] ').strip().lower() in ('y', 'yes')
+    try:
+        return input(f'{question} [y/N] ').strip().lower() in ('y', 'yes')
+    except EOFError:  # Ctrl-D
+        print()
+        return False

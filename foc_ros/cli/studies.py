@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from foc_ros.analysis.simulation import ASSISTANCE, HUMAN_PATHS, OPERATORS
-from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.core.errors import InputError, RecordingError, print_messages
 from foc_ros.io.outputs import EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE, check_folder, check_new_or_earlier
 
 from . import options
-from .options import PLAIN, RECORDINGS, Data, Existing, Study, app, warn_all
+from .options import PLAIN, RECORDINGS, Data, Existing, Study, app
 
 
 @app.command(group=RECORDINGS)
@@ -45,7 +45,7 @@ def learn(data: Data, /, *, output: Path, params: options.Params = options.DEFAU
     save_library(output, learnt)
     words = f'{len(learnt)} movements written to {output}; the parameter homotopy.library names this file for node and replay'
     print(json_format.dumps({'learned': len(learnt), 'failed': failed, 'output': str(output)}) if json else words)
-    return warn_all('learn', failed.values())
+    return print_messages('foc_ros learn', failed.values())
 
 
 @app.command(group=RECORDINGS)
@@ -73,15 +73,15 @@ def fit(data: Data, /, *, output: Path, allow: options.Allowed = (), study: Stud
         found = fitting.fit_parameters(recordings, study.params, may_lower_eta='eta' in allow)
     answer = fitting.make_answer(found, study.params, output)
     losses = fitting.find_worse_positions(found.comparison)
-    warn_all('fit', losses)
+    print_messages('foc_ros fit', losses)
     if losses and 'positions' not in allow and not options.confirm(f'Write {output} all the same?'):
         answer['output'] = None
         replace(study, report=None).show(answer, fitting.make_tables(answer), fitting.make_sentences(answer), FIT_PAGE)
-        return warn_all('fit', [f'{output} is not written; --allow positions writes it all the same'])
+        return print_messages('foc_ros fit', [f'{output} is not written; --allow positions writes it all the same'])
     write_parameter_file('--output', output, found.config)
     write_report(data.resolve().name, answer, recordings, found.config)
     study.show(answer, fitting.make_tables(answer), fitting.make_sentences(answer), FIT_PAGE, fitting.list_commands(answer))
-    return warn_all('fit', [f'{name}: {reason}' for name, reason in found.failed.items()])
+    return print_messages('foc_ros fit', [f'{name}: {reason}' for name, reason in found.failed.items()])
 
 
 @app.command(group=RECORDINGS)
@@ -104,9 +104,9 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
 
     with study.open_workers():
         observed, failed = observations.observe_all(recordings, study.params, in_order)
-        warn_all('evaluate', [f'{name}: {reason}' for name, reason in failed.items()])
+        print_messages('foc_ros evaluate', [f'{name}: {reason}' for name, reason in failed.items()])
         if not observed:
-            warn_all('evaluate', [f'none of the {len(failed)} recordings could be evaluated'])
+            print_messages('foc_ros evaluate', [f'none of the {len(failed)} recordings could be evaluated'])
             return 3
         answer = report.evaluate(observed, study.params)
         if unannounced:
@@ -114,12 +114,12 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
             left_out, _ = observations.observe_all(without, study.params, in_order)
             answer['other_goal'] = scores.score_other_goal(observed, left_out, study.params.likelihood.other_goal)
             if answer['other_goal'] is None:
-                warn_all('evaluate', ['no recording has several goals of which one could be left out'])
+                print_messages('foc_ros evaluate', ['no recording has several goals of which one could be left out'])
             else:
                 answer['verdict'].append(scores.describe_other_goal(answer['other_goal']))
     mismatches = report.find_label_mismatches(data, observed)
     differ = 'the label differs from the recorded path'
-    warn_all('evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
+    print_messages('foc_ros evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
     answer |= {'failed': failed, 'labels_not_taken': mismatches}
     write_report(data.resolve().name, answer, recordings, study.params)
     study.show(answer, report.make_tables(answer), answer['verdict'], EVALUATION_PAGE)

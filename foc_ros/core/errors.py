@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
@@ -72,12 +72,26 @@ def warn(text: str) -> None:
     warnings.warn(text, FocWarning, stacklevel=2)
 
 
+def print_messages(program: str, messages: Iterable[str]) -> int:
+    """Print each message as one line on standard error, after the name of the program; return the exit code, 2 if there is any.
+
+    A character from a file that would control the terminal is escaped.
+    """
+    lines = [' '.join(message.split()) for message in messages]
+    with suppress(OSError):  # the disk of standard error may be full
+        for line in lines:
+            print(f'{program}: {"".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)}', file=sys.stderr)
+    return 2 if lines else 0
+
+
 @contextmanager
 def print_warnings(program: str) -> Iterator[None]:
-    """Print each warning as one line on standard error, after the name of the program, without its place in the code."""
+    """Print each warning as `print_messages` does, without its place in the code, and equal ones once."""
+    told = set[str]()
 
     def show(message: Warning | str, *_: object, **__: object) -> None:
-        print(f'{program}: {" ".join(str(message).split())}', file=sys.stderr)
+        print_messages(program, {str(message)} - told)
+        told.add(str(message))
 
     with warnings.catch_warnings():
         warnings.simplefilter('always', FocWarning)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import shorten
 
 from .classes.library import Demonstration
 from .config import ONLINE, Config
@@ -53,7 +54,8 @@ class Pipeline:
     library: demonstrated paths; is_timed: whether `rate_hz` and `scene.timeout_s` apply; without them every hand sample is due,
     and obstacles are never too old. Attributes: config; given, this library; hand_state, None before the first hand sample;
     scene, obstacles and goals; is_engaged, whether predictions are made; frame_id, the working frame, None until the parameter or
-    the first hand sample fixes it; learnt, what was learnt so far of the operator and the scene.
+    the first hand sample fixes it; learnt, what was learnt so far of the operator and the scene; library_doubt, why no path
+    of the library could count so far, empty once one could, None before the first prediction.
     """
 
     def __init__(self, config: Config, library: Sequence[Demonstration] = (), *, is_timed: bool = True) -> None:
@@ -64,6 +66,7 @@ class Pipeline:
         self.scene = Scene()
         self.is_engaged = True
         self.learnt, self._library = Learnt(), make_library(self.given)
+        self.library_doubt: str | None = None
         self.frame_id = config.frame_id.lstrip('/') or None
         self._rejections = Rejections()
         self._tracks = NO_TRACKS
@@ -202,6 +205,8 @@ class Pipeline:
         self._late_ns = 0 if due_ns is None else stamp_ns - due_ns
         self._is_new, self._predicted_ns = False, stamp_ns
         obstacles = self.scene.obstacles(self.hand_state.stamp_ns)
+        if self.library_doubt != '':
+            self.library_doubt = _describe_unused(self.given, self.hand_state.frame_id, obstacles)
         scene = self.hand_state, obstacles, self.scene.goals
         knowledge = Knowledge(self._library, self.learnt.planning_spread, self.scene.goal_objects, self.learnt.habits)
         tracks, heights = self._tracks, self.scene.goal_heights
@@ -309,3 +314,15 @@ class Pipeline:
             self.set_obstacles(name, source.obstacles, source.stamp_ns, source.frame_id)
         if before.goals is not None:
             self.set_goals(before.goals, before.goals_frame, before.goal_heights, before.goal_objects)
+
+
+def _describe_unused(library: Sequence[Demonstration], frame_id: str, obstacles: Obstacles) -> str:
+    """Return why none of the demonstrations can count in a frame among obstacles; empty if one can, or if there are none."""
+    here = dict.fromkeys(each.ids for each in library if frame_id in ('', each.frame_id))
+    if library and not here:
+        frames = ', '.join(sorted({f"'{each.frame_id}'" for each in library}))
+        return f"none of its paths counts: they are in the frame {frames}, the working frame is '{frame_id}'"
+    present = set(obstacles.ids)
+    missing = min((sorted(set(ids) - present) for ids in here), key=len, default=[])
+    names = shorten(', '.join(map(repr, missing)), 200, placeholder=' ...')
+    return names and f'none of its paths counts: they pass obstacles that the scene does not have: {names}'

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import os
 import reprlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,7 +17,7 @@ from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.support import check_array
 
 from .documents import MAX_BYTES, read_document
-from .outputs import lock_folder
+from .outputs import lock_folder, write_whole
 
 SIDES = {'left': LEFT, 'right': RIGHT}
 MOST_WAYS, MOST_OBSTACLES = 500, 4096
@@ -57,15 +56,11 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
     text = json.dumps({'ways': rows}, allow_nan=False) + '\n'
     if len(text) > MAX_BYTES:
         raise InputError(f'{file}: ways', f'at most {MAX_BYTES:,} bytes', f'{len(text):,} of {len(ways)} ways')
-    target = file.resolve()  # a link stays
-    if target.exists() and not target.is_file():
+    if file.exists() and not file.is_file():
         raise RecordingError(f'{file}: cannot be written: it is no regular file')
-    unfinished = target.with_name(f'{target.name}.{os.getpid()}.unfinished')  # another process may write its own
     try:
-        unfinished.write_text(text, encoding='utf-8')
-        unfinished.replace(target)
+        write_whole(file, text)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
         raise RecordingError(f'{file}: cannot be written: {error.strerror}') from error
 
 

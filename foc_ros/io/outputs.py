@@ -60,6 +60,20 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
         raise InputError(option, 'a folder that can be written', f'{directory}: {error.strerror}') from error
 
 
+def write_whole(file: Path, text: str) -> None:
+    """Write a file completely or not at all, so that an earlier one stays then; a link stays, too. Raises OSError."""
+    target = file.resolve()
+    if target.exists() and not target.is_file():  # a device
+        target.write_text(text, encoding='utf-8')
+        return
+    unfinished = target.with_name(f'{target.name}.{os.getpid()}.unfinished')  # another process may write its own
+    try:
+        unfinished.write_text(text, encoding='utf-8')
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
 @contextmanager
 def lock_folder(folder: Path, *, waits: bool = True) -> Iterator[None]:
     """Let one process at a time continue for a folder, where its system and its file system can; a lock ends with its process.

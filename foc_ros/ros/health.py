@@ -195,8 +195,8 @@ class Monitor:
         state: of the managed node; busy_s: for how long the present prediction has been computed, 0 if there is none [s];
         unheard: a text for each publisher that cannot be heard.
         """
-        by_clock = self._freshness.find_not_ready_reason(now_s)
-        not_ready_reason = self._intake.pipeline.not_ready_reason() or (by_clock and by_clock[1])
+        pipeline, by_clock = self._intake.pipeline, self._freshness.find_not_ready_reason(now_s)
+        not_ready_reason = pipeline.not_ready_reason() or (by_clock and by_clock[1])
         totals = Counter(self._intake.counts) + self.counts
         recent = totals - self._reported
         hand, repeated = self._freshness.inputs[HAND], recent['hand_duplicate']
@@ -206,6 +206,7 @@ class Monitor:
             f'hand_pose: stamps repeat: {repeated} of {poses} poses have that of the pose before': 2 * repeated >= poses > 0,
             f'busy: a prediction has been computed for {busy_s:.1f} s': busy_s > BUSY_S,
             f'busy: {self._late}': recent['predict_too_late'] > 0,
+            f'{pipeline.config.homotopy.library}: {pipeline.library_doubt}': bool(pipeline.library_doubt),
         }
         reasons = [*unheard, *(text for text, is_found in checks.items() if is_found)]
         values = self._list_values(now_s, state, totals, recent)
@@ -214,7 +215,7 @@ class Monitor:
             del recent[DROPPED]  # hand samples between predictions that are fresh are not missed
         if recent['internal_errors']:
             level, message = ERROR, f'{recent["internal_errors"]} internal errors, the last: {self._error}'
-        elif state != 'active' or not self._intake.pipeline.is_engaged:
+        elif state != 'active' or not pipeline.is_engaged:
             level, message = OK, 'disengaged' if state == 'active' else f'{state}: nothing is predicted'
         else:
             faults = {name: count for name, count in recent.items() if name in FAULTS or not name.startswith(HARMLESS)}

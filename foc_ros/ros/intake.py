@@ -130,7 +130,8 @@ class Intake:
             is_same = still is not None and (*still.position, still.height) == (*sample.position, sample.height)
             if not is_same or status.is_restart:
                 self._still = sample
-            for role, table in self._tables.items():
+            for role in self._tables:
+                table = self._find_table(role)
                 if self._find_conditions(table) != self._shown[role]:
                     self._set_table(role, table)
         return status
@@ -155,14 +156,19 @@ class Intake:
     def _update(self, role: str, change: Callable[[ObjectTable], ObjectTable]) -> SampleStatus:
         """Change the table of an input.
 
-        What was received before the working frame was known is discarded if it is in another frame. Several publishers with
-        different delays may add to a table, so a stamp at most `estimator.gap_s` behind the newest one does not make it late.
+        Several publishers with different delays may add to a table, so a stamp at most `estimator.gap_s` behind the newest one
+        does not make it late.
         """
-        before = self._tables[role] if self.pipeline.frame_id in (None, self._tables[role].frame_id) else ObjectTable()
+        before = self._find_table(role)
         table = change(before)
         if table.stamp_ns and 0 < before.stamp_ns - table.stamp_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS:
             table = replace(table, stamp_ns=before.stamp_ns)
         return self._note_dropped(role, table.dropped, self._set_table(role, table))
+
+    def _find_table(self, role: str) -> ObjectTable:
+        """Return the table of an input, without what was received in another frame before the working frame was known."""
+        table = self._tables[role]
+        return table if self.pipeline.frame_id in (None, table.frame_id) else ObjectTable()
 
     def _set_table(self, role: str, table: ObjectTable) -> SampleStatus:
         """Pass the existing objects of a table to the pipeline.

@@ -13,7 +13,7 @@ from io import UnsupportedOperation
 from types import FrameType
 from typing import Any
 
-from foc_ros.core.errors import FocError, list_messages, print_warnings
+from foc_ros.core.errors import FocError, list_messages, print_messages, print_warnings
 
 from .parameters import check_parameter_files
 
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with print_warnings('foc_node'):
             check_parameter_files(given)
     except FocError as error:
-        return _reject(error)
+        return print_messages('foc_node', list_messages(error))
     import rclpy
     from rclpy.executors import ExternalShutdownException
     from rclpy.signals import SignalHandlerOptions
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         context.try_shutdown()
         if 'initialize logging' in str(error):
             error.add_note('ROS_LOG_DIR names another directory for the log')
-        return _reject(error)
+        return print_messages('foc_node', list_messages(error))
     # an update of guidance gives the interpreter away several times, and the thread of the predictions is to return it soon
     sys.setswitchinterval(0.0002)
     gc.collect()
@@ -106,13 +106,6 @@ def create_executor(context: Any) -> Any:
         from rclpy.executors import SingleThreadedExecutor
 
         return SingleThreadedExecutor(context=context)
-
-
-def _reject(error: Exception) -> int:
-    """Print why the node does not start, and return the exit code."""
-    for message in list_messages(error):
-        print(f'foc_node: {" ".join(message.split())}', file=sys.stderr)
-    return 2
 
 
 if __name__ == '__main__':

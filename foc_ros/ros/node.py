@@ -318,6 +318,8 @@ class FocNode(LifecycleNode):
     def _publish_health(self) -> None:
         self._receive(HAND)  # a hand whose poses wait here is not silent
         self._goal_topics.remove_absent(self.pipeline.scene.goals)
+        if doubt := self.pipeline.library_doubt:
+            self.get_logger().warning(f'{self.pipeline.config.homotopy.library}: {doubt}', once=True)
         now_s = monotonic()
         busy_s = 0.0 if self._computation is None else now_s - self._computation.start_s
         unheard = endpoints.report_unconnected(self, self._inputs, self._outputs.values(), self._loggers)

@@ -17,6 +17,7 @@ from foc_ros.core.config import Config, flatten, list_parameters, replace_values
 from foc_ros.core.errors import InputError, ParameterError, warn
 from foc_ros.core.parameter import Bound
 from foc_ros.io.documents import read_document
+from foc_ros.io.outputs import write_whole
 
 NODE = '/foc'
 """Name of the node, with its namespace, unless it is started with another one."""
@@ -135,8 +136,8 @@ def dump_parameter_file(config: Config) -> str:
 
 
 def write_parameter_file(option: str, file: Path, config: Config) -> None:
-    """Write a parameter file; raises InputError, which names the option of the command, where that is impossible."""
+    """Write a parameter file, or nothing; raises InputError, which names the option of the command, where that is impossible."""
     try:
-        file.write_text(dump_parameter_file(config), encoding='utf-8')
+        write_whole(file, dump_parameter_file(config))
     except OSError as error:
         raise InputError(option, 'a file that can be written', f'{file}: {error.strerror}') from error

@@ -154,7 +154,7 @@ def observe(
         reason = losses or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
     if losses:
-        warn(losses)
+        warn(f'{recording.name}: {losses}')
     goals = made[-1][0].scene.goals
     assert goals is not None
     path = RecordedPath.from_samples(samples, goals, recording.goal)

@@ -182,13 +182,15 @@ def make_verdict(answer: Mapping[str, Any]) -> list[str]:
 
 def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
     unit, factor = ('points of 100', 100.0) if name == GAP else ('nat', 1.0)
-    groups: dict[str, list[str]] = {'better than': [], 'not distinguishable from': [], 'worse than': []}
+    unknown = 'not distinguishable from'
+    groups: dict[str, list[str]] = {'better than': [], unknown: [], f'by one recording {unknown}': [], 'worse than': []}
     for baseline, each in comparisons.items():
-        low, high = each['interval']
+        low, high = each['interval'] or (0.0, 0.0)
+        alike = unknown if each['interval'] else f'by one recording {unknown}'
         tenths = ', '.join(map(str, each['worse_tenths']))
         where = f', worse in tenths {tenths}' if 0 < len(each['worse_tenths']) < TENTHS else ''
         words = f'{baseline} ({factor * each["difference"]:+.2g} {unit}{where})'
-        groups['better than' if low > 0.0 else 'worse than' if high < 0.0 else 'not distinguishable from'].append(words)
+        groups['better than' if low > 0.0 else 'worse than' if high < 0.0 else alike].append(words)
     judged = '; '.join(f'{verdict} {", ".join(each)}' for verdict, each in groups.items() if each)
     subject = {PATH_CLASS: 'Homotopy classes', GAP: 'Next gaps', GOAL: 'Goals'}[name]
     return f'{subject}: {PUBLISHED} is {judged}.'

@@ -115,14 +115,16 @@ def score_forecasts(rows: Iterable[tuple[int, Observation, Question, Forecast]])
 def compare_scores(ours: Scores, other: Scores, is_share: bool) -> dict[str, Any]:
     """Return the mean difference of two predictors in the same predictions, with its interval, and the tenths that are worse.
 
+    The interval of one recording is None, because it shows no differences between recordings.
+
     is_share: compare the shares of correct answers instead of the log-likelihoods of the true ones.
     """
     difference = ours.correct - other.correct if is_share else ours.log_likelihood - other.log_likelihood
     tenths = find_tenths(ours.progress)
-    by_tenth = [difference[tenths == each] for each in range(TENTHS)]
+    by_tenth, is_one = [difference[tenths == each] for each in range(TENTHS)], np.ptp(ours.recording) == 0.0
     return {
         'difference': float(difference.mean()),
-        'interval': compute_mean_interval(difference, ours.recording),
+        'interval': None if is_one else compute_mean_interval(difference, ours.recording),
         'worse_tenths': [number for number, each in enumerate(by_tenth, 1) if len(each) and each.mean() < 0.0],
     }
 

@@ -25,8 +25,9 @@ from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
-HARMS = {'wrong_way_s': 'completion_s', 'wrong_way_effort': 'effort'}
-"""What an operator needs more than alone where the likeliest way was wrong, nan elsewhere, and the measure that it is of."""
+HARMS = {'wrong_way_s': 'duration_s', 'wrong_way_effort': 'effort'}
+"""What an operator needs more than alone where the likeliest way was wrong, nan elsewhere, and the measure that it is of. It is
+at least so much where the hand did not arrive before the trial ended."""
 COLUMNS = {
     'collision_rate': ('collisions [%]', 100.0, 1),
     'arrival_rate': ('arrivals [%]', 100.0, 1),
@@ -156,6 +157,7 @@ def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
     return {
         'collision_rate': float(clearance < 0.0),
         'arrival_rate': float(trial.has_arrived),
+        'duration_s': duration_s,
         'completion_s': duration_s if trial.has_arrived else np.nan,
         'min_clearance_m': clearance if len(task.obstacles) else np.nan,
         'path_m': float(np.hypot(*np.diff(trial.position, axis=0).T).sum()),

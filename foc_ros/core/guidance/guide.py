@@ -29,6 +29,7 @@ from .limits import (
     find_largest_force,
     limit_by_energy,
     measure_opposing_distance,
+    release,
     see_margins,
     shorten,
     step_force,
@@ -150,12 +151,13 @@ class Followed(Record):
 class GuidanceState(Record):
     """What the next update needs of this one.
 
-    energy: content of the tank [J], None before the first update; t, position (2,), force (2,): of the last update; share (2,):
-    its authority in the direction of the paths.
+    energy: content of the tank [J], None before the first update; t, position (2,), force (2,): of the last update; zero_t: by
+    when a released force is zero [s], infinite while none is; share (2,): its authority in the direction of the paths.
     """
 
     energy: float | None = None
     t: float = 0.0
+    zero_t: float = np.inf
     position: Array = field(default_factory=lambda: np.zeros(2))
     force: Array = field(default_factory=lambda: np.zeros(2))
     share: Array = field(default_factory=lambda: np.zeros(2))
@@ -193,16 +195,24 @@ def guide(config: Config, state: GuidanceState, given: GuidanceInput) -> tuple[G
         progress = advance_progress(followed.paths, followed.progress, given.position, given.velocity, dt)
         followed = replace(followed, progress=progress)
         demand = _compute_demand(settings, followed, seen, given)
-    target = demand.force if status is GuidanceStatus.GUIDING else _release(settings, state.force, dt)
-    # after a gap nothing rises suddenly; what is released falls by the whole time
-    counted = min(dt, LATE_PERIODS / settings.rate_hz) if status is GuidanceStatus.GUIDING else dt
-    force = step_force(state.force, target, settings.slew * counted, partial(_find_bound, settings, seen, energy))
-    share = state.share + shorten(demand.share - state.share, counted * _find_share_rate(settings))
+    find_bound = partial(_find_bound, settings, seen, energy)
+    share_rate, zero_t = _find_share_rate(settings), np.inf
+    if status is GuidanceStatus.GUIDING:
+        counted = min(dt, LATE_PERIODS / settings.rate_hz)  # after a gap nothing rises suddenly
+        force = step_force(state.force, demand.force, settings.slew * counted, find_bound)
+        share = state.share + shorten(demand.share - state.share, counted * share_rate)
+    else:
+        zero_t = min(state.zero_t, state.t + settings.ramp_s)
+        left = max(zero_t - given.t, 0.0) / max(zero_t - state.t, 1e-9)
+        target = release(state.force, dt * find_largest_force(settings) / settings.ramp_s, left)
+        change = max(settings.slew * dt, float(np.hypot(*(state.force - target))))
+        force = step_force(state.force, target, change, find_bound)
+        share = release(state.share, dt * share_rate, left)
     reference, authority = given.position + find_deflection(demand.stiffness, force), float(np.hypot(*share))
     output = GuidanceOutput(
         given.t, status, given.position, force, reference, demand.stiffness, demand.agreement, authority, normalize(share), energy
     )
-    return output, GuidanceState(energy, given.t, given.position, force, share, followed)
+    return output, GuidanceState(energy, given.t, zero_t, given.position, force, share, followed)
 
 
 def find_status(settings: GuidanceConfig, given: GuidanceInput) -> GuidanceStatus:
@@ -285,12 +295,6 @@ def _find_share_rate(settings: GuidanceConfig) -> float:
     within `ramp_s`.
     """
     return max(settings.authority, 0.5) / settings.ramp_s
-
-
-def _release(settings: GuidanceConfig, force: Array, dt: float) -> Array:
-    """Return a released force: the largest one becomes zero within `ramp_s`, in the same direction."""
-    norm = float(np.hypot(*force))
-    return shorten(force, max(norm - dt * find_largest_force(settings) / settings.ramp_s, 0.0))
 
 
 def _find_bound(settings: GuidanceConfig, seen: SeenMargins, energy: float, force: Array) -> float:

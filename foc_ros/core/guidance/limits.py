@@ -33,6 +33,15 @@ def shorten(vector: Array, length: float) -> Array:
     return vector if norm <= length else vector * (length / norm)
 
 
+def release(vector: Array, change: float, left: float) -> Array:
+    """Return a released vector (2,), shorter by a change, and at most the part of it that is left of its time to become zero.
+
+    A change that makes the largest one zero in time is enough, unless `slew`, `ramp_s` or `authority` were lowered meanwhile.
+    """
+    norm = float(np.hypot(*vector))
+    return shorten(vector, max(min(norm - change, left * norm), 0.0))
+
+
 def step_force(previous: Array, target: Array, most_change: float, find_bound: Callable[[Array], float]) -> Array:
     """Return the next force (2,) [N] on the way to a target, which changes by `most_change` [N] at most and keeps its bound.
 

@@ -92,24 +92,28 @@ class Library(Record):
     """The class library.
 
     demonstrations: one of each class, to recall; recordings: those with states, r of them; states (r, m, 4): x, y, vx, vy [m,
-    m/s], infinite before the movement of each and beyond its end; ends (r,): the last state of each; goals (r, 2): where they
-    lead [m]; scene (r,): equal numbers for recordings in the same scene; shows_ways (r,): whether a recording is evidence of ways
-    between obstacles, or only of goals and paths.
+    m/s], infinite before the movement of each and beyond its end; ends (r,): the last state of each; paths (r, k, 2): to
+    their goals [m]; scene (r,): equal numbers for recordings in the same scene; shows_ways (r,): whether a recording is evidence
+    of ways between obstacles, or only of goals and paths.
     """
 
     demonstrations: tuple[Demonstration, ...]
     recordings: tuple[Demonstration, ...]
     states: Array
     ends: NDArray[np.intp]
-    goals: Array
+    paths: Array
     scene: tuple[int, ...]
     shows_ways: NDArray[np.bool_]
 
     def find_here(self, frame_id: str, obstacles: Obstacles) -> NDArray[np.bool_]:
-        """Tell which recordings (r,) are of this scene: their obstacles are where they were."""
+        """Tell which recordings (r,) are of this scene: their obstacles are where they were, and leave their paths free."""
         one_of_each = dict(zip(self.scene, self.recordings, strict=True))
-        is_here = {scene: each.matches(frame_id, obstacles) for scene, each in one_of_each.items()}
-        return np.array([is_here[scene] for scene in self.scene], dtype=np.bool_)
+        here = {scene: each.ids for scene, each in one_of_each.items() if each.matches(frame_id, obstacles)}
+        names = {name for ids in here.values() for name in ids}
+        known = obstacles.take([row for row, name in enumerate(obstacles.ids) if name in names])
+        is_here = np.isin(self.scene, list(here))
+        is_here[is_here] = ~find_blocked(self.paths[is_here], known)
+        return is_here
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,11 +150,11 @@ def make_library(given: Sequence[Demonstration], learnt: Sequence[Demonstration]
         begin = max(onset - round(SEEN_AFTER_S / STEP_S), 0)
         states[row, begin : len(table)] = table[begin:]
     ends = np.array([len(table) - 1 for table in tables], dtype=np.intp)
-    goals = np.array([each.path[-1] for each in recordings]).reshape(-1, 2)
+    paths = np.array([each.path for each in recordings]).reshape(-1, POINTS, 2)
     numbers = dict[tuple[object, ...], int]()
     scene = tuple(numbers.setdefault((each.frame_id, each.ids, each.centre.tobytes()), len(numbers)) for each in recordings)
     shows_ways = np.arange(len(recordings)) < sum(each.states is not None for each in given)
-    return Library(tuple(distinct), recordings, states, ends, goals, scene, shows_ways)
+    return Library(tuple(distinct), recordings, states, ends, paths, scene, shows_ways)
 
 
 NO_LIBRARY = make_library(())
@@ -167,18 +171,13 @@ def find_evidence(library: Library, hand: HandState, obstacles: Obstacles, goals
     rows = np.argsort(-weight, kind='stable')
     rows = rows[(is_near & is_here)[rows]][:MOST_NEAR]
     column = {name: number for number, name in enumerate(obstacles.ids)}
-    near = [library.recordings[row] for row in rows]
-    known = obstacles.take(sorted({column[name] for each in near for name in each.ids}))
-    is_blocked = find_blocked(np.array([each.path for each in near]).reshape(len(near), POINTS, 2), known)
-    is_here[rows[is_blocked]] = False
-    rows = rows[~is_blocked]
     sides, passing_s = np.zeros((len(rows), len(obstacles)), dtype=np.int8), np.zeros((len(rows), len(obstacles)))
     for number, row in enumerate(rows.tolist()):
         recording = library.recordings[row]
         columns = [column[name] for name in recording.ids]
         sides[number, columns] = recording.rest_sides[state[row]]
         passing_s[number, columns] = STEP_S * (recording.passing - state[row])
-    is_at_goal = np.hypot(*(library.goals[:, None] - goals).transpose(2, 0, 1)) <= NEAR
+    is_at_goal = np.hypot(*(library.paths[:, -1:] - goals).transpose(2, 0, 1)) <= NEAR
     return Evidence(weight[rows], rows, state[rows], sides, passing_s, is_at_goal[rows], is_at_goal[is_here].sum(axis=0))
 
 

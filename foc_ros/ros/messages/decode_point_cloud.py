@@ -86,7 +86,8 @@ def read_table(message: Any) -> NDArray[np.void]:
     if rows > MAX_ROWS:
         raise MessageError('height * width', f'at most {MAX_ROWS} obstacles', rows)
     step = int(message.point_step)
-    row_step = int(message.row_step) if message.height > 1 else width * step
+    is_plain = message.height < 2 and len(data) == rows * step  # a single line needs no row_step
+    row_step = width * step if is_plain else int(message.row_step)
     expected = int(message.height) * row_step
     if len(data) != expected or row_step < width * step:
         size = f'{message.height} rows of row_step {message.row_step} and {width} points of point_step {step}'
