@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from bag_helpers import TYPES
+from matplotlib.figure import Figure
 from report_samples import START_NS, prediction, samples, scene
 
 from foc_ros.core.config import Config
@@ -21,6 +22,7 @@ from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.core.solution import Status
 from foc_ros.io.bags import TYPESTORE, BagReader
 from foc_ros.reporting import study_pages
+from foc_ros.reporting.draw import save_figure
 from foc_ros.reporting.page import Section, write_page
 from foc_ros.reporting.study_pages import FEW, draw_example, warn_of_few
 from foc_ros.reporting.study_pages import write_fit as write_report
@@ -172,3 +174,18 @@ def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_abs
     assert sorted(many[:12]) == list(range(12)) and many[12] is None
     assert len({slot % 6 for slot in many[:6]}) == 6
     assert slots.assign([3])[0] in range(12)
+
+
+def test_a_page_that_cannot_be_written_to_its_end_leaves_the_earlier_one(tmp_path):
+    resource = pytest.importorskip('resource')
+    write_page(tmp_path, 'x.html', 'first', [], (), None)
+    earlier, (limit, most) = (tmp_path / 'x.html').read_text(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, most))
+    try:
+        with pytest.raises(InputError, match='File too large'):
+            write_page(tmp_path, 'x.html', 'second', [], (), None)
+        with pytest.raises(InputError, match='File too large'):
+            save_figure(Figure(), tmp_path / 'x.png')
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
+    assert [each.name for each in tmp_path.iterdir()] == ['x.html'] and (tmp_path / 'x.html').read_text() == earlier

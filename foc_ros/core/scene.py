@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -72,7 +72,8 @@ class Scene(Record):
         padded = [
             replace(each, vertices=np.pad(each.vertices, ((0, 0), (0, most - each.vertices.shape[1]), (0, 0)))) for each in tables
         ]
-        columns = {name: np.concatenate([vars(each)[name] for each in padded]) for name in vars(padded[0]) if name != 'ids'}
+        names = [each.name for each in fields(Obstacles) if each.name != 'ids']
+        columns = {name: np.concatenate([getattr(each, name) for each in padded]) for name in names}
         return Obstacles(tuple(ids), **columns).take(sorted(latest.values()))
 
     def not_ready_reason(self, stamp_ns: int, timeout_s: float) -> tuple[str, str] | None:

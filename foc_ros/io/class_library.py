@@ -59,7 +59,8 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
     if file.exists() and not file.is_file():
         raise RecordingError(f'{file}: cannot be written: it is no regular file')
     try:
-        write_whole(file, text)
+        with write_whole(file) as unfinished:
+            unfinished.write_text(text, encoding='utf-8')
     except OSError as error:
         raise RecordingError(f'{file}: cannot be written: {error.strerror}') from error
 

@@ -60,15 +60,19 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
         raise InputError(option, 'a folder that can be written', f'{directory}: {error.strerror}') from error
 
 
-def write_whole(file: Path, text: str) -> None:
-    """Write a file completely or not at all, so that an earlier one stays then; a link stays, too. Raises OSError."""
+@contextmanager
+def write_whole(file: Path) -> Iterator[Path]:
+    """Yield the path at which to write a file, which takes the place of an earlier one only when it is complete; a link stays.
+
+    A device is written directly.
+    """
     target = file.resolve()
-    if target.exists() and not target.is_file():  # a device
-        target.write_text(text, encoding='utf-8')
+    if target.exists() and not target.is_file():
+        yield target
         return
-    unfinished = target.with_name(f'{target.name}.{os.getpid()}.unfinished')  # another process may write its own
+    unfinished = target.with_name(f'{target.stem}.{os.getpid()}.unfinished{target.suffix}')  # another process may write its own
     try:
-        unfinished.write_text(text, encoding='utf-8')
+        yield unfinished
         unfinished.replace(target)
     finally:
         unfinished.unlink(missing_ok=True)

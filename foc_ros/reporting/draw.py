@@ -23,7 +23,7 @@ from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obstacle
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
-from foc_ros.io.outputs import MARK
+from foc_ros.io.outputs import MARK, write_whole
 from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
 
 from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghosts
@@ -76,7 +76,8 @@ def save_figure(figure: Figure, file: Path) -> None:
         '.svg': {'Creator': MARK, 'Date': None},
     }
     try:
-        figure.savefig(file, bbox_inches='tight', pad_inches=0.08, metadata=metadata[file.suffix.lower()])
+        with write_whole(file) as unfinished:
+            figure.savefig(unfinished, bbox_inches='tight', pad_inches=0.08, metadata=metadata[file.suffix.lower()])
     except OSError as error:
         raise InputError('picture file', 'a file that can be written', f'{file}: {error.strerror or error}') from error
 

@@ -16,7 +16,7 @@ from foc_ros.core.errors import InputError
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.core.types import NANOSECONDS, HandSample
-from foc_ros.io.outputs import MARK, REPORT_FILES, check_page, make_folder
+from foc_ros.io.outputs import MARK, REPORT_FILES, check_page, make_folder, write_whole
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
 from .draw import save_figure
@@ -105,8 +105,9 @@ def write_report(
             goals = np.unique(np.concatenate([each.goal_positions for each in solved]), axis=0)
             bounds = compute_recording_bounds(hand, solved)
             save_figure(make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds), overview_file)
-        page_file.write_text(html, encoding='utf-8', errors='replace')
-        numbers_file.write_text(json.dumps(numbers, indent=1, allow_nan=False), encoding='utf-8')
+        for file, text in ((page_file, html), (numbers_file, json.dumps(numbers, indent=1, allow_nan=False))):
+            with write_whole(file) as unfinished:
+                unfinished.write_text(text, encoding='utf-8', errors='replace')
     return [page_file, numbers_file, *([overview_file] if solved else [])]
 
 

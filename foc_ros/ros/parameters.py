@@ -138,6 +138,7 @@ def dump_parameter_file(config: Config) -> str:
 def write_parameter_file(option: str, file: Path, config: Config) -> None:
     """Write a parameter file, or nothing; raises InputError, which names the option of the command, where that is impossible."""
     try:
-        write_whole(file, dump_parameter_file(config))
+        with write_whole(file) as unfinished:
+            unfinished.write_text(dump_parameter_file(config), encoding='utf-8')
     except OSError as error:
         raise InputError(option, 'a file that can be written', f'{file}: {error.strerror}') from error

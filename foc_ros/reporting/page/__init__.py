@@ -17,7 +17,7 @@ from typing import Any
 
 from foc_ros.core.config import Config, flatten
 from foc_ros.core.errors import FocError
-from foc_ros.io.outputs import MARK, check_replaceable, make_folder
+from foc_ros.io.outputs import MARK, check_replaceable, make_folder, write_whole
 from foc_ros.reporting.draw import open_figure
 
 try:
@@ -75,8 +75,8 @@ def write_page(
         # of a file only its name
         changed = {name: Path(value).name if isinstance(value, str) else f'{value}' for name, value in changed.items()}
     page = render('study.html', title=title, sections=sections, warnings=warnings, made=made, changed=changed)
-    with make_folder('--report', directory):
-        (directory / name).write_text(page, encoding='utf-8', errors='replace')
+    with make_folder('--report', directory), write_whole(directory / name) as unfinished:
+        unfinished.write_text(page, encoding='utf-8', errors='replace')
 
 
 def make_picture(figure: Any, caption: str) -> Picture:
