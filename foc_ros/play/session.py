@@ -27,8 +27,8 @@ from .jobs import Jobs
 from .predictor import Predictor, Receive
 from .recording import Recording
 
-OWN_VALUES = {'plane': 'xy', 'frame_id': '', 'predict_height': False}
-"""Parameters that the page fixes: its hand has no height."""
+OWN_VALUES = {'plane': 'xy', 'frame_id': ''}
+"""Parameters that the page fixes."""
 Send = Callable[[dict[str, Any]], None]
 
 
