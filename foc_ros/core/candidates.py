@@ -257,9 +257,9 @@ def drop_duplicates(candidates: Sequence[PredictedCandidate]) -> list[PredictedC
 
 
 def _merge(alike: Sequence[PredictedCandidate]) -> PredictedCandidate:
-    """Return the newest of solutions in one class, a followed one if there is one.
+    """Return one of the solutions in one class: the newest one, of the followed ones if there are any.
 
-    The name of several has only obstacles that the path passes.
+    Where there are several, the name that it gets contains only the obstacles that its path passes.
     """
     newest = min(alike, key=lambda each: (each.way == NO_NUMBER, each.age_s))
     if len(alike) == 1:

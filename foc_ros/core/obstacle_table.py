@@ -82,8 +82,8 @@ class Obstacles(Record):
     def take(self, rows: NDArray[np.intp] | list[int]) -> Obstacles:
         """Return the obstacles of the given rows, in that order."""
         index = np.asarray(rows, dtype=np.intp)
-        columns = {each.name: getattr(self, each.name)[index] for each in fields(self)[1:]}
-        return Obstacles(tuple(self.ids[i] for i in index), **columns)
+        columns = [getattr(self, name)[index] for name in COLUMNS]
+        return Obstacles(tuple(self.ids[i] for i in index), *columns)
 
     @property
     def extent(self) -> Array:
@@ -107,6 +107,10 @@ class Obstacles(Record):
             return False
         pairs = ((self.centre, other.centre), (self.vertices, other.vertices), (self.radius, other.radius))
         return all(bool((np.abs(one - two) <= distance).all()) for one, two in pairs)
+
+
+COLUMNS = tuple(each.name for each in fields(Obstacles) if each.name != 'ids')
+"""Arrays of a table, with a row for each obstacle."""
 
 
 def make_obstacles(

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .config import Config
 from .errors import SceneError
-from .obstacle_table import Obstacles, make_obstacles
+from .obstacle_table import COLUMNS, Obstacles, make_obstacles
 from .obstacles.geometry import measure_offsets
 from .types import NANOSECONDS, Array, HandState, Record
 
@@ -72,9 +72,8 @@ class Scene(Record):
         padded = [
             replace(each, vertices=np.pad(each.vertices, ((0, 0), (0, most - each.vertices.shape[1]), (0, 0)))) for each in tables
         ]
-        names = [each.name for each in fields(Obstacles) if each.name != 'ids']
-        columns = {name: np.concatenate([getattr(each, name) for each in padded]) for name in names}
-        return Obstacles(tuple(ids), **columns).take(sorted(latest.values()))
+        columns = [np.concatenate([getattr(each, name) for each in padded]) for name in COLUMNS]
+        return Obstacles(tuple(ids), *columns).take(sorted(latest.values()))
 
     def not_ready_reason(self, stamp_ns: int, timeout_s: float) -> tuple[str, str] | None:
         """Return why nothing can be predicted for a hand pose at a stamp [ns], as (kind, message); None if it can.

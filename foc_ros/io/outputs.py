@@ -62,9 +62,9 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
 
 @contextmanager
 def write_whole(file: Path) -> Iterator[Path]:
-    """Yield the path at which to write a file, which takes the place of an earlier one only when it is complete; a link stays.
+    """Yield the path of an unfinished file, which replaces the file when the context ends without an error.
 
-    A device is written directly.
+    An earlier file stays until then. A link stays a link. A device is written directly.
     """
     target = file.resolve()
     if target.exists() and not target.is_file():

@@ -26,8 +26,8 @@ from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
 HARMS = {'wrong_way_s': 'duration_s', 'wrong_way_effort': 'effort'}
-"""What an operator needs more than alone where the likeliest way was wrong, nan elsewhere, and the measure that it is of. It is
-at least so much where the hand did not arrive before the trial ended."""
+"""Measures of harm, and the measure that each compares: by how much more an operator needs than alone, in trials in which the
+likeliest way was wrong; nan in the others. It is a lower bound where the trial ended before the hand arrived."""
 COLUMNS = {
     'collision_rate': ('collisions [%]', 100.0, 1),
     'arrival_rate': ('arrivals [%]', 100.0, 1),

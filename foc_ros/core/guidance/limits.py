@@ -34,9 +34,10 @@ def shorten(vector: Array, length: float) -> Array:
 
 
 def release(vector: Array, change: float, left: float) -> Array:
-    """Return a released vector (2,), shorter by a change, and at most the part of it that is left of its time to become zero.
+    """Return a vector (2,) that is being released: shorter by a change, and by a larger one where it would be zero too late.
 
-    A change that makes the largest one zero in time is enough, unless `slew`, `ramp_s` or `authority` were lowered meanwhile.
+    left: part of the time of the release that remains after this update. The change alone is enough, unless `slew`, `ramp_s` or
+    `authority` were lowered meanwhile.
     """
     norm = float(np.hypot(*vector))
     return shorten(vector, max(min(norm - change, left * norm), 0.0))

@@ -186,6 +186,6 @@ def scale_covariances(candidates: Sequence[PredictedCandidate], config: Covarian
     errors *= interpolate_factors(compute_shares(times), config)
     scaled = errors @ total @ errors.swapaxes(-1, -2)
     return tuple(
-        replace(each, solution=each.solution.with_covariance(covariance.copy()))
+        replace(each, solution=each.solution.with_covariance(covariance))
         for each, covariance in zip(candidates, scaled, strict=True)
     )

@@ -40,8 +40,7 @@ def is_free(path: Array, obstacles: Obstacles, dt: float) -> bool:
 def find_blocked(paths: Array, obstacles: Obstacles) -> NDArray[np.bool_]:
     """Tell which of the paths (r, m, 2) [m] through points that are close together are not free, (r,), as `is_free` does."""
     is_blocked, (x, y) = np.zeros(len(paths), dtype=np.bool_), np.moveaxis(paths, 2, 0).copy()
-    extents = obstacles.radius + np.hypot(*obstacles.vertices.T).max(axis=0)
-    for row, ((x0, y0), extent) in enumerate(zip(obstacles.centre.tolist(), extents.tolist(), strict=True)):
+    for row, ((x0, y0), extent) in enumerate(zip(obstacles.centre.tolist(), obstacles.extent.tolist(), strict=True)):
         near = np.flatnonzero(((x - x0) ** 2 + (y - y0) ** 2 < extent**2).any(axis=1))  # hardly any path is
         if len(near):
             distances = measure_offsets(paths[near], obstacles.take([row]))[1].reshape(len(near), paths.shape[1], 1)
