@@ -30,10 +30,11 @@ from tornado.websocket import websocket_connect
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
+from foc_ros.core.pipeline import Pipeline
 from foc_ros.play.address import open_sockets
 from foc_ros.play.messages import LONGEST_MESSAGE, PageClock, parse_message
 from foc_ros.play.predictor import Predictor, State
-from foc_ros.play.scene import FIRST_SCENE, START
+from foc_ros.play.scene import FIRST_SCENE, START, View
 from foc_ros.play.server import FILES, listen
 from foc_ros.play.session import Session
 from foc_ros.play.tasks import Phase, Tasks, tabulate_scores
@@ -278,6 +279,33 @@ def test_a_pose_that_is_refused_is_no_sign_of_the_hand():
     noted = predictor._guidance.newest
     predictor._take('hand_pose', pose)
     assert predictor._guidance.newest is noted
+
+
+def test_no_prediction_begins_at_a_pose_that_waited_for_the_one_before(monkeypatch):
+    """The next pose is as near as the next frame, and its prediction shows a younger hand."""
+    step_ns, stamps = 20_000_000, list[int]()
+    predictor = Predictor(Config(), lambda outcome: isinstance(outcome, View) and stamps.append(outcome.prediction.stamp_ns))
+    compute = Pipeline.predict
+
+    def send(number):
+        predictor.send('hand_pose', encode_hand_pose(TYPES, NOW_NS + number * step_ns, 'play', (0.001 * number, 0.0, 0.0)))
+
+    def predict_while_a_pose_comes(pipeline, deadline):
+        send(2 * len(stamps) + 1)
+        return compute(pipeline, deadline)
+
+    monkeypatch.setattr(Pipeline, 'predict', predict_while_a_pose_comes)
+    for role, message in FIRST_SCENE.encode(TYPES, NOW_NS).items():
+        predictor.send(role, message)
+    predictor.start()
+    try:
+        for number in range(3):
+            until(predictor._queue.empty, 'the poses before are taken', 20)
+            send(2 * number)
+            until(lambda count=number + 1: len(stamps) == count, 'a prediction', 20)
+    finally:
+        predictor.stop()
+    assert stamps == [NOW_NS + number * step_ns for number in (0, 2, 4)]
 
 
 def test_the_state_is_well_only_while_predictions_succeed():

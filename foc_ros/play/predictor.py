@@ -51,7 +51,8 @@ class Predictor:
     def __init__(self, config: Config, receive: Receive) -> None:
         self._receive = receive
         self._intake = Intake(Pipeline(config, load_library(config.homotopy.library)))
-        self._queue: SimpleQueue[tuple[str, Any] | Config | None] = SimpleQueue()
+        self._queue: SimpleQueue[tuple[float, str, Any] | Config | None] = SimpleQueue()
+        self._ended_s = 0.0
         self._error = ''
         self._recent: deque[Prediction] = deque(maxlen=REMEMBERED)
         self._guidance = GuidanceLoop(config, lambda *outcome: receive(outcome), self._note_error, getLogger(__name__).warning)
@@ -72,7 +73,7 @@ class Predictor:
 
     def send(self, role: str, message: Any) -> None:
         """Take a message of an input."""
-        self._queue.put((role, message))
+        self._queue.put((monotonic(), role, message))
 
     def configure(self, config: Config) -> None:
         """Use other parameters, after the messages that were sent before; movement and scene are kept."""
@@ -100,9 +101,12 @@ class Predictor:
                 if isinstance(given, Config):
                     self._intake.pipeline.reconfigure(given)
                     self._guidance.reconfigure(given)
-                else:
-                    self._take(*given)
-                if self._queue.empty():
+                    continue
+                sent_s, role, message = given
+                self._take(role, message)
+                # not from a pose that has waited for the last prediction: the page sends the next one within a frame, from which a
+                # prediction is seen hardly later, and after less time since its pose
+                if self._queue.empty() and sent_s >= self._ended_s:
                     self._predict()
             except Exception as error:
                 self._note_error(error)
@@ -116,6 +120,7 @@ class Predictor:
     def _predict(self) -> None:
         pipeline, received_s = self._intake.pipeline, monotonic()
         prediction = pipeline.predict(Deadline(pipeline.config.budget_s or None)) if pipeline.is_due else None
+        self._ended_s = monotonic()
         if prediction is not None:
             self._error = ''
             self._recent.append(prediction)
