@@ -152,7 +152,7 @@ def replay(
     output
         New bag for inputs and predictions.
     report
-        Folder for a page, its numbers and a picture of all movements.
+        Folder for a page and its numbers.
     guidance
         Compute guidance as well, at guidance.rate_hz: into the output bag and, with --json, as a list `guidance`.
     remap

@@ -182,7 +182,7 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: thread
             node.check()
             now = time.monotonic()
             if recorder.snapshots:
-                show(now, recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
+                show(now, recorder.snapshots[-1], recorder.describe(items))
             return not stopped.is_set()
 
         with Player(items, RECEIVED, receive, tick, domain) as player:

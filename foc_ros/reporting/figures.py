@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whole figures for print: a prediction, a scene, the movements of a recording, a moment of one of them; and their legends.
+"""Whole figures for print: a prediction, a scene, a moment of a recording; and their legends.
 
 A legend is below the axes, so that it covers nothing: the candidates with their classes in words, and the signs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -15,7 +14,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
@@ -84,19 +82,6 @@ def make_scene_figure(snapshot: Prediction) -> Figure:
     hand, bounds = _frame_scene(snapshot)
     with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
         draw_snapshot(figure.subplots(), snapshot, bounds, hand, is_alone=True)
-    return figure
-
-
-def make_recording_figure(
-    hand: HandTrajectory, obstacles: Obstacles, goals: Array, spans: Sequence[Span], bounds: Bounds
-) -> Figure:
-    """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each movement."""
-    with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
-        axes = figure.subplots()
-        draw.draw_scene(axes, obstacles, goals, bounds, named=False)
-        axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
-        for number, span in enumerate(spans):
-            draw.draw_movement(axes, hand.positions[hand.between(*span)], number)
     return figure
 
 
