@@ -54,7 +54,7 @@ def test_end_to_end(tmp_path, capsys):
         'The node starts ...',
         ' of 2.0 s   hand samples ',
         'The report is written ...',
-        'predictions were',
+        'written to ',
         'report/index.html',
     )
     places = [printed.find(words) for words in told]
