@@ -3,8 +3,7 @@
 """Recordings in parallel by joblib: one function applied to many named items.
 
 Where that happens is joblib's setting: this process unless :func:`open_workers`, or `joblib.parallel_config`, says otherwise.
-Results do not depend on it. What goes wrong with one item, an exception or a worker process that is killed, becomes the
-:class:`Failure` of this item alone.
+What goes wrong with one item, an exception or a worker process that is killed, becomes the :class:`Failure` of this item alone.
 """
 
 from __future__ import annotations
@@ -46,10 +45,7 @@ class Failure:
 
 @contextmanager
 def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
-    """Let :func:`run` use a number of worker processes, 1 for this one, or the Dask cluster of a scheduler.
-
-    Raises InputError where there is no such cluster.
-    """
+    """Let :func:`run` use a number of worker processes, 1 for this one, or a Dask cluster; InputError where there is none."""
     with warnings.catch_warnings():
         # said by joblib where a command is interrupted
         warnings.filterwarnings('ignore', '.* tasks which were still being processed', UserWarning)
@@ -64,8 +60,7 @@ def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
 class DaskBackend(ThreadingBackend):
     """The backend of joblib for a Dask cluster: as many calls wait in threads as the cluster has.
 
-    With joblib's own one a result that is lost with a killed worker, and is then blamed for the death of the next one, never
-    arrives (joblib 1.6, distributed 2026.8).
+    With joblib's own one a result that is lost with a killed worker never arrives (joblib 1.6, distributed 2026.8).
     """
 
     def __init__(self, client: Any = None, **options: Any) -> None:

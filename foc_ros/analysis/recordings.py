@@ -107,11 +107,7 @@ Recording = BagRecording | TableRecording | BrokenRecording
 
 
 def find_recordings(data: Path) -> dict[str, Recording]:
-    """Return the recordings of a folder by name.
-
-    data: a folder with recordings.csv, and either goals.csv and, where there are obstacles, obstacles.csv, or scenes.csv with the
-    boxes of each recording; a folder of bags; or a bag. Raises RecordingError where it is none of these.
-    """
+    """Return the recordings of a folder of tables or of bags, or a bag, by name; RecordingError where it is none of these."""
     if (data / RECORDINGS).exists():
         return dict(read_tables(data))
     if data.is_file() or ((data / 'metadata.yaml').exists() and any(map(is_bag_file, data.iterdir()))):
@@ -163,8 +159,8 @@ def read_tables(data: Path) -> dict[str, TableRecording | BrokenRecording]:
 def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, output: Path) -> str:
     """Convert the tables, all of which are checked before the first bag is written; return in words what was written.
 
-    table, obstacles, goals: the recordings and their scenes, or a folder of all three tables; output: folder for the bags. Raises
-    RecordingError for a table that cannot be read and for a bag that exists, InputError for a table without one of obstacles.
+    table: the recordings, or a folder of all tables. Raises RecordingError for a table that cannot be read and for a bag that
+    exists, InputError for a table without one of obstacles.
     """
     if obstacles is None and not table.is_dir():
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
@@ -281,12 +277,10 @@ def _warn_of_far_scenes(file: Path, recordings: Iterable[TableRecording]) -> Non
 
 
 def _find_least_size(scene: RecordedScene) -> float:
-    """Return the radius or the larger length of the smallest obstacle [m], 0 if there is none."""
     return min((max(row[3], *row[6:8]) for row in scene.obstacles), default=0.0)
 
 
 def _warn_once_for_each(file: Path, doubts: Iterable[tuple[str, Doubt]]) -> None:
-    """Warn once of what is doubted in several recordings, given with their names."""
     grouped: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for name, (what, words, reason) in doubts:
         grouped.setdefault((what, words), []).append((name, reason))
@@ -296,5 +290,4 @@ def _warn_once_for_each(file: Path, doubts: Iterable[tuple[str, Doubt]]) -> None
 
 
 def _find_nearest_unit(units: Mapping[str, float], value: float, usual: float) -> str:
-    """Return the unit in which a value is nearest to a usual one, by their ratio."""
     return min(units, key=lambda each: abs(math.log(value * units[each] / usual)))

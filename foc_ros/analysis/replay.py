@@ -31,11 +31,7 @@ from foc_ros.ros.transforms import Transforms, TransformTree
 
 @dataclass(frozen=True)
 class Step:
-    """One recorded message and its effect.
-
-    item: the message; sample: as of `Replay.take`; prediction: made from the sample, None where none was due or possible; scene:
-    the scene of the prediction.
-    """
+    """One recorded message and its effect: a prediction and its scene, or None where none was due or possible."""
 
     item: Item
     sample: HandSample | None
@@ -46,8 +42,8 @@ class Step:
 class Replay:
     """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
 
-    Transforms of the recording are applied as the node applies those of tf2, by the log times of the messages. Raises
-    RecordingError or InputError where the class library cannot be used.
+    Transforms of the recording are applied by the log times of the messages. Raises RecordingError or InputError where the class
+    library cannot be used.
     """
 
     def __init__(self, config: Config) -> None:
@@ -145,7 +141,7 @@ class Replay:
 def keep_last_run(samples: list[HandSample], sample: HandSample, *made: list[Any]) -> bool:
     """Add a sample to those of a recording, and return whether the recording begins anew with it.
 
-    Then the samples before it, and what was made from them, are dropped: their path is that of another movement.
+    Then the samples before it, and what was made from them, are dropped.
     """
     begins_anew = bool(samples) and sample.stamp_ns <= samples[-1].stamp_ns
     if begins_anew:
@@ -218,10 +214,7 @@ class GuidanceReplay:
 
 
 def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration, ...]:
-    """Return the movements of a recording that end at a goal (`foc_ros.core.learning.movements`), the last ones.
-
-    Raises RecordingError where the recording cannot be read or contains none.
-    """
+    """Return the movements of a recording that end at a goal, the last ones; raises RecordingError where there is none."""
     replayed = Replay(config.with_values({'experience.learning': ONLINE, 'homotopy.library': ''}))
     for _ in replayed.take(recording.items()):
         pass

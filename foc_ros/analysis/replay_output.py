@@ -40,8 +40,8 @@ def replay_to(
 ) -> None:
     """Pass every step of a recording to consumers, and write what was predicted.
 
-    guidance: is updated between the steps; output: new bag for the inputs and what a node would publish; predictions, updates:
-    files for the elements of JSON lists of the predictions and of the updates of guidance.
+    output: new bag for the inputs and what a node would publish; predictions, updates: files for the elements of JSON lists of
+    the predictions and of the updates of guidance.
     """
     types, plane = RosbagsTypes(TYPESTORE), replay.pipeline.config.plane
     with ExitStack() as stack:
@@ -71,11 +71,7 @@ def _write_element(file: TextIO, element: object) -> None:
 
 
 class Summary:
-    """Counts over the steps of one replay, and the wall time of each prediction [s].
-
-    Counted are the hand poses read, the predictions, those with a candidate that has a likelihood, the candidates with one that
-    are compromised or estimated, and the obstacles that a predicted height cleared, over all predictions.
-    """
+    """Counts over the steps of one replay, and the wall time of each prediction [s]."""
 
     def __init__(self) -> None:
         self.seconds: list[float] = []
@@ -97,10 +93,7 @@ class Summary:
             self.seconds.append(step.prediction.solve_s)
 
     def answer(self, counts: Mapping[str, int], duration_s: float) -> dict[str, Any]:
-        """Return all as plain values; counts: of the intake; duration_s: of the recording.
-
-        refused: rejected messages, samples and predictions, and restarts, by kind; failures: candidates by status.
-        """
+        """Return all as plain values; counts: of the intake; duration_s: of the recording."""
         failures = Counter({name.removeprefix(FAILED): count for name, count in counts.items() if name.startswith(FAILED)})
         p50, p99 = (1e3 * np.percentile(self.seconds, (50, 99))).tolist() if self.seconds else (None, None)
         return {

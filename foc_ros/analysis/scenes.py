@@ -3,9 +3,8 @@
 """The scenes of recordings in CSV tables: circles and boxes in the plane with goals, or boxes in space.
 
 Boxes in space are a table of their own: the boxes, walls and targets among which people reached, one scene for each recording.
-The columns are `recording`, `object`, the centre `x_m`, `y_m`, `z_m`, and the full lengths along these axes `width_m`, `depth_m`
-and `height_m`. The object `Target` is the goal of its recording, and no obstacle. Where a table of trials has the column
-`object`, which is what the hand picked up, all objects that are picked up in any recording are goals, and obstacles.
+The object `Target` is the goal of its recording, and no obstacle. Where a table of trials has the column `object`, which is what
+the hand picked up, all objects that are picked up in any recording are goals, and obstacles.
 """
 
 from __future__ import annotations
@@ -35,9 +34,9 @@ NO_GOAL = -1
 class RecordedScene:
     """What a recording took place in.
 
-    obstacles: rows of `encode_obstacles`; goals (g, 3) [m], None where they are unknown; boxes: by name, instead of the rows,
-    x, y, z of the centre and the full lengths along these axes [m]; goal: row of the goal that was reached, `NO_GOAL` if it is
-    not among them, None where no table says it.
+    obstacles: rows of `encode_obstacles`; goals (g, 3) [m], None where they are unknown; boxes: by name, instead of the rows, x,
+    y, z of the centre and the full lengths along these axes [m]; goal: row of the goal that was reached, `NO_GOAL` if it is not
+    among them, None where no table says it.
     """
 
     obstacles: tuple[tuple[float, ...], ...] = ()
@@ -56,10 +55,7 @@ FindScene = Callable[[str], RecordedScene]
 
 
 def read_scenes(obstacles: Path | None, goals: Path | None) -> FindScene:
-    """Read the tables of obstacles and of goals; a column `recording` gives each recording its own rows.
-
-    Raises one RecordingError for the errors of both.
-    """
+    """Read the tables of obstacles and of goals; a column `recording` gives each recording its own rows."""
     readers = [(read_obstacles, obstacles), (read_goals, goals)]
     rows, targets = collect_all(lambda read, file: {} if file is None else read(file), readers)
 
@@ -77,7 +73,7 @@ def read_scenes(obstacles: Path | None, goals: Path | None) -> FindScene:
 def read_obstacles(file: Path) -> dict[str, tuple[tuple[float, ...], ...]]:
     """Return obstacles by recording as rows x, y, z, radius, radius_stddev, id, size_x, size_y, yaw, possibly none.
 
-    Ids default to the position in the rows of the recording. There are at most as many as a message may contain.
+    Ids default to the position in the rows of the recording.
     """
     found: dict[str, dict[int, tuple[float, ...]]] = {}
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands: each signature declares its arguments, each docstring explains them in `--help`.
 
-A command checks its arguments, and reads small files, before it imports what computes: that takes seconds.
+A command checks its arguments before it imports what computes: that takes seconds.
 """
 
 from __future__ import annotations

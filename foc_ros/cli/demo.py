@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""`demo`: plays the packaged recording over DDS in real time to the real node, which runs in a process of its own.
-
-It shows the predictions, and leaves a bag and a report.
-"""
+"""`demo`: plays the packaged recording over DDS in real time to the real node, which runs in a process of its own."""
 
 from __future__ import annotations
 
@@ -141,10 +138,7 @@ def _play_and_report(items: list[Item], output: Path) -> int:
 
 @contextmanager
 def prepare(output: Path) -> Iterator[None]:
-    """Make the output directory and remove bag and report of an earlier demo; no other demo has it within the context.
-
-    Raises InputError for a directory with other contents, and for that of a demo that runs.
-    """
+    """Make the output directory and remove bag and report of an earlier demo; no other demo has it within the context."""
     if output.exists() and not (output / MARK).exists() and (not output.is_dir() or any(output.iterdir())):
         raise InputError('--output', 'a new or empty directory, or one of an earlier demo', f'{output}, which has other contents')
     with make_folder('--output', output):

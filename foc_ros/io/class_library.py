@@ -39,10 +39,7 @@ def load_library(name: str) -> tuple[Demonstration, ...]:
 
 
 def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
-    """Write a library, replacing the file.
-
-    Raises RecordingError if the file cannot be written, InputError for more demonstrations than a library may hold.
-    """
+    """Write a library, replacing the file; RecordingError if that is impossible, InputError for more than it may hold."""
     if len(ways) > MOST_WAYS:
         raise InputError(f'{file}: ways', f'at most {MOST_WAYS}', f'{len(ways)} with the new ones')
     words, rows = {side: word for word, side in SIDES.items()}, []
@@ -68,8 +65,7 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
 def extend_library(file: Path, ways: Sequence[Demonstration]) -> int:
     """Add demonstrations to a library, which is made where there is none; return how many of them it did not contain.
 
-    Processes that do so at once wait for each other, so that the file has what all of them add. Raises as `load_library` and
-    `save_library` do.
+    Processes that do so at once wait for each other. Raises as `load_library` and `save_library` do.
     """
     with lock_folder(file.resolve().parent):
         given = load_library(str(file)) if file.exists() else ()

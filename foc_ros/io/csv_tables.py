@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""CSV tables of measured numbers, checked cell by cell: every error names file, row, column, value and bound.
-
-The errors of all rows are raised together, as one error with notes.
-"""
+"""CSV tables of measured numbers, checked cell by cell: every error names file, row, column, value and bound."""
 
 from __future__ import annotations
 
@@ -102,9 +99,8 @@ def read_rows(
     """Yield the rows of a CSV file with a header; empty lines are skipped, and other columns are allowed.
 
     The separator is found in the header, before which a spreadsheet may name it (`sep=;`). optional: columns that may be missing;
-    instead: columns that together replace a needed one. Raises RecordingError for a file that cannot be read, for one that lacks
-    a needed column, names a column twice or has a misspelt one, and after the last row for rows with more or fewer cells than the
-    header.
+    instead: columns that together replace a needed one. Raises RecordingError for a file that cannot be read, for a wrong header,
+    and after the last row for rows with more or fewer cells than that.
     """
     try:
         with file.open(newline='', encoding='utf-8-sig') as stream:
@@ -142,7 +138,6 @@ def read_rows(
 def _check_header(
     file: Path, cells: list[str], needed: tuple[str, ...], optional: tuple[str, ...], instead: Mapping[str, tuple[str, ...]]
 ) -> list[str]:
-    """Return the names of the columns; see `read_rows`."""
     header = [name.strip() for name in cells]
     if not header:
         raise RecordingError(f'{file}: the file is empty: expected columns {", ".join(needed)}')

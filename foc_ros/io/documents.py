@@ -21,10 +21,7 @@ MAX_DEPTH = 20
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Safe YAML without tags, and without aliases, which can stand for any amount of data.
-
-    PyYAML itself uses the last value of a key that is given twice, and fails in many ways where a value does not fit its tag.
-    """
+    """Safe YAML without tags, without a key that is given twice, and without aliases, which can stand for any amount of data."""
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Return the next node; see :class:`yaml.SafeLoader`."""

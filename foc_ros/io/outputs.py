@@ -29,10 +29,7 @@ def check_file(option: str, file: Path) -> None:
 
 
 def check_new_or_earlier(option: str, file: Path, read: Callable[[Path], object]) -> None:
-    """Raise InputError, which names the option, as `check_file` does, or if a file exists that is no earlier one of the command.
-
-    read: reads an earlier one; raises FocError for another file.
-    """
+    """Raise InputError as `check_file` does, or if a file exists that is no earlier one of the command, by `read`."""
     check_file(option, file)
     try:
         if file.is_file() and file.stat().st_size:
@@ -62,9 +59,9 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
 
 @contextmanager
 def write_whole(file: Path) -> Iterator[Path]:
-    """Yield the path of an unfinished file, which replaces the file when the context ends without an error.
+    """Yield the path of an unfinished file, which replaces the file, or what it links to, when the context ends without an error.
 
-    An earlier file stays until then. A link stays a link. A device is written directly.
+    A device is written directly.
     """
     target = file.resolve()
     if target.exists() and not target.is_file():

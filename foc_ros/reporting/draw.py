@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures for print, by matplotlib: scenes with candidates, and the measured hand.
 
-Every picture shows the same thing in the same way. A path is a solid line that begins at the hand, and is the thicker the more
-likely it is; it is dotted if it is not known to avoid the obstacles as surely as wanted. A path that is no proper prediction,
-because it could not be solved or leads through an obstacle, is a ghost: pale, with the reason beside it. Colours are those of
-Okabe and Ito, which can be told apart without perception of hue, and a letter stands beside each.
+A path is a solid line that begins at the hand, and is the thicker the more likely it is; it is dotted if it is not known to avoid
+the obstacles as surely as wanted. A path that is no proper prediction, because it could not be solved or leads through an
+obstacle, is a ghost: pale, with the reason beside it. Colours are those of Okabe and Ito, which can be told apart without
+perception of hue, and a letter stands beside each.
 """
 
 from __future__ import annotations
@@ -171,8 +171,8 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
     Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
-    has its total uncertainty, too. Ghosts have their reasons beside them. The legend has one line for all below NOTED, and the
-    others in the order of their group identities.
+    has its total uncertainty, too. The legend has one line for all below NOTED, and the others in the order of their group
+    identities.
     """
     goals, entered = len(snapshot.goal_positions), set[str]()
     order = {each.label: f'candidate {row:04d}' for row, each in enumerate(snapshot.candidates)}

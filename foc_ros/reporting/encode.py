@@ -36,10 +36,10 @@ PATH_POINTS = 26
 def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence[Span]) -> dict[str, Any]:
     """Return everything that the page of a report draws, of at most MOST_BYTES; spans: of the movements.
 
-    count: of the predictions; times [s] after the first hand sample, solve_ms, and unknown, the share that no candidate has, of
-    those that are drawn; tracks: for each its slot, the row of its first prediction and its likelihoods from there on; frames:
-    the predictions at which the slider stops; openings: the frame at which each movement opens, and opened: the movement that the
-    page shows first. Obstacles, goals and labels are stored once and referred to by their row.
+    count: of the predictions; unknown: the share that no candidate has; tracks: for each its slot, the row of its first
+    prediction and its likelihoods from there on; frames: the predictions at which the slider stops; openings: the frame at which
+    each movement opens, and opened: the movement that the page shows first. Obstacles, goals and labels are stored once and
+    referred to by their row.
     """
     count, most = len(tracks.snapshots), MOST_FRAMES
     known = {'count': count, 'bounds': [round(each, 4) for each in compute_recording_bounds(hand, tracks.snapshots)]}
@@ -126,10 +126,9 @@ class _ReportData:
 def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
     """Return the candidates with a likelihood, the most likely first.
 
-    ghost: why it is no proper prediction, or ''; ghost_at: share of the path at which that is, or None; t and v: at some of
-    the steps; motor: ellipses of the motor noise, none of a candidate that is less than LIKELY; total: of the uncertainty of the
-    most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard deviation, and the angle of
-    the greater one [degrees].
+    ghost, ghost_at: as of `describe_ghosts`; t and v: at some of the steps; motor: ellipses of the motor noise, none of a
+    candidate that is less than LIKELY; total: of the uncertainty of the most likely candidate, none if that is the same. An
+    ellipse has x, y, greater and smaller standard deviation, and the angle of the greater one [degrees].
     """
     shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
     if not shown:

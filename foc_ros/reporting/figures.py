@@ -104,15 +104,13 @@ def _frame_scene(snapshot: Prediction) -> tuple[Array, Bounds]:
 
 
 def _get_height(bounds: Bounds) -> float:
-    """Return the height [in] of a scene with equal axes and its axis labels."""
     return float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.6
 
 
 def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> None:
-    """Write everything that is drawn on axes into a legend, in a part of their place.
+    """Write all that is drawn on axes into a legend, in a part of their place; a second call replaces it.
 
-    is_added: whether the figure becomes higher by it; otherwise the text is as small as the place needs. A second call replaces
-    the legend of the first.
+    is_added: whether the figure becomes higher by it; otherwise the text is as small as the place needs.
     """
     from matplotlib.lines import Line2D
 

@@ -35,11 +35,7 @@ class PageWarning(NamedTuple):
 
 
 class ReportCollector:
-    """Collects what a report shows.
-
-    Attributes: samples, of the hand; snapshots, as `build_snapshot` and `read_snapshot` make them; runs, of which a replay that
-    begins anew has several.
-    """
+    """Collects what a report shows: samples of the hand, snapshots, and runs, of which a replay that begins anew has several."""
 
     def __init__(self) -> None:
         self.samples: list[HandSample] = []

@@ -165,10 +165,7 @@ def write_fit(
     recordings: Mapping[str, Recording] | None = None,
     config: Config | None = None,
 ) -> None:
-    """Write the page; answer: as of `fit --json`, of recordings, with the fitted configuration.
-
-    Raises InputError where that cannot be done.
-    """
+    """Write the page; answer: as of `fit --json`, of recordings, with the fitted configuration; InputError where it cannot."""
     count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
     fitted = f'{len(answer["parameters"])} parameters were fitted to {count} recordings.'
@@ -241,7 +238,6 @@ def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
-    """Draw the mean of a measure with its interval for every operator and rule."""
     operators, rules = (list(dict.fromkeys(cell[key] for cell in cells)) for key in ('operator', 'assistance'))
     heading, factor, _ = study.COLUMNS[name]
     for number, rule in enumerate(rules):

@@ -44,10 +44,7 @@ THROTTLE_S = 5.0
 
 @dataclass
 class Input:
-    """Messages of one input: numbers received, refused, and received before the last report.
-
-    And when the last one was received, used and refused, and why it was refused.
-    """
+    """Messages of one input: numbers received, refused, and received before the last report; times, and the last refusal."""
 
     received: int = 0
     refused: int = 0
@@ -59,10 +56,7 @@ class Input:
 
 
 class Freshness:
-    """Ages of the inputs of a pipeline: the time since their last message, and the age of a hand pose, if it has ROS time.
-
-    Attributes: inputs, by topic.
-    """
+    """Ages of the inputs of a pipeline: the time since their last message, and the age of a hand pose, if it has ROS time."""
 
     def __init__(self, pipeline: Pipeline) -> None:
         self.inputs: defaultdict[str, Input] = defaultdict(Input)
@@ -84,7 +78,7 @@ class Freshness:
         """Store the age of a hand pose by ROS time.
 
         Ages count once a movement has begun with a pose that is not older or newer than the timeout. If a recording is played
-        with its own stamps and without `use_sim_time`, the age of its poses means nothing, and it is not checked.
+        with its own stamps and without `use_sim_time`, the age of its poses means nothing.
         """
         self._age_s = (clock_ns - stamp_ns) / NANOSECONDS
         if clock_ns and (is_restart or not self._is_moving):
@@ -126,10 +120,7 @@ class Freshness:
         return [each for each in sources if 0.0 < limit_s < now_s - self.used_s(SOURCE_TOPICS[each], now_s)]
 
     def find_late_reason(self, stamp_ns: int, received_s: float, now_s: float, clock_ns: int) -> str | None:
-        """Return why a prediction is not published now that it is computed, None if it is.
-
-        stamp_ns, received_s: stamp of its hand pose [ns], and when that arrived.
-        """
+        """Return why a prediction is not published now that it is computed, None if it is; received_s: when its pose arrived."""
         age_s, limit_s = now_s - received_s, self._pipeline.config.estimator.hand_timeout_s
         if self._has_ros_time:
             age_s = max(age_s, (clock_ns - stamp_ns) / NANOSECONDS)
@@ -146,16 +137,13 @@ class Health(NamedTuple):
     values: dict[str, str]
 
     def encode(self, node_name: str, stamp_ns: int, types: MessageTypes) -> Any:
-        """Return a diagnostic_msgs/DiagnosticArray with one status; node_name: the node's full name, such as '/foc'."""
+        """Return a diagnostic_msgs/DiagnosticArray with one status; node_name: the full one, such as '/foc'."""
         status = self.level, f'{node_name[1:]}: prediction', self.message, node_name, list(self.values.items())
         return types.fill('diagnostic_msgs/msg/DiagnosticArray', (make_header(types, stamp_ns, ''), [status]))
 
 
 class Monitor:
-    """Counts and times of what the node did; :meth:`report` judges what happened since its last call. Attributes: counts.
-
-    Times are of the steady clock [s]; now_s: the present one.
-    """
+    """Counts and times of what the node did; :meth:`report` judges what happened since its last call. Attributes: counts."""
 
     def __init__(self, intake: Intake, freshness: Freshness, now_s: float) -> None:
         self._intake, self._freshness = intake, freshness
@@ -169,9 +157,9 @@ class Monitor:
         self._reported_s = now_s
 
     def note_prediction(self, prediction: Prediction, start_s: float, now_s: float, budget_s: float, late: str | None) -> None:
-        """Count a prediction that was computed and published between two times.
+        """Count a prediction that was computed and published between two times; late: why it was not published, None if it was.
 
-        budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit; late: why it was not published, None if it was.
+        budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit.
         """
         self._solve_ms.append(1e3 * prediction.solve_s)
         self.counts['predict_over_budget'] += 0.0 < budget_s < prediction.solve_s - 0.002
@@ -190,11 +178,7 @@ class Monitor:
         self._error = f'{type(error).__name__}: {error}'
 
     def report(self, now_s: float, state: str, busy_s: float, unheard: Iterable[str]) -> Health:
-        """Return the health since the last call.
-
-        state: of the managed node; busy_s: for how long the present prediction has been computed, 0 if there is none [s];
-        unheard: a text for each publisher that cannot be heard.
-        """
+        """Return the health since the last call; busy_s: for how long a prediction has been computed, 0 if there is none [s]."""
         pipeline, by_clock = self._intake.pipeline, self._freshness.find_not_ready_reason(now_s)
         not_ready_reason = pipeline.not_ready_reason() or (by_clock and by_clock[1])
         totals = Counter(self._intake.counts) + self.counts

@@ -53,10 +53,8 @@ REGIONS = {
 def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[str, Any]:
     """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON.
 
-    What is fitted is scored on recordings that it was not fitted to. `questions`: values of `scores.summarise` by question and
-    predictor; for `gap`, tenths and `right_from_half_way` count from row to row, else over the whole movement. `settings`: by
-    question and predictor, the best for all recordings. `comparisons`: of the published predictions with each baseline, by
-    question. `positions`: values of `positions.compute_position_scores`. `verdict`: sentences.
+    What is fitted is scored on recordings that it was not fitted to. For `gap`, tenths and `right_from_half_way` count from row
+    to row, else over the whole movement.
     """
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
@@ -118,8 +116,7 @@ def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -
     """Return both texts for each recording whose label is not the path class that was taken; none where there are no labels.
 
     The columns of labels.csv after the first are the gaps taken, row by row, counted from low x. The column `sides` of trials.csv
-    has the side of each box by the end of its name; where it says which object was picked up instead, that is the truth already.
-    Raises RecordingError for a table that cannot be read.
+    has the side of each box by the end of its name. Raises RecordingError for a table that cannot be read.
     """
     trials, labels = data / TRIALS, data / LABELS
     compare: Callable[[Observation, Mapping[str, str]], str]

@@ -39,9 +39,9 @@ Sides = NDArray[np.int8]
 class RecordedPath:
     """A recorded path, whose movement ends where it is nearest to the goal that it reached.
 
-    goal: row of the one that was reached, or `NO_GOAL`; None to find it. Attributes: stamps_ns (m,), positions (m, 2) [m], goals
-    (g, 2) [m]; goal: row of the goal reached, None where none was; end_ns: when the movement ends; travelled (m,): distance
-    travelled so far [m]; progress (m,): its share of the movement.
+    Attributes: stamps_ns (m,), positions (m, 2) [m], goals (g, 2) [m]; goal: row of the goal reached, None where none was;
+    end_ns: when the movement ends; travelled (m,) [m]: so far; progress (m,): its share of the movement. The argument goal is
+    None to find it.
     """
 
     def __init__(self, stamps_ns: NDArray[np.int64], positions: Array, goals: Array, goal: int | None = None) -> None:
@@ -115,11 +115,10 @@ def read_hand(recording: Recording, config: Config) -> RecordedHand:
 class GroundTruth(Record):
     """What the hand really did after one prediction.
 
-    sides (n,): LEFT or RIGHT, the side of each obstacle on which the rest of the path runs; is_ahead (n,): whether the row of the
-    obstacle is still to be passed; goal: row of the goal that was reached, None where none was, or where the goals were other
-    ones; positions (h, 2) [m]: at `TIMES_S`, nan beyond the end; progress in [0, 1]: share of the movement so far; approach in
-    [0, 1]: share of the distance from the last row, or the start, to the next one, nan where no row is to come; left_s: time to
-    the end of the movement [s].
+    sides (n,): LEFT or RIGHT, on which the rest of the path passes each obstacle; is_ahead (n,): whether its row is still to be
+    passed; goal: row of the goal that was reached, None where none was, or where the goals were other ones; positions (h, 2) [m]:
+    at `TIMES_S`, nan beyond the end; progress: share of the movement so far; approach: share of the distance from the last row,
+    or the start, to the next one, nan where no row is to come; left_s: time to the end of the movement [s].
     """
 
     sides: Sides
@@ -161,7 +160,7 @@ def find_ground_truth(
 def find_open_gaps(obstacles: Obstacles, row: Rows, direction: Array, hand_radius: float) -> tuple[Sides, ...]:
     """Return for each row the sides (k, n) on which a path through one of its k open gaps passes its obstacles, 0 for all others.
 
-    A gap is open if it is wider than the hand, hand_radius [m]; the outer gaps of a row are those between it and the walls.
+    A gap is open if it is wider than the hand; the outer gaps of a row are those between it and the walls.
     """
     left = np.array([-direction[1], direction[0]])
     corners = obstacles.centre[:, None] + obstacles.vertices  # two convex polygons that are apart are nearest at a vertex of one

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fitting: recordings of an operator enter; the parameters that explain them best leave.
 
-What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings (Efron 1979,
-doi:10.1214/aos/1176344552) and the cross-validation are exact. A parameter that the recordings do not determine keeps its given
-value: where its profile, the best log-likelihood over all other parameters, is flat, hardly better than at the given value, or
-best at the end of what was tried.
+What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings and the
+cross-validation are exact. A parameter that the recordings do not determine keeps its given value: where its profile, the best
+log-likelihood over all other parameters, is flat, hardly better than at the given value, or best at the end of what was tried.
 """
 
 from __future__ import annotations
@@ -50,8 +49,8 @@ class Estimate:
 class Findings:
     """What one step of a fit found.
 
-    estimates by name; chosen: values that are no numbers; undetermined: why a parameter keeps its given value, by name; scores:
-    as plain values; warnings.
+    chosen: values that are no numbers, by name; undetermined: why a parameter keeps its given value, by name; scores: as plain
+    values.
     """
 
     estimates: dict[str, Estimate] = field(default_factory=dict)
@@ -122,7 +121,7 @@ class SettingTable:
         return [self.settings[each] for each in choose_held_out(np.nan_to_num(self.values), groups)]
 
     def list_choices(self, given: Setting, names: Sequence[str]) -> dict[str, list[Setting]]:
-        """Return the settings chosen for the recordings (n,), of these names, by how they were chosen."""
+        """Return the settings of these names chosen for the recordings (n,), by how they were chosen."""
         choices = {'as given': [given] * len(names), 'fitted': [self.best] * len(names)}
         return choices | ({'without the recording': self.choose_held_out(names)} if is_cross_validated(names) else {})
 
@@ -131,10 +130,10 @@ class SettingTable:
         return float(np.nanmean([row[self.settings.index(each)] for row, each in zip(self.values, chosen, strict=True)]))
 
     def determine(self, given: Setting) -> tuple[SettingTable, dict[str, str]]:
-        """Find the parameters that the recordings do not determine.
+        """Return the settings that are left without the parameters that are not determined, and why they are not, by name.
 
-        They keep their given values, one after the other, the flattest first, because one that is kept may determine another.
-        Return the settings that are left, and the reasons by name. The given values are among the settings.
+        These keep their given values, which are among the settings, one after the other, the flattest first, because one that is
+        kept may determine another.
         """
         left, undetermined = self, dict[str, str]()
         while True:

@@ -56,10 +56,7 @@ Rows = list[tuple[str, ...]]
 
 @dataclass
 class Fit(Findings):
-    """The findings of all steps so far, and the configuration with them.
-
-    recordings: how many are used; failed recordings with reasons; comparison: of given and fitted parameters.
-    """
+    """The findings of all steps so far, and the configuration with them; comparison: of given and fitted parameters."""
 
     config: Config = field(default_factory=Config)
     recordings: int = 0
@@ -132,10 +129,9 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
 def compare_configs(
     recordings: Mapping[str, Recording], configs: tuple[Config, Config], thinned: Mapping[str, object]
 ) -> dict[str, dict[str, float | None]]:
-    """Return the measures of two configurations, `before` and `after`, by measure, from the recordings that both predict.
+    """Return the measures `COMPARISON_TITLES` of two configurations, `before` and `after`, from the recordings that both predict.
 
-    thinned: parameters of these replays alone. The measures are those of `COMPARISON_TITLES`; the position is the
-    likelihood-weighted one.
+    thinned: parameters of these replays alone.
     """
     replays = []
     for config, words in zip(configs, ('before', 'after'), strict=True):

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters for which one replay of the recordings is enough: of the likelihood, and those that widen the covariance.
 
-The latter, process noise, scatter of the end point and spread of the duration, change no plan. In the covariances they can be
-exchanged, so that all of them are tried on observations with the given ones, by the density of the true positions under the
-mixture of the candidates.
+The latter, process noise, scatter of the end point and spread of the duration, change no plan. All of them are tried on
+observations with the given ones, by the density of the true positions under the mixture of the candidates.
 """
 
 from __future__ import annotations
@@ -58,8 +57,7 @@ FEW_WIDENINGS = tuple(product((0.0, *PROCESS_NOISES[1::4]), (0.0, 3e-3, 8e-3, 24
 def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
     """Return the parameters of the likelihood, from one replay of the recordings.
 
-    Scores `ways`: mean log-likelihoods by how the setting was chosen, with at least three recordings also held out, by recording
-    and by the class taken; none where no class or goal is in question.
+    Scores `ways`: mean log-likelihoods by how the setting was chosen, none where no class or goal is in question.
     """
     questions = [ask_main(each) for each in recordings]
     if not any(questions):
@@ -97,10 +95,7 @@ def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
 
 
 def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
-    """Return the parameters that widen the covariance.
-
-    Scores: mean log-densities and coverage by how the widening was chosen, with at least three recordings also held out.
-    """
+    """Return the parameters that widen the covariance; scores: mean log-densities and coverage by how the widening was chosen."""
     before = flatten(config)
     given = {name: float(before[name]) for name in WIDENINGS}
     settings = list_settings({name: (0.0, given[name], *TRIED_WIDENINGS[name]) for name in WIDENINGS})
@@ -124,10 +119,9 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Fin
 
 
 def compute_mean_densities(observation: Observation, shares: Array, widenings: Iterable[Sequence[float]]) -> Array | None:
-    """Return the log-density of the true positions, the mean over the horizons, under each widening, (q,) [nat, metres].
+    """Return the log-density of the true positions, the mean over the horizons, under each of the `WIDENINGS` (q,) [nat, metres].
 
-    shares (k,): of the candidates; widenings: values of `WIDENINGS`. None where the movement ends before the first horizon
-    or has not begun, because a hand at rest shows how long it waits, not how it moves.
+    None where the movement ends before the first horizon, and of a hand at rest, which shows how long it waits, not how it moves.
     """
     if observation.movement_age_s == 0.0 or not shares.any() or np.isnan(observation.truth.positions[HORIZONS[0], 0]):
         return None
@@ -147,7 +141,7 @@ def compute_coverage(
     """Return the shares of true positions of moving hands after 0.5 s inside 90 % ellipses and regions.
 
     inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; chosen (n,): the
-    widening of each recording, so that each can be judged by one that it did not influence.
+    widening of each recording.
     """
     moving = []
     for recording, setting in zip(recordings, chosen, strict=True):

@@ -3,13 +3,12 @@
 """Parameters of the predictor itself, each setting of which needs replays: a race of settings.
 
 A setting has two scores, means over the recordings. The score of classes is the log-likelihood of the homotopy class that was
-taken plus that of the gap taken in the next row, or without obstacles that of the goal. (Assistance acts on the next gap first,
-and less chance is in it than in choices that the operator has yet to make.) The score of positions is the log-density of the true
-ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates, by which settings are ranked that are alike in classes. Both are
-proper scores: no setting gains by claiming more or less than it knows. What needs no replay, the parameters of the likelihood and
-the widening of the covariance, is at its best for each setting. The race is successive halving (Jamieson and Talwalkar 2016,
-arXiv:1502.07943): all settings predict a few recordings, the better half of them twice as many, and so on. The given setting
-stays unless another one is better by more than chance.
+taken plus that of the gap taken in the next row, on which assistance acts first, or without obstacles that of the goal. The score
+of positions is the log-density of the true ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates, by which settings
+are ranked that are alike in classes. What needs no replay, the parameters of the likelihood and the widening of the covariance,
+is at its best for each setting. The race is successive halving (Jamieson and Talwalkar 2016, arXiv:1502.07943): all settings
+predict a few recordings, the better half of them twice as many, and so on. The given setting stays unless another one is better
+by more than chance.
 """
 
 from __future__ import annotations
@@ -65,8 +64,7 @@ def make_eta_settings(config: Config, may_be_lower: bool) -> list[Config]:
 def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
     """Return every combination of model, duration, arrival and whether accelerations fade, the given one first.
 
-    Where a goal that is passed is modelled as one where the hand stops, no duration is right, nor where an acceleration that
-    lasts is modelled as one that fades.
+    Where a goal that is passed is modelled as one where the hand stops, no duration is right.
     """
     models = [config]
     if config.duration.model != 'fitts':
@@ -84,7 +82,6 @@ def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> lis
 
 
 def _scale(config: Config, names: Iterable[str], factor: float) -> Config:
-    """Multiply each of the parameters by a factor."""
     before = flatten(config)
     return replace_values(config, {name: clip_to_bounds(name, factor * float(before[name])) for name in names})
 
@@ -132,7 +129,6 @@ class Replays:
 
 
 def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> tuple[int, ReplayScores]:
-    """Score the predictions of one setting in a recording; return its number and the scores."""
     number, given, config, thinned = item
     config = replace_values(config, thinned)
     recording, found = observe(given, config, with_plans=True), ReplayScores({}, {})
@@ -240,10 +236,7 @@ def find_behind(scores: Array, errors: float) -> NDArray[np.bool_]:
 
 
 def is_better(scores: Array, given: Array) -> bool:
-    """Return whether a setting is better than the given one, in classes or in positions, by more than chance (Student's t).
-
-    scores, given (2, n): of classes and of positions.
-    """
+    """Return whether a setting beats the given one in classes or in positions (2, n), by more than chance (Student's t)."""
     difference, n = scores - given, scores.shape[1]
     if n < 2:
         return False

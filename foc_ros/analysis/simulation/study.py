@@ -146,8 +146,8 @@ def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: A
 def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
     """Return the measures of a trial by name.
 
-    The opposing impulse is the integral of the force of the assistance against the direction in which the operator intends to
-    move, and the opposing share its mean as a share of the largest force.
+    The opposing impulse is the integral of the force against the direction of the intended movement, the opposing share its mean
+    as a share of the largest force.
     """
     clearance, duration_s = float(trial.measure_clearances(task).min()), DT * len(trial.position)
     velocity = task.path[: len(trial.position), 1]
@@ -218,8 +218,7 @@ def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
 def summarise(results: Sequence[PairResult], seed: int) -> list[dict[str, Any]]:
     """Return a cell for each operator and rule: number of trials, and every measure with its interval.
 
-    `<name>_interval` is a bootstrap interval of 95 % of the mean; `<name>_difference` and `<name>_difference_interval` are those
-    of the paired difference to `none`. None where there is nothing to average, or the value is not finite.
+    `<name>_difference` is the paired difference to `none`. None where there is nothing to average, or the value is not finite.
     """
     cells = []
     for operator in dict.fromkeys(each.operator for each in results):

@@ -44,10 +44,7 @@ def render(template: str, **values: Any) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: sentences, pictures, and a table below notes that explain it, whichever of them it has.
-
-    pictures: each as PNG in base64, and its caption; the first cell of a row is its heading.
-    """
+    """A part of a page: sentences, pictures, and a table below notes that explain it, whichever of them it has."""
 
     heading: str = ''
     sentences: Sequence[str] = ()
@@ -62,8 +59,7 @@ def write_page(
 ) -> None:
     """Write a page with warnings on top, and what made it below: program, date, machine, and parameters unlike their defaults.
 
-    The folder is made if necessary. A page that foc_ros has made is replaced. Raises InputError where that cannot be done, or
-    another file has its name.
+    A page that foc_ros has made is replaced. Raises InputError where it cannot be written, or another file has its name.
     """
     check_replaceable('--report', directory / name)
     system = f'{platform.system()} on {platform.machine()} with {os.cpu_count()} processors, Python {platform.python_version()}'

@@ -65,7 +65,7 @@ def compute_rotation(quaternion: Any) -> Array:
 def make_heights(middle: ArrayLike, size: ArrayLike) -> Array:
     """Return the lowest and the highest point (..., 2) of bodies of sizes (...) about their middles (...) along the normal [m].
 
-    The height of a body without a size is not known: it is unbounded.
+    That of a body without a size is not known: it is unbounded.
     """
     half = np.where(np.asarray(size) >= FLAT, np.asarray(size) / 2.0, np.inf)
     heights: Array = np.stack((middle - half, middle + half), axis=-1)
