@@ -13,10 +13,9 @@ from typing import Any
 
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.classes.library import Demonstration
-from foc_ros.core.config import ONLINE, Config
+from foc_ros.core.config import ONLINE, Config, replace_values
 from foc_ros.core.errors import MessageError, RecordingError, warn
-from foc_ros.core.guidance.guide import GuidanceInput, GuidanceOutput, GuidanceState, GuidanceStatus, guide
-from foc_ros.core.hand.kalman import FilterState
+from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import Scene
@@ -24,6 +23,7 @@ from foc_ros.core.types import NANOSECONDS, HandSample, SampleStatus
 from foc_ros.io.bags import BagReader, Item
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
+from foc_ros.ros.guidance import GuidanceLoop
 from foc_ros.ros.intake import DROPPED, Intake
 from foc_ros.ros.messages.encode_guidance import SampleHeader
 from foc_ros.ros.transforms import Transforms, TransformTree
@@ -159,58 +159,44 @@ def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = N
                 yield step.prediction
 
 
-@dataclass(frozen=True)
-class GuidanceStep:
-    """One update: its stamp [ns], where its hand sample was, and its output."""
-
-    stamp_ns: int
-    header: SampleHeader
-    output: GuidanceOutput
+GuidanceUpdate = tuple[int, GuidanceOutput, SampleHeader]
+"""Stamp [ns] of an update, its output, and where its hand sample was."""
 
 
 class GuidanceReplay:
-    """Updates guidance between the steps of a replay, at `guidance.rate_hz`, as a node that receives messages without delay.
-
-    An update at an instant knows the hand samples and predictions of stamps before it. Between movements, while there is no force
-    and no fresh prediction, there are no updates.
-    """
+    """Updates guidance between the steps of a replay, at `guidance.rate_hz`, as a node that receives messages without delay."""
 
     def __init__(self, pipeline: Pipeline) -> None:
-        self._pipeline = pipeline
-        self._period_ns = round(NANOSECONDS / pipeline.config.guidance.rate_hz)
-        self._state, self._first_ns, self._next_ns = GuidanceState(), 0, 0
-        self._hand: FilterState | None = None
-        self._prediction: Prediction | None = None
+        self._pipeline, self._config = pipeline, replace_values(pipeline.config, {'guidance.enabled': True})
+        self._period_ns = round(NANOSECONDS / self._config.guidance.rate_hz)
+        self._first_ns = self._hand_ns = self._next_ns = 0
+        self._loop: GuidanceLoop | None = None
+        self._updates: list[GuidanceUpdate] = []
 
-    def add(self, step: Step) -> Iterator[GuidanceStep]:
-        """Yield the updates until the hand sample of a step, then use its sample and its prediction."""
+    def add(self, step: Step) -> list[GuidanceUpdate]:
+        """Return the updates until the hand sample of a step, then use its sample and its prediction."""
+        self._updates = []
         if step.sample is None:
-            return
-        stamp_ns, hand = step.sample.stamp_ns, self._pipeline.hand_state
-        if self._hand is None or stamp_ns < self._hand.stamp_ns:  # the recording began anew
-            self._state, self._first_ns, self._next_ns, self._prediction = GuidanceState(), stamp_ns, stamp_ns, None
-        else:
-            yield from self._update_until(stamp_ns, self._hand)
-            if hand is not None and not self._hand.is_continued_by(hand):
-                self._state, self._prediction = replace(self._state, position=hand.mean[:2]), None
-        self._hand = hand
-        if step.prediction is not None:
-            self._prediction = step.prediction
-
-    def _update_until(self, end_ns: int, hand: FilterState) -> Iterator[GuidanceStep]:
-        config, prediction = self._pipeline.config, self._prediction
-        while self._next_ns < end_ns:
-            prediction_ns = self._next_ns if prediction is None else prediction.stamp_ns
-            ages = (self._next_ns - hand.stamp_ns) / NANOSECONDS, (self._next_ns - prediction_ns) / NANOSECONDS
-            # seconds since the epoch would be rounded to a quarter of a microsecond
-            t = (self._next_ns - self._first_ns) / NANOSECONDS
-            given = GuidanceInput(t, hand.mean[:2], hand.mean[2:4], prediction, *ages, acceleration=hand.mean[4:6])
-            output, self._state = guide(config, self._state, given)
-            yield GuidanceStep(self._next_ns, SampleHeader(hand.stamp_ns, hand.frame_id, hand.height, config.plane), output)
+            return self._updates
+        stamp_ns = step.sample.stamp_ns
+        if self._loop is None or stamp_ns < self._hand_ns:  # the recording begins, or begins anew
+            self._loop = GuidanceLoop(self._config, self._keep)
+            self._loop.set_released(False)
+            self._first_ns = self._next_ns = stamp_ns
+        while self._next_ns < stamp_ns:
+            self._loop.update(self._seconds(self._next_ns))
             self._next_ns += self._period_ns
-            if output.status is not GuidanceStatus.GUIDING and not output.force.any() and not output.authority:
-                self._next_ns = max(self._next_ns, end_ns)
-                self._state = replace(self._state, t=(self._next_ns - self._first_ns) / NANOSECONDS)
+        self._loop.note_hand(self._pipeline.hand_state, self._seconds(stamp_ns))
+        if step.prediction is not None:
+            self._loop.note_prediction(step.prediction, self._seconds(stamp_ns))
+        self._hand_ns = stamp_ns
+        return self._updates
+
+    def _keep(self, output: GuidanceOutput, header: SampleHeader) -> None:
+        self._updates.append((self._next_ns, output, header))
+
+    def _seconds(self, stamp_ns: int) -> float:
+        return (stamp_ns - self._first_ns) / NANOSECONDS  # since the epoch they would be rounded to a quarter of a microsecond
 
 
 def learn_recording(recording: Recording, config: Config) -> tuple[Demonstration, ...]:

@@ -47,12 +47,12 @@ def replay_to(
     with ExitStack() as stack:
         writer = None if output is None else stack.enter_context(BagWriter(output))
         for step in replay.steps(show_progress(reader, 'replay', reader.message_count)):
-            for update in guidance.add(step) if guidance is not None else ():
+            for stamp_ns, guided, header in guidance.add(step) if guidance is not None else ():
                 if updates is not None:
-                    _write_element(updates, encode_guidance(update.stamp_ns, update.output))
+                    _write_element(updates, encode_guidance(stamp_ns, guided))
                 if writer is not None:
                     for name, (_, encode) in GUIDANCE_OUTPUTS.items():
-                        writer.write(f'{NODE}/{name}', encode(update.output, update.header, types), step.item.log_ns)
+                        writer.write(f'{NODE}/{name}', encode(guided, header, types), step.item.log_ns)
             for consume in consumers:
                 consume(step)
             if writer is not None:

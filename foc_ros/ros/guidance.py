@@ -75,8 +75,8 @@ class GuidanceLoop:
         self,
         config: Config,
         publish: Callable[[GuidanceOutput, SampleHeader], None],
-        report: Callable[[Exception], None],
-        warn: Callable[[str], None],
+        report: Callable[[Exception], None] = lambda _: None,
+        warn: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.newest = Newest(config)
         self.output: GuidanceOutput | None = None
