@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -195,45 +195,36 @@ def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
     """Yield the tables of an answer of `evaluate --json`."""
-    questions = answer['questions']
-    tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
+    questions, tenths = answer['questions'], ('', *(str(tenth + 1) for tenth in range(TENTHS)))
     for name, subject in ((PATH_CLASS, 'Homotopy class'), (GOAL, 'Goal')):
         if name in questions:
             title, scores = f'{subject}: log-likelihood above uniform [nat]', questions[name].items()
-            gains = [(predictor, *(_number(tenth['gain'], 1.0, 2) for tenth in each['by_tenth'])) for predictor, each in scores]
+            gains = [_show_row(predictor, (tenth['gain'] for tenth in each['by_tenth'])) for predictor, each in scores]
             yield f'{title}, by tenths of the movement', tenths, gains
             totals = [
-                (predictor, *(_number(each[score], factor, digits) for score, factor, digits in TOTALS.values()))
+                (predictor, *(_show(each[score], factor, digits) for score, factor, digits in TOTALS.values()))
                 for predictor, each in scores
             ]
             yield f'{title}, of all', ('', *TOTALS), totals
     if GAP in questions:
         scores = questions[GAP].items()
-        yield (
-            GAP_TITLE,
-            tenths,
-            [(predictor, *(_number(tenth['right'], 100.0, 0) for tenth in each['by_tenth'])) for predictor, each in scores],
-        )
-        halves: list[tuple[str, ...]] = [
-            (predictor, _number(each['right_from_half_way'], 100.0, 1)) for predictor, each in scores
-        ]
+        shares = [_show_row(predictor, (tenth['right'] for tenth in each['by_tenth']), 100.0, 0) for predictor, each in scores]
+        yield GAP_TITLE, tenths, shares
+        halves = [_show_row(predictor, [each['right_from_half_way']], 100.0, 1) for predictor, each in scores]
         yield 'Gap in the next row', ('', 'correct in the second half [%]'), halves
-    positions = answer['positions']
-    horizons = [f'{each:g}' for each in HORIZONS_S]
-    columns = ('', *(f'{each} s' for each in horizons))
-    errors = [
-        (name, *(_number(by[each], 1e3, 1) for by in kinds.values() for each in horizons))
-        for name, kinds in positions['displacement_m'].items()
-    ]
-    yield 'Displacement error [mm]', ('', *(f'{kind}\n{each} s' for kind in ('average', 'final') for each in horizons)), errors
-    densities = [(name, *(_number(by[each], 1.0, 2) for each in horizons)) for name, by in positions['nlpd'].items()]
-    yield 'Negative log-density of the true position [nat, metres]', columns, densities
-    inside = [
-        (f'{words}, {100 * float(level):g} %', *(_number(by[each], 100.0, 1) for each in horizons))
+    positions, horizons = answer['positions'], [f'{each:g} s' for each in HORIZONS_S]
+    columns = ('', *(f'{kind}\n{each}' for kind in ('average', 'final') for each in horizons))
+    errors = positions['displacement_m'].items()
+    rows = [_show_row(name, (error for by in kinds.values() for error in by.values()), 1e3, 1) for name, kinds in errors]
+    yield 'Displacement error [mm]', columns, rows
+    rows = [_show_row(name, by.values()) for name, by in positions['nlpd'].items()]
+    yield 'Negative log-density of the true position [nat, metres]', ('', *horizons), rows
+    rows = [
+        _show_row(f'{words}, {100 * float(level):g} %', by.values(), 100.0, 1)
         for name, words in REGIONS.items()
         for level, by in positions[name].items()
     ]
-    yield 'True positions inside [%]', columns, inside
+    yield 'True positions inside [%]', ('', *horizons), rows
     facts: list[tuple[str, ...]] = [
         ('recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'),
         ('predictions', str(answer['predictions'])),
@@ -252,5 +243,9 @@ def _format_setting(setting: Any) -> str:
     return f'{setting:.4g}' if isinstance(setting, float) else str(setting)
 
 
-def _number(value: float | None, factor: float, digits: int) -> str:
+def _show_row(name: str, values: Iterable[float | None], factor: float = 1.0, digits: int = 2) -> tuple[str, ...]:
+    return name, *(_show(each, factor, digits) for each in values)
+
+
+def _show(value: float | None, factor: float, digits: int) -> str:
     return '-' if value is None else f'{factor * value:.{digits}f}'
