@@ -166,8 +166,7 @@ def replay(
     check_bag(bag)
     if output is not None:
         check_new_bag(output)
-    from foc_ros.analysis.replay import GuidanceReplay, Replay
-    from foc_ros.analysis.replay_output import Summary, facts, replay_to
+    from foc_ros.analysis.replay import GuidanceReplay, Replay, Summary, facts, replay_to
     from foc_ros.io.bags import BagReader
     from foc_ros.io.class_library import extend_library
     from foc_ros.io.terminal import show_address, show_table

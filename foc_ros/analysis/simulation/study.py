@@ -101,9 +101,8 @@ class FocAssistance(Assistance):
         return False
 
 
-Rules = Mapping[str, type[Assistance]]
-RULES: Rules = {NONE: Assistance, FOC: FocAssistance}
-"""The rules of `simulate` by name. A study may have others: they need a task and a configuration, as `Assistance` has them."""
+RULES: dict[str, type[Assistance]] = {NONE: Assistance, FOC: FocAssistance}
+"""The rules of `simulate` by name. A study may add others, which are made from a task and a configuration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +199,7 @@ def make_pairs(
     ]
 
 
-def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
+def run_pair(pair: Pair, config: Config, rules: Mapping[str, type[Assistance]] = RULES) -> PairResult:
     """Run all rules of a pair."""
     rng = np.random.default_rng([pair.seed, OPERATORS.index(pair.operator), pair.number])
     task = pair.task or draw_task(pair.operator, rng, config.scene.hand_radius)
