@@ -57,11 +57,7 @@ class Step:
 
 
 class Replay:
-    """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts.
-
-    Transforms of the recording are applied by the log times of the messages. Raises RecordingError or InputError where the class
-    library cannot be used.
-    """
+    """Feeds recorded messages to a pipeline as the node does live; `intake` keeps the counts. Raises as `load_library` does."""
 
     def __init__(self, config: Config) -> None:
         self.pipeline = Pipeline(config, load_library(config.homotopy.library))
@@ -243,8 +239,7 @@ def replay_to(
 ) -> None:
     """Pass every step of a recording to consumers, and write what was predicted.
 
-    output: new bag for the inputs and what a node would publish; predictions, updates: files for the elements of JSON lists of
-    the predictions and of the updates of guidance.
+    output: new bag; predictions, updates: files for the elements of JSON lists of the predictions and of the updates of guidance.
     """
     types, plane = RosbagsTypes(TYPESTORE), replay.pipeline.config.plane
     with ExitStack() as stack:

@@ -42,10 +42,7 @@ PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
 
 
 class Recorder(ReportCollector):
-    """Keeps the hand samples that a demo sends and the predictions that it receives.
-
-    Attributes: delays [s], from a hand sample to its prediction; health, the values of the node's diagnostics by name.
-    """
+    """Keeps the hand samples that a demo sends, the predictions that it receives, their delays [s], and the diagnostics."""
 
     def __init__(self, config: Config) -> None:
         super().__init__()

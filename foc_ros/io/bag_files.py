@@ -178,10 +178,7 @@ class McapFile:
 
 
 def add_checksums(file: Path) -> None:
-    """Write the checksums of chunks, data section and summary into an MCAP file without compression: rosbags writes none.
-
-    See https://mcap.dev/spec. Raises OSError.
-    """
+    """Write the checksums into an MCAP file without compression (https://mcap.dev/spec): rosbags writes none. Raises OSError."""
     chunk, data_end, footer, head = 0x06, 0x0F, 0x02, struct.Struct('<BQ')
     with file.open('r+b') as stream, mmap(stream.fileno(), 0) as content, memoryview(content) as data:
         start, summary, code = len(MAGIC), 0, 0
@@ -203,8 +200,7 @@ def add_checksums(file: Path) -> None:
 class SqliteFile:
     """A file of SQLite in any version that rosbag2 has written; a stack closes it.
 
-    A file whose recorder was killed has a log of its last transactions beside it. It is read with them, from a copy: SQLite would
-    otherwise write into the recording.
+    With the log of a recorder that was killed it is read from a copy: SQLite would otherwise write into the recording.
     """
 
     is_counted = False

@@ -135,10 +135,7 @@ class BagReader:
 
 
 class BagWriter:
-    """A new bag, within a context manager: a directory with metadata.yaml and one .mcap file with checksums, rosbag2 version 9.
-
-    An existing path is refused, and an unfinished bag is removed. Raises RecordingError.
-    """
+    """A new bag, within a context: a directory with metadata.yaml and one .mcap file with checksums; else RecordingError."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)

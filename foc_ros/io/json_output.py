@@ -62,10 +62,7 @@ def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
 
 
 def encode_solution(solution: Solution) -> dict[str, Any]:
-    """Return what `encode_candidate` leaves out of a solution; units are those of :class:`Solution`.
-
-    rows: the active contacts; acceleration is null if the state of the plant holds only position and velocity.
-    """
+    """Return what `encode_candidate` leaves out of a solution, whose units are those of :class:`Solution`; rows: the contacts."""
     contacts = zip(solution.multipliers, solution.equivalent_weights, strict=True)
     places = {name: getattr(solution, name) for name in ('eta_at', 'violation_at')}
     values = {

@@ -59,10 +59,7 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
 
 @contextmanager
 def write_whole(file: Path) -> Iterator[Path]:
-    """Yield the path of an unfinished file, which replaces the file, or what it links to, when the context ends without an error.
-
-    A device is written directly.
-    """
+    """Yield the path of an unfinished file, which replaces the file, or what it links to, if the context ends without an error."""
     target = file.resolve()
     if target.exists() and not target.is_file():
         yield target
@@ -77,10 +74,7 @@ def write_whole(file: Path) -> Iterator[Path]:
 
 @contextmanager
 def lock_folder(folder: Path, *, waits: bool = True) -> Iterator[None]:
-    """Let one process at a time continue for a folder, where its system and its file system can; a lock ends with its process.
-
-    Raises BlockingIOError where another process has the lock, unless it `waits`.
-    """
+    """Let one process at a time continue for a folder, where its system can; unless it `waits`, raise BlockingIOError."""
     if sys.platform == 'win32':
         yield
         return

@@ -70,8 +70,8 @@ def write_report(
 ) -> Path:
     """Write `REPORT_FILES` into a directory, replacing an earlier report; return the page.
 
-    snapshots: in order of their stamps; summary: facts for a table of the page; tables: further ones. Raises InputError if the
-    directory cannot be written or contains other files of those names, or if the hand has no sample.
+    summary: facts for a table of the page; tables: further ones. Raises InputError if that is impossible, or the hand has no
+    sample.
     """
     check_page('--report', directory, *REPORT_FILES)
     if not len(hand.stamps_ns):

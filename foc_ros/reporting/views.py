@@ -34,10 +34,7 @@ ONSET_SPEED, PAUSE_S, LEAST_M = 0.05, 0.15, 0.03
 
 
 def build_snapshot(prediction: Prediction) -> Prediction:
-    """Return a prediction as pictures and reports show it; raises FocError if it holds a number that is not finite.
-
-    The candidate that is called most likely comes first. Of the states only positions and velocities are kept, to save memory.
-    """
+    """Return a prediction as pictures and reports show it, most likely first; FocError if a number is not finite."""
     kept = []
     for each in (*order_candidates(prediction), *list_unsolved(prediction)):
         solution, motor = each.solution, each.solution.motor_covariance
@@ -121,10 +118,7 @@ def count_likely_paths(snapshot: Prediction) -> float:
 
 
 def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -> int | None:
-    """Return the row of the snapshot of a movement that is the most worth seeing, None where the movement has none.
-
-    It has the most likely paths of those on the way, once the filter of the hand has settled.
-    """
+    """Return the row of the snapshot of a movement with the most likely paths on the way, None where the movement has none."""
     during = {row: each for row, each in enumerate(snapshots) if start_ns <= each.stamp_ns <= end_ns and each.most_likely}
     if not during:
         return None
@@ -216,10 +210,7 @@ def parse_sides(label: str, ids: Collection[str]) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class CandidateTracks:
-    """Snapshots with their candidates by track; slots: of the tracks with a letter and colour.
-
-    tracks: for each snapshot, the number of the track of each candidate, by label.
-    """
+    """Snapshots, for each of them the track of each candidate by label, and the slots of the tracks with a letter and colour."""
 
     snapshots: Sequence[Prediction]
     tracks: Sequence[Mapping[str, int]]
@@ -246,10 +237,7 @@ class Slots:
         self._turn = 0
 
     def assign(self, ways: Sequence[int]) -> list[int | None]:
-        """Return the slots of the present classes, by their numbers; a class that finds none has None.
-
-        A slot whose colour (slot modulo COLOURS) is unused is preferred, then the one that has been free for longest.
-        """
+        """Return the slots of the present classes, by their numbers: of another colour and long free if possible, or None."""
         self._turn += 1
         slots = {way: slot for slot, way in self._owners.items() if way in ways}
         for way in ways:
@@ -264,10 +252,7 @@ class Slots:
 
 
 def build_candidate_tracks(snapshots: Sequence[Prediction]) -> CandidateTracks:
-    """Return the candidates of successive snapshots by track, and the letters and colours of the tracks.
-
-    A track lasts as long as its class has one letter. Tracks are numbered from 0 in order of their appearance.
-    """
+    """Return the candidates of successive snapshots by track, which lasts as long as its class has one letter."""
     given, numbers, tracks = Slots(), dict[tuple[int, int | None], int](), list[dict[str, int]]()
     for snapshot in snapshots:
         shown = snapshot.candidates_with_likelihood

@@ -95,10 +95,7 @@ class Freshness:
         return now_s if used_s is None else used_s
 
     def find_not_ready_reason(self, now_s: float) -> tuple[str, str] | None:
-        """Return why the clocks allow no prediction, as (kind, text); None if they allow it. The pipeline judges by stamps.
-
-        If a source of obstacles is silent, nothing is predicted: its obstacles may still be there.
-        """
+        """Return why the clocks allow no prediction, as (kind, text); None if they allow it. The pipeline judges by stamps."""
         hand, limit_s, age_s = self.inputs[HAND], self._pipeline.config.estimator.hand_timeout_s, abs(self._age_s)
         limit, silence_s = f'(estimator.hand_timeout_s is {limit_s:g})', now_s - self.used_s(HAND, now_s)
         if 0.0 < limit_s < silence_s:
@@ -157,10 +154,7 @@ class Monitor:
         self._reported_s = now_s
 
     def note_prediction(self, prediction: Prediction, start_s: float, now_s: float, budget_s: float, late: str | None) -> None:
-        """Count a prediction that was computed and published between two times; late: why it was not published, None if it was.
-
-        budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit.
-        """
+        """Count a prediction; budget_s: of it, exceeded from 2 ms on; late: why it was not published, None if it was."""
         self._solve_ms.append(1e3 * prediction.solve_s)
         self.counts['predict_over_budget'] += 0.0 < budget_s < prediction.solve_s - 0.002
         if late is not None:

@@ -27,10 +27,7 @@ STILL_S = 1.0
 
 
 class Arrival(NamedTuple):
-    """A message that can be taken, when it arrived [s], and the frame and transform of its headers.
-
-    error: why it is not in the working frame, empty if it is; is_inexact: whether the newest transform was taken for another.
-    """
+    """A message that can be taken, when it arrived [s], and the frame and transform of its headers, or the error of these."""
 
     message: Any
     received_s: float
@@ -42,8 +39,7 @@ class Arrival(NamedTuple):
 class Intake:
     """Takes messages by the name of their input; one that cannot be decoded changes nothing and is counted.
 
-    A hand pose less than `estimator.min_interval_s` after the last used one is skipped. A marker whose lifetime ends before the
-    stamp of the last hand sample does not exist for it. Attributes: pipeline; sample: the last decoded hand sample; last_refusal.
+    Attributes: pipeline; sample: the last decoded hand sample; last_refusal: why the last refused message was refused.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:

@@ -138,10 +138,7 @@ class FocNode(LifecycleNode):
         return self._enter('finalized')
 
     def rest(self) -> None:
-        """Wait after a pose of a fast hand, so that several are taken at once; the end of a prediction ends the wait.
-
-        To wake up for each pose at 1 kHz would cost more than to use it, and would delay the threads of guidance and prediction.
-        """
+        """Wait after a pose of a fast hand, so that several are taken at once: to wake up for each costs more than to use it."""
         if self._is_hand_fast:
             self._is_hand_fast = False
             unneeded_s = 0.0 if self.pipeline.config.guidance.enabled else self.pipeline.until_due_s
@@ -198,10 +195,7 @@ class FocNode(LifecycleNode):
         self._guidance.loop.reconfigure(config)
 
     def _receive(self, role: str, *messages: Any) -> None:
-        """Take messages and those in the queue behind them, and predict once, from the newest hand pose.
-
-        Markers are taken one message at a time, so that the hand has its turn in between.
-        """
+        """Take messages and those in the queue behind them, markers one at a time, and predict once, from the newest hand pose."""
         if role not in self._inputs:
             return  # the executor still held messages when the node was cleaned up
         if role == COMMAND:

@@ -38,11 +38,7 @@ def load_parameter_file(path: Path | str) -> Config:
 
 
 def check_parameter_files(arguments: Sequence[str]) -> None:
-    """Raise FocError for a parameter file in the ROS arguments of a node that the commands would refuse, too.
-
-    ROS reads some of them in another way: of a key that is given twice it takes the last, and it skips a section that is not for
-    the node without a word.
-    """
+    """Raise FocError for a parameter file in the ROS arguments of a node that the commands would refuse and ROS would not."""
     given = re.findall(r'__(node|name|ns):=(\S+)', ' '.join(arguments))
     names = {'node': 'foc', 'ns': ''} | {key.replace('name', 'node'): value for key, value in given}
     node = f'/{names["ns"].strip("/")}/{names["node"]}'.replace('//', '/')

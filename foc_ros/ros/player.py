@@ -31,10 +31,9 @@ DEPTH = 200
 
 
 class Player:
-    """A ROS node that publishes the raw messages of a recording and subscribes to the outputs of another node.
+    """A ROS node, as a context, that publishes the raw messages of a recording and subscribes to the outputs of another node.
 
-    outputs: type of each topic to receive; tick: called all the time, returns False where the player is to end; domain: of the
-    ROS graph. Use as a context manager.
+    tick: called all the time, returns False where the player is to end; domain: of the ROS graph.
     """
 
     def __init__(

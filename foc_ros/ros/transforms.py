@@ -61,10 +61,7 @@ class Transforms:
         self._held.setdefault(role, deque()).append((message, now_s))
 
     def release(self, role: str, now_s: float) -> Iterator[Arrival]:
-        """Yield the messages of an input that need not be held any longer at a time [s], in the order of their arrival.
-
-        Each has to be taken before the next one is asked for: it decides whether the next one is skipped.
-        """
+        """Yield the messages of an input that need not be held any longer; each is to be taken before the next is asked for."""
         queue, pipeline = self._held.get(role, ()), self._intake.pipeline
         while queue:
             message, received_s = queue[0]
@@ -160,10 +157,7 @@ class TransformTree:
         self._frames: dict[str, _Frame] = {}
 
     def add(self, message: Any, *, is_static: bool) -> int:
-        """Add the transforms of a tf2_msgs/TFMessage, and return how many are left out.
-
-        These have a wrong stamp, a number that is not finite, no rotation, or one frame as both parent and child.
-        """
+        """Add the transforms of a tf2_msgs/TFMessage, and return how many are left out, because they cannot be used."""
         left_out = 0
         for each in message.transforms:
             shift, turn = each.transform.translation, each.transform.rotation

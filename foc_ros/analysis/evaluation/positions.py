@@ -98,10 +98,9 @@ def compute_log_densities(observation: Observation, shares: Array, covariance: A
 
 
 def find_denser_share(weight: Array, mean: Array, covariance: Array, position: Array) -> Array:
-    """Return the probability (h,) of all that is denser than a position, nan where the position is not known.
+    """Return the probability (h,) of all that is denser than a position (h, 2) [m], nan where the position is not known.
 
-    weight (k,) of normal distributions with mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2], positive definite;
-    position (h, 2) [m].
+    weight (k,) of normal distributions with mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2], positive definite.
     """
     counted = weight > 1e-4
     weight, mean, covariance = weight[counted] / weight[counted].sum(), mean[counted], covariance[counted]

@@ -51,11 +51,7 @@ REGIONS = {
 
 
 def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[str, Any]:
-    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON.
-
-    What is fitted is scored on recordings that it was not fitted to. For `gap`, tenths and `right_from_half_way` count from row
-    to row, else over the whole movement.
-    """
+    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON."""
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
     # log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor

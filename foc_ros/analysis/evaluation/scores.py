@@ -47,11 +47,7 @@ def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
 
 
 def choose_held_out(table: Array, groups: Sequence[Hashable]) -> NDArray[np.intp]:
-    """Choose for each recording the setting (r,) that is best for the recordings of all other groups, the first of equal ones.
-
-    table (r, s): log-likelihoods of recordings under settings; groups: the group of each recording. Of a single group, all
-    recordings are used.
-    """
+    """Choose for each recording the setting (r,) that is best for all other groups, by a table (r, s); of one group, for all."""
     rows = {group: [row for row, each in enumerate(groups) if each == group] for group in groups}
     total = table.sum(axis=0)
     best = {group: int((total - table[own].sum(axis=0) if len(rows) > 1 else total).argmax()) for group, own in rows.items()}
@@ -111,11 +107,7 @@ def score_forecasts(rows: Iterable[tuple[int, Observation, Question, Forecast]])
 
 
 def compare_scores(ours: Scores, other: Scores, is_share: bool) -> dict[str, Any]:
-    """Return the mean difference of two predictors, with its interval, and the tenths that are worse.
-
-    The interval of one recording is None. is_share: compare shares of correct answers instead of log-likelihoods of the true
-    ones.
-    """
+    """Return the mean difference of two predictors, its interval, None of one recording, and the tenths that are worse."""
     difference = ours.correct - other.correct if is_share else ours.log_likelihood - other.log_likelihood
     tenths = find_tenths(ours.progress)
     by_tenth, is_one = [difference[tenths == each] for each in range(TENTHS)], np.ptp(ours.recording) == 0.0

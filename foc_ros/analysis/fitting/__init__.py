@@ -132,8 +132,7 @@ class SettingTable:
     def determine(self, given: Setting) -> tuple[SettingTable, dict[str, str]]:
         """Return the settings that are left without the parameters that are not determined, and why they are not, by name.
 
-        These keep their given values, which are among the settings, one after the other, the flattest first, because one that is
-        kept may determine another.
+        These keep their given values, one after the other, the flattest first, because one that is kept may determine another.
         """
         left, undetermined = self, dict[str, str]()
         while True:

@@ -138,11 +138,7 @@ def widen_covariances(observation: Observation, widenings: Iterable[Sequence[flo
 def compute_coverage(
     recordings: Sequence[ObservedRecording], config: Config, chosen: Sequence[Setting]
 ) -> dict[str, float | None]:
-    """Return the shares of true positions of moving hands after 0.5 s inside 90 % ellipses and regions.
-
-    inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; chosen (n,): the
-    widening of each recording.
-    """
+    """Return the shares of true positions of moving hands in 90 % ellipses and regions after 0.5 s; chosen (n,): widenings."""
     moving = []
     for recording, setting in zip(recordings, chosen, strict=True):
         for each in recording.observations:

@@ -104,8 +104,7 @@ class Replays:
     def score(self, settings: Sequence[Config], names: Sequence[str], description: str) -> Array:
         """Return the scores of settings in recordings, of classes and of positions, (2, s, n) [nat]; description: for a bar.
 
-        A prediction that a setting could not make counts as the worst of those that others made in its place; of classes at most
-        as a uniform guess.
+        A prediction that a setting could not make counts as the worst of the others', of classes at most as a uniform guess.
         """
         missing = [key for key in product(settings, names) if key not in self._known]
         items = [

@@ -143,11 +143,7 @@ def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: A
 
 
 def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
-    """Return the measures of a trial by name.
-
-    The opposing impulse is the integral of the force against the direction of the intended movement, the opposing share its mean
-    as a share of the largest force.
-    """
+    """Return the measures of a trial by name; the opposing impulse integrates the force against the intended movement."""
     clearance, duration_s = float(trial.measure_clearances(task).min()), DT * len(trial.position)
     velocity = task.path[: len(trial.position), 1]
     speed = np.hypot(*velocity.T)

@@ -57,10 +57,7 @@ class Section:
 def write_page(
     directory: Path, name: str, title: str, sections: Sequence[Section], warnings: Sequence[str], config: Config | None
 ) -> None:
-    """Write a page with warnings on top, and what made it below: program, date, machine, and parameters unlike their defaults.
-
-    A page that foc_ros has made is replaced. Raises InputError where it cannot be written, or another file has its name.
-    """
+    """Write a page with warnings on top, and what made it below; raises InputError where it cannot be written, or replaced."""
     check_replaceable('--report', directory / name)
     system = f'{platform.system()} on {platform.machine()} with {os.cpu_count()} processors, Python {platform.python_version()}'
     made = f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; {system}.'

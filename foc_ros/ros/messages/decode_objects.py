@@ -59,7 +59,7 @@ class Outline(NamedTuple):
 def outline(solid: Solid, plane: str, field: str) -> Outline:
     """Return a solid in the plane: the hull of a box, the circle of a sphere, all within the radius of a cylinder of its axis.
 
-    The height of a sphere is not known. Raises MessageError, with the name of a field, for a box without an extent in the plane.
+    Raises MessageError, with the name of a field, for a box without an extent in the plane.
     """
     kind, size, pose = solid
     centre, height = project(pose.translation, plane)
@@ -91,8 +91,7 @@ class Present(NamedTuple):
 class ObjectTable:
     """The present markers, updated as RViz updates its own, or the present collision objects; an update returns a new table.
 
-    held: markers by (ns, id), or objects by id; stamp_ns: newest stamp of the last message, 0 if it had none; dropped: parts of
-    the last message that are no obstacles, by reason (`not_finite`, `not_a_shape`).
+    held: markers by (ns, id), or objects by id; stamp_ns: newest of the last message; dropped: its parts that are no obstacles.
     """
 
     held: Mapping[Any, Present] = field(default_factory=dict)

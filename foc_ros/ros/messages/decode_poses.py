@@ -39,10 +39,7 @@ def decode_hand_sample(message: Any, plane: str, look_up: FrameLookup = keep_fra
 
 
 def check_hand_pose(pose: Any) -> None:
-    """Raise LostHandError for a geometry_msgs/Pose by which a tracker says that it does not see the hand.
-
-    It has no finite position, or the position 0 with an orientation that is none.
-    """
+    """Raise LostHandError for a pose that is not finite, or 0 with an orientation that is none: the tracker is blind."""
     place, turn = (pose.position.x, pose.position.y, pose.position.z), pose.orientation
     for axis, value in zip('xyz', place, strict=True):
         if not math.isfinite(value):

@@ -90,7 +90,6 @@ def _tabulate(outcomes: Sequence[PredictedCandidate], height: float, plane: str)
 def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     """Encode one row per candidate with a likelihood, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
 
-    The first dimension's label joins the labels of the candidates by ';', and that of the third one, of size 1, has the stamp.
     Shares that no candidate has come last, without the other numbers: rows `UNKNOWN` and `OTHER`, if above 0.
     """
     outcomes, shares = order_candidates(prediction), _list_shares(prediction)
@@ -109,10 +108,7 @@ def _list_shares(prediction: Prediction) -> dict[str, float]:
 
 
 def encode_likelihoods_by_name(prediction: Prediction, types: MessageTypes) -> Any:
-    """Encode the likelihoods as a diagnostic_msgs/DiagnosticArray, which tools plot by name: status `goals`, status `classes`.
-
-    The key of a value is the name of a goal or the label of a candidate, or `UNKNOWN` and `OTHER`.
-    """
+    """Encode the likelihoods by the names of goals and the labels of classes as a DiagnosticArray, which tools plot by name."""
     classes = {outcome.label: outcome.likelihood for outcome in order_candidates(prediction)}
     goals = {goal.name: goal.likelihood for goal in prediction.goals if goal.likelihood is not None}
     statuses = []
