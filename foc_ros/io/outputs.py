@@ -59,7 +59,7 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
 
 @contextmanager
 def write_whole(file: Path) -> Iterator[Path]:
-    """Yield the path of an unfinished file, which replaces the file, or what it links to, if the context ends without an error."""
+    """Yield the path of an unfinished file, which replaces the file, or what it links to, when the context ends well."""
     target = file.resolve()
     if target.exists() and not target.is_file():
         yield target

@@ -195,7 +195,7 @@ class FocNode(LifecycleNode):
         self._guidance.loop.reconfigure(config)
 
     def _receive(self, role: str, *messages: Any) -> None:
-        """Take messages and those in the queue behind them, markers one at a time, and predict once, from the newest hand pose."""
+        """Take messages and those queued behind them, markers one at a time, and predict once, from the newest hand pose."""
         if role not in self._inputs:
             return  # the executor still held messages when the node was cleaned up
         if role == COMMAND:
