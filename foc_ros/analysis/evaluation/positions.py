@@ -214,5 +214,5 @@ def score_singer(recordings: Sequence[ObservedRecording]) -> Array:
         squared = ((true[:, None] - mean) ** 2).sum(axis=-1)
         tables.append(np.log(2.0 * np.pi * variance) + squared / (2.0 * variance))  # (m, s, 3), under each setting
     table = np.array([-np.nansum(each, axis=(0, 2)) for each in tables])
-    chosen = choose_held_out(table, [each.name for each in recordings])
+    chosen = choose_held_out(table)
     return np.concatenate([each[:, setting] for each, setting in zip(tables, chosen, strict=True)])

@@ -57,11 +57,10 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
     # log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor
     tables = collect_all(_tabulate_log_likelihoods, items, 'compare')
     table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
-    names = [each.name for each in recordings]
     asked = {name: [ask_all(each, name) for each in recordings] for name in FITTED_TO}
     asked = {name: questions for name, questions in asked.items() if any(questions)}
     scores = {
-        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], names, questions) for each in baselines}
+        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], questions) for each in baselines}
         for name, questions in asked.items()
     }
     best = {key: int(each.sum(axis=0).argmax()) for key, each in table.items()}
@@ -94,9 +93,9 @@ def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]
     return {(name, each.name): compute_log_likelihoods(questions[name], each) for name in questions for each in baselines}
 
 
-def _score_held_out(baseline: Baseline, table: Array, names: Sequence[str], questions: Sequence[Questions]) -> Scores:
+def _score_held_out(baseline: Baseline, table: Array, questions: Sequence[Questions]) -> Scores:
     """Score a predictor, on the questions of each recording with the setting that is best for the others by a table (r, s)."""
-    choices = choose_held_out(table, names)
+    choices = choose_held_out(table)
     return score_forecasts(
         (number, observation, question, baseline.forecast(observation, question, baseline.settings[choice]))
         for number, (choice, asked) in enumerate(zip(choices, questions, strict=True))

@@ -15,7 +15,7 @@ costs where the goal is on the list, the mean of -log(1 - other).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -46,12 +46,10 @@ def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
     return np.array([np.log(each).sum() for each in probabilities])
 
 
-def choose_held_out(table: Array, groups: Sequence[Hashable]) -> NDArray[np.intp]:
-    """Choose for each recording the setting (r,) that is best for all other groups, by a table (r, s); of one group, for all."""
-    rows = {group: [row for row, each in enumerate(groups) if each == group] for group in groups}
-    total = table.sum(axis=0)
-    best = {group: int((total - table[own].sum(axis=0) if len(rows) > 1 else total).argmax()) for group, own in rows.items()}
-    return np.array([best[group] for group in groups], dtype=np.intp)
+def choose_held_out(table: Array) -> NDArray[np.intp]:
+    """Choose for each recording the setting (r,) that is best for all others, by a table of log-likelihoods (r, s)."""
+    others: Array = table.sum(axis=0) - table if len(table) > 1 else table
+    return np.asarray(others.argmax(axis=1))
 
 
 class Scores(NamedTuple):

@@ -10,7 +10,7 @@ log-likelihood over all other parameters, is flat, hardly better than at the giv
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
@@ -22,6 +22,8 @@ from foc_ros.core.config import list_parameters
 from foc_ros.core.types import Array
 
 BOUNDS = {parameter.name: parameter.bound for parameter in list_parameters()}
+FEWEST = 3
+"""Recordings of which one can be held out."""
 FLAT_NAT = 2.0
 """A profile that varies by less is flat: settings this far apart are not distinguished (95 % of chi-square, halved)."""
 Setting = Mapping[str, float]
@@ -78,11 +80,6 @@ class Findings:
         self.warnings += later.warnings
 
 
-def is_cross_validated(recordings: Sequence[object]) -> bool:
-    """Return whether there are enough recordings to hold one out."""
-    return len(recordings) >= 3
-
-
 def clip_to_bounds(name: str, value: float) -> float:
     """Return a value within the bounds of a parameter, rounded, so that a file reads well."""
     bound = BOUNDS[name]
@@ -116,14 +113,13 @@ class SettingTable:
         """The setting that is best for all recordings, the first of equal ones."""
         return self.settings[int(np.nansum(self.values, axis=0).argmax())]
 
-    def choose_held_out(self, groups: Sequence[Hashable]) -> list[Setting]:
-        """Return the setting for each recording (n,) that is best for the other groups."""
-        return [self.settings[each] for each in choose_held_out(np.nan_to_num(self.values), groups)]
-
-    def list_choices(self, given: Setting, names: Sequence[str]) -> dict[str, list[Setting]]:
-        """Return the settings of these names chosen for the recordings (n,), by how they were chosen."""
-        choices = {'as given': [given] * len(names), 'fitted': [self.best] * len(names)}
-        return choices | ({'without the recording': self.choose_held_out(names)} if is_cross_validated(names) else {})
+    def list_choices(self, given: Setting) -> dict[str, list[Setting]]:
+        """Return the settings chosen for the recordings (n,), by how they were chosen: for each of them, or for all others."""
+        choices, count = {'as given': given, 'fitted': self.best}, len(self.values)
+        found = {how: [setting] * count for how, setting in choices.items()}
+        if count >= FEWEST:
+            found['without the recording'] = [self.settings[each] for each in choose_held_out(np.nan_to_num(self.values))]
+        return found
 
     def score(self, chosen: Sequence[Setting]) -> float:
         """Return the mean over the recordings under the setting chosen for each of them (n,)."""

@@ -26,7 +26,7 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
-from . import Findings, clip_to_bounds, is_cross_validated
+from . import FEWEST, Findings, clip_to_bounds
 from .direct import fit_duration, fit_estimator, fit_fading, fit_wait
 from .one_replay import fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
@@ -120,8 +120,8 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
     for step in (fit_likelihood, fit_widening):
         fit.take(step(observed, fit.config))
-    if not is_cross_validated(observed):
-        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
+    if len(observed) < FEWEST:
+        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, {FEWEST} are needed')
     if len(observed) == 1:
         fit.warnings.append('intervals: one recording, which shows no differences between recordings')
 

@@ -25,7 +25,7 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, flatten, replace_values
 from foc_ros.core.types import Array
 
-from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
+from . import Findings, Setting, SettingTable, list_settings
 
 RULES = tuple(
     LikelihoodConfig(beta=beta, planning_horizon_s=horizon_s, lookahead_s=lookahead_s)
@@ -79,13 +79,8 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> F
         words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
         found.warnings.append(f'likelihood.beta: in {100 * missed:.0f} % of the predictions {words}')
     uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
-    names = [each.name for each in recordings]
-    found.scores['ways'] = scores = {'uniform': float(np.mean(uniform))}
-    scores |= {how: left.score(each) for how, each in left.list_choices(given, names).items()}
-    if is_cross_validated(recordings):
-        taken = [each[0][1].answers[each[0][1].truth] if each else name for each, name in zip(questions, names, strict=True)]
-        if len(set(taken)) > 1:
-            scores['without its way'] = left.score(left.choose_held_out(taken))
+    found.scores['ways'] = {'uniform': float(np.mean(uniform))}
+    found.scores['ways'] |= {how: left.score(each) for how, each in left.list_choices(given).items()}
     return found
 
 
@@ -110,7 +105,7 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Fin
     found, left = table.estimate(given, 'density of true positions')
     none: Setting = dict.fromkeys(WIDENINGS, 0.0)
     chosen = {'motor noise alone': [none] * len(recordings)}
-    chosen |= left.list_choices(given, [each.name for each in recordings])
+    chosen |= left.list_choices(given)
     found.scores = {'positions': {name: table.score(each) for name, each in chosen.items()}, 'inside_90': {}, 'inside_all_90': {}}
     for name, each in chosen.items():
         for kind, share in compute_coverage(recordings, config, each).items():
