@@ -19,7 +19,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from foc_ros.analysis.evaluation.baselines import Forecast, power_rule_shares
@@ -42,8 +41,6 @@ FIRST = 6
 """Recordings that all settings predict."""
 MAX_RECORDINGS = 48
 """Recordings in which settings are compared; more make no difference that counts."""
-PLAINLY_WORSE = 3.0
-"""Standard errors by which a setting behind the best is plainly worse."""
 CONFIDENT = 0.95
 """Probability with which a setting is better than the given one, and share of the resamples with which a choice is sure."""
 Key = tuple[str, int]
@@ -157,20 +154,13 @@ def _average_by_recording(found: Sequence[Mapping[Key, float]], most: float, nam
 
 def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> Findings:
     """Return what is new in the best of some settings, of which the first is the given one."""
-    finalists, scores, first_scores = race(kind, settings, replays)
-    winners, best = list(range(len(finalists))), rank(scores)[0]
+    finalists, scores = race(kind, settings, replays)
+    best, winners = rank(scores)[0], list(range(len(finalists)))
     if scores.shape[2] > 1:  # else any of them may be the best by chance
         winners = resample(lambda rows: rank(scores[:, :, rows])[0], scores.shape[2]).astype(int).tolist()
-    if settings[0] in finalists and not is_better(scores[:, best], scores[:, given := finalists.index(settings[0])]):
-        best = given
-    found = _describe_choice(finalists[best], settings, [finalists[each] for each in winners])
-    positions = first_scores[1].mean(axis=1)
-    if (loss := float(positions[0] - positions[settings.index(finalists[best])])) > 0.05:
-        found.warnings.append(
-            f'{kind}: the setting that explains the classes best predicts positions worse: the mean log-density of the true ones '
-            f'falls by {loss:.2g} nat'
-        )
-    return found
+    if not is_better(scores[:, best], scores[:, 0]):
+        best = 0
+    return _describe_choice(finalists[best], settings, [finalists[each] for each in winners])
 
 
 def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequence[Config]) -> Findings:
@@ -196,18 +186,14 @@ def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequen
     return found
 
 
-def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array, Array]:
-    """Return the finalists, in the given order, with their scores, and all scores of the first round."""
+def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array]:
+    """Return the finalists, the given one first, with their scores."""
     names, left, count = sample_names(list(replays.recordings)), list(settings), FIRST
-    rounds: list[Array] = []
     while True:
-        rounds.append(replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}'))
+        scores = replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}')
         if count >= len(names) or len(left) == 1:
-            return left, rounds[-1], rounds[0]
-        is_behind = find_behind(rounds[-1], PLAINLY_WORSE)
-        kept = {index for index in rank(rounds[-1])[: max(-(-len(left) // 2), 4)] if not is_behind[index]}
-        if left[0] == settings[0] and not is_behind[0]:
-            kept.add(0)
+            return left, scores
+        kept = {0, *rank(scores)[: max(-(-len(left) // 2), 4)]}
         left, count = [left[index] for index in sorted(kept)], 2 * count
 
 
@@ -222,16 +208,10 @@ def rank(scores: Array) -> list[int]:
     Alike are those within one standard error (Breiman et al. 1984).
     """
     classes, positions = scores.mean(axis=2)
-    is_behind = find_behind(scores, 1.0)
+    behind = scores[0, classes.argmax()] - scores[0]
+    is_behind = behind.mean(axis=1) > behind.std(axis=1) / np.sqrt(scores.shape[2])
     order: list[int] = np.lexsort((-classes, np.where(is_behind, 0.0, -positions), is_behind)).tolist()
     return order
-
-
-def find_behind(scores: Array, errors: float) -> NDArray[np.bool_]:
-    """Tell which settings are behind the best in classes by more than some standard errors."""
-    classes = scores[0]
-    behind = classes[classes.mean(axis=1).argmax()] - classes
-    return np.asarray(behind.mean(axis=1) > errors * behind.std(axis=1) / np.sqrt(classes.shape[1]))
 
 
 def is_better(scores: Array, given: Array) -> bool:
