@@ -27,7 +27,7 @@ from foc_ros.io.terminal import show_progress
 from foc_ros.ros.messages.encode_inputs import encode_boxes, encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 
-from .scenes import POSITION, FindScene, RecordedScene, check_not_empty, read_box_scenes, read_recording, read_scenes
+from .scenes import POSITION, FindScene, RecordedScene, check_not_empty, read_box_scenes, read_scenes
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
 SCENES, TRIALS = 'scenes.csv', 'trials.csv'
@@ -182,7 +182,7 @@ def read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> d
     errors: list[FocError] = []
     find, found = collect(errors, read), dict[str, list[Row]]()
     known, rows = len(errors), read_rows(file, ('recording', 't_s', 'x_m', 'y_m'), ('z_m',))
-    collect(errors, parse_rows, rows, lambda row: found.setdefault(read_recording(row), []).append(row))
+    collect(errors, parse_rows, rows, lambda row: found.setdefault(row.read_name('recording'), []).append(row))
     if len(errors) == known:
         collect(errors, check_not_empty, file, found)
     _warn_of_doubts(file, {name: _doubt_samples(rows) for name, rows in found.items()})

@@ -78,7 +78,7 @@ def read_obstacles(file: Path) -> dict[str, tuple[tuple[float, ...], ...]]:
     found: dict[str, dict[int, tuple[float, ...]]] = {}
 
     def parse(row: Row) -> None:
-        rows = found.setdefault(read_recording(row), {})
+        rows = found.setdefault(row.read_name('recording'), {})
         x, y, z, radius, stddev, *size, yaw = row.read_numbers(*POSITION, *EXTENT, Column('yaw_rad', default=0.0))
         identity = row.read_integer('id', -(2**31), 2**31 - 1, default=len(rows))
         if identity in rows:
@@ -98,7 +98,7 @@ def read_goals(file: Path) -> dict[str, Array]:
     found: dict[str, list[tuple[float, ...]]] = {}
     parse_rows(
         read_rows(file, ('x_m', 'y_m'), ('recording', 'z_m')),
-        lambda row: found.setdefault(read_recording(row), []).append(tuple(row.read_numbers(*POSITION))),
+        lambda row: found.setdefault(row.read_name('recording'), []).append(tuple(row.read_numbers(*POSITION))),
     )
     _check_length(file, found, MAX_GOALS)
     check_not_empty(file, found)
@@ -128,10 +128,8 @@ def read_picked(file: Path) -> Mapping[str, str]:
     found: dict[str, str] = {}
 
     def parse(row: Row) -> None:
-        if row.cells.get('object') == '':
-            raise row.make_error('object', 'a name')
-        if 'object' in row.cells:
-            found[row.cells['recording']] = row.cells['object']
+        if name := row.read_name('object'):
+            found[row.cells['recording']] = name
 
     parse_rows(read_rows(file, ('recording',)), parse)
     return found
@@ -142,23 +140,13 @@ def read_boxes(file: Path) -> Mapping[str, Mapping[str, tuple[float, ...]]]:
     found: dict[str, dict[str, tuple[float, ...]]] = {}
 
     def parse(row: Row) -> None:
-        for column in ('recording', 'object'):
-            if not row.cells[column]:
-                raise row.make_error(column, 'a name')
-        boxes, name = found.setdefault(row.cells['recording'], {}), row.cells['object']
+        boxes, name = found.setdefault(row.read_name('recording'), {}), row.read_name('object')
         if name in boxes:
             raise row.make_error('object', 'another name than the rows above of this recording')
         boxes[name] = tuple(row.read_numbers(*BOX))
 
     parse_rows(read_rows(file, ('recording', 'object', *(each.name for each in BOX))), parse)
     return found
-
-
-def read_recording(row: Row) -> str:
-    """Return the recording of a row, an empty text if the table does not have the column."""
-    if row.cells.get('recording') == '':
-        raise row.make_error('recording', 'a name')
-    return row.cells.get('recording', '')
 
 
 def _check_length(file: Path, found: Mapping[str, Sized], most: int) -> None:

@@ -70,6 +70,12 @@ class Row:
             raise self.make_error(column, f'a whole number in [{low}, {high}]')
         return int(value)
 
+    def read_name(self, column: str) -> str:
+        """Return a cell that may not be empty; an empty text if the table does not have the column."""
+        if self.cells.get(column) == '':
+            raise self.make_error(column, 'a name')
+        return self.cells.get(column, '')
+
     def make_error(self, column: str, expected: str) -> RecordingError:
         """Return the error of a cell."""
         return RecordingError(f'{self.file}: row {self.line}, column {column}: expected {expected}, got {self.cells[column]!r}')
