@@ -33,7 +33,6 @@ from .truth import HORIZONS, HORIZONS_S, TIMES_S
 
 LEVELS = (0.5, 0.9)
 """Probabilities of the ellipses and regions."""
-TIMES = np.array(TIMES_S)
 RINGS, SPOKES = 25, 4
 """Rings of a Gaussian, and points of a ring. A region is exact at 50 and 90 %, because the border lies between two rings."""
 Shares = dict[str, float | None]
@@ -54,18 +53,18 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
         'most likely': [np.tensordot(*each, 1) for each in zip(leading, means, strict=True)],
         'likelihood-weighted': [np.tensordot(*each, 1) for each in zip(mixture, means, strict=True)],
         'constant velocity': [
-            each.hand[:2] + TIMES[:, None] * (each.hand[2:4] if each.movement_age_s > 0.0 else np.zeros(2))
+            each.hand[:2] + TIMES_S[:, None] * (each.hand[2:4] if each.movement_age_s > 0.0 else np.zeros(2))
             for each in observations
         ],
         'straight minimum jerk': [
-            compute_straight_positions(each, int(compute_straight_costs(each).argmin()), TIMES) for each in observations
+            compute_straight_positions(each, int(compute_straight_costs(each).argmin()), TIMES_S) for each in observations
         ],
     }
     densities = [compute_log_densities(each, each.candidates.mixture, each.candidates.covariance) for each in observations]
     true, errors = np.array([each.truth.positions for each in observations]), {}
     for name, each in predicted.items():
         distance = np.hypot(*(np.array(each) - true).transpose(2, 0, 1))
-        mean = np.cumsum(distance, axis=1) / np.arange(1, len(TIMES) + 1)
+        mean = np.cumsum(distance, axis=1) / np.arange(1, len(TIMES_S) + 1)
         errors[name] = {'average': average(mean[:, HORIZONS]), 'final': average(distance[:, HORIZONS])}
     return {
         'displacement_m': errors,
@@ -129,15 +128,10 @@ def _make_points() -> Array:
 POINTS = _make_points()
 
 
-def choose_row(row: int, count: int) -> Array:
-    """Return weights (count,) of which one is 1, and the others are 0."""
-    weights: Array = np.eye(count)[row]
-    return weights
-
-
 def _choose_leading(observation: Observation) -> Array:
     candidates, label = observation.candidates, observation.most_likely
-    return choose_row(candidates.labels.index(label) if label else int(candidates.likelihood.argmax()), len(candidates))
+    row = candidates.labels.index(label) if label else int(candidates.likelihood.argmax())
+    return np.asarray(np.eye(len(candidates))[row])
 
 
 def _choose_taken(recordings: Sequence[ObservedRecording]) -> list[Array]:
@@ -148,7 +142,7 @@ def _choose_taken(recordings: Sequence[ObservedRecording]) -> list[Array]:
         for each in recording.observations:
             question, likelihood = questions.get(each.stamp_ns), each.candidates.likelihood
             if question is not None and (is_true := question.given == question.truth).any():
-                found.append(choose_row(int(np.where(is_true, likelihood, -1.0).argmax()), len(likelihood)))
+                found.append(np.eye(len(likelihood))[np.where(is_true, likelihood, -1.0).argmax()])
             else:
                 found.append(_choose_leading(each))
     return found

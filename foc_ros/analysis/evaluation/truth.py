@@ -24,11 +24,11 @@ from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
-TIMES_S = tuple(0.125 * step for step in range(1, 9))
+TIMES_S = 0.125 * np.arange(1, 9)
 """Times ahead at which predicted positions are compared with the true ones [s]."""
 HORIZONS_S = (0.25, 0.5, 1.0)
 """Those of them that are reported."""
-HORIZONS = np.array([TIMES_S.index(horizon) for horizon in HORIZONS_S])
+HORIZONS = np.searchsorted(TIMES_S, HORIZONS_S)
 """Their indices."""
 MIN_SAMPLES = 10
 
@@ -150,7 +150,7 @@ def find_ground_truth(
         sides=np.where(compute_swept_angles(path.positions[now:], centres) < 0.0, LEFT, RIGHT).astype(np.int8),
         is_ahead=np.append(crosses[now:].any(axis=0), False)[row],
         goal=path.goal if np.array_equal(goals, path.goals) else None,
-        positions=path.interpolate(stamp_ns, np.array(TIMES_S)),
+        positions=path.interpolate(stamp_ns, TIMES_S),
         progress=float(path.progress[now]),
         approach=float((path.travelled[now] - path.travelled[last]) / whole) if whole != 0.0 else 0.0,
         left_s=(path.end_ns - stamp_ns) / NANOSECONDS,

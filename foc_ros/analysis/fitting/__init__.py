@@ -32,19 +32,18 @@ Setting = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings, and its data."""
+    """A fitted value, its 95 % interval by bootstrap over recordings, and its data."""
 
-    name: str
     value: float
     low: float
     high: float
     how: str
 
     @classmethod
-    def from_resamples(cls, name: str, value: float, resampled: Array | Sequence[float], how: str) -> Estimate:
+    def from_resamples(cls, value: float, resampled: Array | Sequence[float], how: str) -> Estimate:
         """Return the estimate whose interval holds the value and the central values of a bootstrap, (b,)."""
         low, high = np.percentile(resampled, CENTRAL).tolist()
-        return cls(name, value, min(low, value), max(high, value), how)
+        return cls(value, min(low, value), max(high, value), how)
 
 
 @dataclass
@@ -167,5 +166,5 @@ class SettingTable:
         drawn = resample(lambda rows: int(values[rows].sum(axis=0).argmax()), len(values)).astype(int)
         for name in [each for each in given if each not in undetermined]:
             resampled = [left.settings[each][name] for each in drawn]
-            found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, best[name]), resampled, how)
+            found.estimates[name] = Estimate.from_resamples(clip_to_bounds(name, best[name]), resampled, how)
         return found, left

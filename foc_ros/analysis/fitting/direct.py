@@ -171,7 +171,7 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
             )
     factors = np.percentile(resample(lambda rows: _find_best_factor(errors[:, rows]), errors.shape[1]) / best, CENTRAL)
     for name, each in zip(names, value.tolist(), strict=True):
-        found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, each), each * factors, 'time to go')
+        found.estimates[name] = Estimate.from_resamples(clip_to_bounds(name, each), each * factors, 'time to go')
     return found
 
 
@@ -200,4 +200,4 @@ def fit_wait(hands: Sequence[RecordedHand], config: Config) -> Findings:
         return Findings(undetermined={WAIT: 'no hand waits before a movement'})
     value, table = clip_to_bounds(WAIT, float(np.mean(means))), np.array(means)
     resampled = resample(lambda rows: table[rows].mean(), len(table))
-    return Findings({WAIT: Estimate.from_resamples(WAIT, value, resampled, 'time until movements begin')})
+    return Findings({WAIT: Estimate.from_resamples(value, resampled, 'time until movements begin')})

@@ -17,7 +17,7 @@ import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, power_rule_shares
 from foc_ros.analysis.evaluation.observations import WIDENINGS, Observation, ObservedRecording, ask_main
-from foc_ros.analysis.evaluation.positions import choose_row, compute_log_densities, measure_inside
+from foc_ros.analysis.evaluation.positions import compute_log_densities, measure_inside
 from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS
@@ -143,5 +143,5 @@ def compute_coverage(
     if not moving:
         return {'inside_90': None, 'inside_all_90': None}
     shares = [power_rule_shares(each, config.likelihood) for each in moving]
-    weights = {'inside_90': [choose_row(int(each.argmax()), len(each)) for each in shares], 'inside_all_90': shares}
+    weights = {'inside_90': [np.eye(len(each))[each.argmax()] for each in shares], 'inside_all_90': shares}
     return {name: measure_inside(moving, each)[f'{COVERAGE_LEVEL:g}'][COVERAGE_S] for name, each in weights.items()}
