@@ -44,21 +44,9 @@ def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array |
 
 
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
-    """Draw a prediction with its obstacles and goals.
+    """Draw a prediction with its obstacles and goals, on axes of a new pyplot figure by default; return the axes.
 
-    Parameters
-    ----------
-    prediction : Prediction
-        Its candidates are drawn from the hand on, the thicker the more likely, with ellipses of one standard deviation of the
-        position: filled for motor noise, dashed for the total uncertainty of the most likely one. Those without a likelihood, and
-        those that lead through an obstacle, are pale, with the reason beside them.
-    axes : matplotlib.axes.Axes, optional
-        Where to draw; axes of a new pyplot figure by default. The legend takes a part of their place.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes that hold the drawing.
+    The legend takes a part of their place.
     """
     import matplotlib.pyplot as plt
 
