@@ -24,7 +24,7 @@ from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
-TIMES_S: Array = 0.125 * np.arange(1, 9)
+TIMES_S: Array = np.arange(1.0, 9.0) * 0.125
 """Times ahead at which predicted positions are compared with the true ones [s]."""
 HORIZONS_S = (0.25, 0.5, 1.0)
 """Those of them that are reported."""
