@@ -37,7 +37,6 @@ RECORDING = Path(__file__).resolve().parents[1] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
 """File that marks the output directory of a demo: the next demo may replace its bag and report."""
 RECEIVED = {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()} | {'/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}
-"""Types of the outputs of the node."""
 PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
 
 

@@ -42,7 +42,6 @@ RECORDINGS = Group.create_ordered('For recordings of people')
 OTHER = Group.create_ordered('Other')
 
 Table = tuple[str | None, Sequence[str], Iterable[Sequence[str]]]
-"""Title, columns and rows."""
 
 
 def _read(read: Callable[[str], Any], **options: Any) -> Parameter:

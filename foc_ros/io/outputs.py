@@ -16,7 +16,6 @@ MARK = 'made by foc_ros'
 """Text that every picture and page contains that a command writes."""
 EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE = 'evaluation.html', 'fit.html', 'simulation.html'
 REPORT_FILES = ('index.html', 'predictions.json')
-"""Files of the report of a recording."""
 PICTURE_SUFFIXES = ('.png', '.pdf', '.svg')
 
 

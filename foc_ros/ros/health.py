@@ -25,11 +25,9 @@ from .intake import SOURCES, Intake
 from .messages.types import MessageTypes, make_header
 
 SOURCE_TOPICS = {source: role for role, source in SOURCES.items()}
-"""Topic of every source of obstacles in the scene."""
 WINDOW = 1000
 """Number of predictions over which the percentiles are computed."""
 OK, WARN, ERROR = 0, 1, 2
-"""Levels of diagnostic_msgs/DiagnosticStatus."""
 HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'hand_skipped', 'predict_', 'predictions', 'transform_newest_')
 """Prefixes of the counts that are no fault by themselves; the reason why no prediction is made is reported as text."""
 FAULTS = ('predict_failed', 'predict_nothing_solved', 'predict_too_late')

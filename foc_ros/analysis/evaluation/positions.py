@@ -32,7 +32,6 @@ from .scores import choose_held_out
 from .truth import HORIZONS, HORIZONS_S, TIMES_S
 
 LEVELS = (0.5, 0.9)
-"""Probabilities of the ellipses and regions."""
 RINGS, SPOKES = 25, 4
 """Rings of a Gaussian, and points of a ring. A region is exact at 50 and 90 %, because the border lies between two rings."""
 Shares = dict[str, float | None]

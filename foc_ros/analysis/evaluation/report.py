@@ -32,7 +32,6 @@ OURS = 'likelihood-weighted'
 COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
 """Horizon and probability of the region that is judged."""
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
-"""Title, columns, rows."""
 GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
 TOTALS = {
     'gain': ('gain', 1.0, 3),

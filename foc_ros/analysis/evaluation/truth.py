@@ -29,7 +29,6 @@ TIMES_S: Array = np.arange(1.0, 9.0) * 0.125
 HORIZONS_S = (0.25, 0.5, 1.0)
 """Those of them that are reported."""
 HORIZONS = np.searchsorted(TIMES_S, HORIZONS_S)
-"""Their indices."""
 MIN_SAMPLES = 10
 
 Bools = NDArray[np.bool_]

@@ -27,7 +27,6 @@ except ImportError as error:
 
 Picture = tuple[str, str]
 Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
-"""Heading, columns and rows."""
 FOLDER = Path(__file__).parent
 POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """Content security policy of every page: a browser shows what the page holds and fetches nothing."""

@@ -29,17 +29,13 @@ from .decode_poses import MAX_COORDINATE, FrameLookup, check_coordinates, decode
 from .plane import NO_TRANSFORM, Transform, compute_rotation, lift, make_heights, project
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
-"""Actions of a marker."""
 REMOVE, APPEND, MOVE = 1, 2, 3
 """Operations on a collision object besides ADD."""
 BOX, SPHERE, CYLINDER = 1, 2, 3
 """Types that become obstacles, of markers and of primitives alike."""
 DIMENSIONS = {BOX: 3, SPHERE: 1, CYLINDER: 2}
-"""Number of dimensions of each shape_msgs/SolidPrimitive that becomes an obstacle."""
 POINT = np.zeros((1, 2))
-"""The polygon of a circle."""
 CORNERS = np.array([*product((-0.5, 0.5), repeat=3)])
-"""Corners of a box of the size 1."""
 NORMALS = {plane: lift(np.zeros(2), 1.0, plane) for plane in ('xy', 'xz', 'yz')}
 UPRIGHT = {plane: np.outer(normal, [0.0, 0.0, 1.0]) for plane, normal in NORMALS.items()}
 """Matrices whose last column, the axis of a cylinder, is the normal of each plane."""

@@ -26,17 +26,14 @@ from .ranking import describe_candidate, find_drawn_curve, order_candidates
 from .types import MessageTypes, make_header
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
-"""Types of markers."""
 LIFETIME_S = 1.0
 ELLIPSES = 6
-"""Number of ellipses along each path."""
 MAX_DRAWN = 128
 """Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
 THICKNESS, TEXT_HEIGHT = 0.002, 0.01
 TALL = 10 * THICKNESS
 """Height of round obstacles [m]; texts are above them."""
 MOTOR, TOTAL = 'motor_noise', 'total_uncertainty'
-"""Namespaces of the two ellipses."""
 ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
 """Opacity as a share of that of the path, and thickness [m]: the inner ellipse stands out of the outer one."""
 LEGEND = 'ellipses of one standard deviation\ninner: motor noise, which eta is about\nouter: total uncertainty'
