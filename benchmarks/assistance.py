@@ -17,10 +17,10 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from foc_ros.analysis.simulation.operators import Task
-from foc_ros.analysis.simulation.study import Assistance
+from foc_ros.analysis.simulation.study import RULES, Assistance
+from foc_ros.cli import studies
 from foc_ros.cli.main import main
 from foc_ros.cli.options import PLAIN, Existing, Operators, Seed, Study, Trials, app, names
-from foc_ros.cli.studies import run_simulation
 from foc_ros.core.config import Config
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
@@ -167,7 +167,10 @@ def simulate(
     study: Study = PLAIN,
 ) -> int:
     """Compare guidance with the assistance rules of others; the options are those of `foc_ros simulate`."""
-    return run_simulation(operators, assistance, trials, seed, recordings, study, RIVALS)
+    RULES.update(RIVALS)
+    return studies.simulate(
+        operators=operators, assistance=assistance, trials=trials, seed=seed, recordings=recordings, study=study
+    )
 
 
 if __name__ == '__main__':

@@ -207,8 +207,7 @@ def test_a_choice_that_is_better_by_chance_only_is_undetermined(scores):
     assert found.undetermined['duration.arrival'].startswith('no other value tried is better by more than chance')
 
 
-def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings(monkeypatch):
-    monkeypatch.setattr(race, 'PLAINLY_WORSE', 1e6)
+def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_recordings():
     settings = [replace_values(SEARCH_CONFIG, {'foc.eta': 0.5 + 0.02 * place}) for place in range(20)]
     quality = -np.abs(np.arange(20.0) - 13.0)[:, None] + 0.1 * np.random.default_rng(3).standard_normal((20, 40))
     replays = KnownReplays(quality)

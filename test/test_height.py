@@ -28,7 +28,7 @@ from reach_helpers import make_predictor
 from scipy.spatial.transform import Rotation
 
 import foc_ros
-from foc_ros.analysis.replay_output import Summary, facts
+from foc_ros.analysis.replay import Summary, facts
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import MessageError
 from foc_ros.core.height import predict_height, reach_along_axis

@@ -292,9 +292,9 @@ def test_guidance_of_a_recording_takes_no_jump_for_work():
         pipeline.add_hand_sample(sample)
         predicted = predict_aside(stamp_ns=sample.stamp_ns) if tick < 20 else None
         outputs += guidance.add(Step(None, sample, predicted, pipeline.scene))
-    assert max(each.output.force[1] for each in outputs) > 2.0
-    assert min(each.output.tank for each in outputs) > 0.4
-    assert outputs[-1].output.status is GuidanceStatus.NO_PREDICTION
+    assert max(output.force[1] for _, output, _ in outputs) > 2.0
+    assert min(output.tank for _, output, _ in outputs) > 0.4
+    assert outputs[-1][1].status is GuidanceStatus.NO_PREDICTION
 
 
 def test_guidance_is_the_same_each_time_and_within_its_limits(tmp_path, capsys):

@@ -67,14 +67,13 @@ def report(directory, reaches=1, title='A title'):
     return write_report(directory, title, build_hand_trajectory(made), snapshots, {'recording': 'some <bag> & more'})
 
 
-def test_the_report_is_a_page_without_other_files_and_a_picture_beside_it(tmp_path):
+def test_the_report_is_a_page_without_other_files(tmp_path):
     """Text is escaped, facts are shown, and nothing is loaded from anywhere; the input is left alone."""
     before = OBSTACLES.centre.copy()
-    files = report(tmp_path / 'new' / 'report', title='<img src=x onerror=alert(1)>')
+    file = report(tmp_path / 'new' / 'report', title='<img src=x onerror=alert(1)>')
     np.testing.assert_array_equal(OBSTACLES.centre, before)
-    assert {file.name for file in files} == {'index.html', 'predictions.json', 'overview.png'}
-    assert set((tmp_path / 'new' / 'report').iterdir()) == set(files)
-    page = Page(files[0])
+    assert {each.name for each in file.parent.iterdir()} == {'index.html', 'predictions.json'}
+    page = Page(file)
     for tag, attributes in page.tags:
         assert tag != 'img' and not {'href', 'src', 'srcset', 'action'} & attributes.keys()
     policy = next(attributes['content'] for _, attributes in page.tags if 'http-equiv' in attributes)
@@ -197,19 +196,17 @@ def page_data_of(directory):
 def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path):
     """Without predictions, without a solved candidate, with a hand that never moves, and with a number that is not finite."""
     hand, made = build_hand_trajectory(samples()), prediction(START_NS, np.zeros(2))
-    files = write_report(tmp_path / 'none', 'x', hand, [], {})
-    assert [file.name for file in files] == ['index.html', 'predictions.json']
-    assert 'There is no prediction.' in Page(files[0]).text
+    file = write_report(tmp_path / 'none', 'x', hand, [], {})
+    assert 'There is no prediction.' in Page(file).text
     lost = tuple(each for each in made.candidates if not each.is_solved)
-    files = write_report(tmp_path / 'lost', 'x', hand, 3 * [build_snapshot(replace(made, candidates=lost, most_likely=None))], {})
-    assert 'In 3 of 3 predictions no candidate could be solved.' in Page(files[0]).text
+    file = write_report(tmp_path / 'lost', 'x', hand, 3 * [build_snapshot(replace(made, candidates=lost, most_likely=None))], {})
+    assert 'In 3 of 3 predictions no candidate could be solved.' in Page(file).text
     still = build_hand_trajectory([HandSample(START_NS + n * 10_000_000, np.zeros(2)) for n in range(50)])
     view = build_snapshot(prediction(int(still.stamps_ns[20]), np.zeros(2)))
     strange = replace(view.candidates[0], solution=replace(view.candidates[0].solution, eta=float('nan')))
     unknown = replace(view, candidates=(strange, *view.candidates[1:]))
-    files = write_report(tmp_path / 'still', 'x', still, [unknown], {})
-    assert (tmp_path / 'still' / 'overview.png') in files
-    text = files[1].read_text(encoding='utf-8')
+    write_report(tmp_path / 'still', 'x', still, [unknown], {})
+    text = (tmp_path / 'still' / 'predictions.json').read_text(encoding='utf-8')
     assert 'NaN' not in text and json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
 
 
@@ -237,7 +234,7 @@ def test_a_picture_that_something_else_has_made_is_left_alone(tmp_path, capsys):
     assert picture.read_bytes() == before
 
 
-@pytest.mark.parametrize('name', ['index.html', 'predictions.json', 'overview.png'])
+@pytest.mark.parametrize('name', ['index.html', 'predictions.json'])
 def test_a_report_overwrites_no_other_file(tmp_path, name):
     (tmp_path / name).write_text('mine', 'utf-8')
     with pytest.raises(InputError, match='--report: expected a new file, or one that foc_ros has made'):

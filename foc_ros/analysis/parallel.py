@@ -3,8 +3,7 @@
 """Recordings in parallel by joblib: one function applied to many named items.
 
 Where that happens is joblib's setting: this process unless :func:`open_workers`, or `joblib.parallel_config`, says otherwise.
-Results do not depend on it. What goes wrong with one item, an exception or a worker process that is killed, becomes the
-:class:`Failure` of this item alone.
+What goes wrong with one item, an exception or a worker process that is killed, becomes the :class:`Failure` of this item alone.
 """
 
 from __future__ import annotations
@@ -46,10 +45,7 @@ class Failure:
 
 @contextmanager
 def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
-    """Let :func:`run` use a number of worker processes, 1 for this one, or the Dask cluster of a scheduler.
-
-    Raises InputError where there is no such cluster.
-    """
+    """Let :func:`run` use a number of worker processes, 1 for this one, or a Dask cluster; InputError where there is none."""
     with warnings.catch_warnings():
         # said by joblib where a command is interrupted
         warnings.filterwarnings('ignore', '.* tasks which were still being processed', UserWarning)
@@ -64,8 +60,7 @@ def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
 class DaskBackend(ThreadingBackend):
     """The backend of joblib for a Dask cluster: as many calls wait in threads as the cluster has.
 
-    With joblib's own one a result that is lost with a killed worker, and is then blamed for the death of the next one, never
-    arrives (joblib 1.6, distributed 2026.8).
+    With joblib's own one a result that is lost with a killed worker never arrives (joblib 1.6, distributed 2026.8).
     """
 
     def __init__(self, client: Any = None, **options: Any) -> None:
@@ -95,48 +90,36 @@ def run(function: Callable[[T], R], items: Sequence[tuple[str, T]]) -> Iterator[
     """Apply a function to every item; yield names and results in the order of the items.
 
     function: importable by name where the workers are, and without a state of its own; items: names with arguments that can be
-    pickled. Raises RecordingError where the workers cannot go on.
+    pickled. A worker that is killed takes those beside it along. All that may have been at work is then computed again, one after
+    the other, so that only the guilty one fails. Raises RecordingError where the workers cannot go on.
     """
-    found: dict[int, R | Failure] = {}
-    first = 0
-    for number, result, texts in _run_unordered(function, [item for _, item in items]):
-        for text in texts:
-            warn(text)
-        found[number] = result
-        while first in found:
-            yield items[first][0], found.pop(first)
-            first += 1
-
-
-def _run_unordered(function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | Failure, list[str]]]:
-    """Yield number, result and warnings of every item, as they come.
-
-    A worker that is killed takes those beside it along. All that may have been at work is then computed again, one after the
-    other, so that only the guilty one fails.
-    """
-    missing, at_work = list(range(len(items))), 2 * effective_n_jobs(None)
-    while missing:
+    done, at_work = 0, 2 * effective_n_jobs(None)
+    while done < len(items):
         try:
-            for found in _compute(function, [(each, items[each]) for each in missing]):
-                missing.remove(found[0])
-                yield found
+            for result in _compute(function, [item for _, item in items[done:]]):
+                done += 1
+                yield items[done - 1][0], result
         except CancelledError as error:
             raise RecordingError('the Dask scheduler was lost before all recordings had their turn') from error
         except Exception:
-            for number in missing[:at_work]:
+            for name, item in items[done : done + at_work]:
+                done += 1
                 try:
-                    yield from _compute(function, [(number, items[number])])
+                    (result,) = _compute(function, [item])
                 except Exception as error:
-                    yield number, Failure(f'its worker process was lost ({type(error).__name__})'), []
-            missing = missing[at_work:]
+                    result = Failure(f'its worker process was lost ({type(error).__name__})')
+                yield name, result
 
 
-def _compute(function: Callable[[T], R], items: Sequence[tuple[int, T]]) -> Iterator[tuple[int, R | Failure, list[str]]]:
-    is_alone, parent = len(items) == 1 and effective_n_jobs(None) > 1, os.getpid()
+def _compute(function: Callable[[T], R], items: Sequence[T]) -> Iterator[R | Failure]:
+    is_alone = len(items) == 1 and effective_n_jobs(None) > 1
     # in a process of its own, also alone; arrays are passed as they are, not as files
-    parallel = Parallel(2 if is_alone else None, return_as='generator_unordered', batch_size=1, max_nbytes=None)
-    with closing(parallel(delayed(call_guarded)(function, *item, parent) for item in items)) as found:
-        yield from found
+    parallel = Parallel(2 if is_alone else None, return_as='generator', batch_size=1, max_nbytes=None)
+    with closing(parallel(delayed(_call_guarded)(function, item, os.getpid()) for item in items)) as found:
+        for result, texts in found:
+            for text in texts:
+                warn(text)
+            yield result
 
 
 def collect(function: Callable[[T], R], items: Sequence[tuple[str, T]], description: str) -> tuple[list[R], dict[str, str]]:
@@ -159,8 +142,8 @@ def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], desc
     return results
 
 
-def call_guarded(function: Callable[[T], R], number: int, item: T, parent: int) -> tuple[int, R | Failure, list[str]]:
-    """Return the number and result of an item, or its failure in words, as an exception may not survive pickling; and warnings.
+def _call_guarded(function: Callable[[T], R], item: T, parent: int) -> tuple[R | Failure, list[str]]:
+    """Return the result of an item, or its failure in words, as an exception may not survive pickling; and warnings.
 
     parent: process that gave the work; a worker process that is its child ends with it.
     """
@@ -177,7 +160,7 @@ def call_guarded(function: Callable[[T], R], number: int, item: T, parent: int) 
             place = traceback.extract_tb(error.__traceback__)[-1]
             words = f'{type(error).__name__}: {" ".join(str(error).split())} ({Path(place.filename).name}:{place.lineno})'
             result = Failure(words)
-    return number, result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
+    return result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
 
 
 @cache

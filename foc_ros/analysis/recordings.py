@@ -11,7 +11,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from filecmp import cmp
 from functools import partial
 from heapq import merge
 from pathlib import Path
@@ -28,13 +27,14 @@ from foc_ros.io.terminal import show_progress
 from foc_ros.ros.messages.encode_inputs import encode_boxes, encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.types import RosbagsTypes
 
-from .scenes import POSITION, FindScene, RecordedScene, check_not_empty, read_box_scenes, read_recording, read_scenes
+from .scenes import POSITION, FindScene, RecordedScene, check_not_empty, read_box_scenes, read_scenes
 
 RECORDINGS, OBSTACLES, GOALS, LABELS = 'recordings.csv', 'obstacles.csv', 'goals.csv', 'labels.csv'
 SCENES, TRIALS = 'scenes.csv', 'trials.csv'
 FRAME = 'world'
 EPOCH_NS = NANOSECONDS
 """Stamp of t_s = 0. It is not 0, which means `not set` in a message."""
+TIME_UNITS = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
 LENGTH_UNITS = {'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6}
 Doubt = tuple[str, str, str]
 """What is doubted, what is wrong with it, and the reason."""
@@ -107,11 +107,7 @@ Recording = BagRecording | TableRecording | BrokenRecording
 
 
 def find_recordings(data: Path) -> dict[str, Recording]:
-    """Return the recordings of a folder by name.
-
-    data: a folder with recordings.csv, and either goals.csv and, where there are obstacles, obstacles.csv, or scenes.csv with the
-    boxes of each recording; a folder of bags; or a bag. Raises RecordingError where it is none of these.
-    """
+    """Return the recordings of a folder of tables or of bags, or a bag, by name; RecordingError where it is none of these."""
     if (data / RECORDINGS).exists():
         return dict(read_tables(data))
     if data.is_file() or ((data / 'metadata.yaml').exists() and any(map(is_bag_file, data.iterdir()))):
@@ -125,21 +121,7 @@ def find_recordings(data: Path) -> dict[str, Recording]:
         raise RecordingError(f'{data}: no such file or directory')
     if not bags:
         raise RecordingError(f'{data}: expected bags, or {RECORDINGS} with {GOALS} or {SCENES}, got neither')
-    return {path.name: BagRecording(path.name, path) for path in _leave_out_copies(bags)}
-
-
-def _leave_out_copies(bags: Iterable[Path]) -> Iterator[Path]:
-    """Yield the bags; warn of those with the same files as one before, which would count twice, and leave them out."""
-    of_sizes: dict[tuple[int, ...], list[list[Path]]] = {}
-    for bag in bags:
-        files = [path for path in sorted(bag.iterdir()) if is_bag_file(path)] if bag.is_dir() else [bag]
-        known = of_sizes.setdefault(tuple(path.stat().st_size for path in files), [])
-        same = next((each for each in known if all(map(partial(cmp, shallow=False), files, each))), None)
-        if same is None:
-            known.append(files)
-            yield bag
-        else:
-            warn(f'{bag}: left out, because it is a copy of {same[0]}')
+    return {path.name: BagRecording(path.name, path) for path in bags}
 
 
 def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recording]]:
@@ -163,8 +145,8 @@ def read_tables(data: Path) -> dict[str, TableRecording | BrokenRecording]:
 def convert_tables(table: Path, obstacles: Path | None, goals: Path | None, output: Path) -> str:
     """Convert the tables, all of which are checked before the first bag is written; return in words what was written.
 
-    table, obstacles, goals: the recordings and their scenes, or a folder of all three tables; output: folder for the bags. Raises
-    RecordingError for a table that cannot be read and for a bag that exists, InputError for a table without one of obstacles.
+    table: the recordings, or a folder of all tables. Raises RecordingError for a table that cannot be read and for a bag that
+    exists, InputError for a table without one of obstacles.
     """
     if obstacles is None and not table.is_dir():
         raise InputError('--obstacles', 'a table of obstacles, which may be without rows', 'nothing')
@@ -200,10 +182,10 @@ def read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> d
     errors: list[FocError] = []
     find, found = collect(errors, read), dict[str, list[Row]]()
     known, rows = len(errors), read_rows(file, ('recording', 't_s', 'x_m', 'y_m'), ('z_m',))
-    collect(errors, parse_rows, rows, lambda row: found.setdefault(read_recording(row), []).append(row))
+    collect(errors, parse_rows, rows, lambda row: found.setdefault(row.read_name('recording'), []).append(row))
     if len(errors) == known:
         collect(errors, check_not_empty, file, found)
-    _warn_once_for_each(file, ((name, doubt) for name, rows in found.items() if (doubt := _find_doubt(rows))))
+    _warn_of_doubts(file, {name: _doubt_samples(rows) for name, rows in found.items()})
     samples = {name: _parse_samples(rows) for name, rows in found.items()}
     failures = [each for each in samples.values() if isinstance(each, RecordingError)]
     if find is None or errors or len(failures) == len(found):
@@ -215,7 +197,7 @@ def read_with_scenes(file: Path, read: Callable[[], FindScene], data: Path) -> d
         else:
             stamps_ns = tuple(EPOCH_NS + round(t_s * NANOSECONDS) for t_s in each[:, 0].tolist())
             recordings[name] = TableRecording(name, stamps_ns, each[:, 1:], find(name))
-    _warn_of_far_scenes(data, [each for each in recordings.values() if isinstance(each, TableRecording)])
+    _warn_of_doubts(data, {name: _doubt_scene(each) for name, each in recordings.items() if isinstance(each, TableRecording)})
     return recordings
 
 
@@ -235,66 +217,56 @@ def _parse_samples(table: Iterable[Row]) -> Array | RecordingError:
     return np.array(samples)
 
 
-def _find_doubt(rows: Sequence[Row]) -> Doubt | None:
-    """Find times or positions that cannot be in s and m, or that repeat, also in rows that cannot be used because of that."""
+def _doubt_samples(rows: Sequence[Row]) -> Iterator[Doubt]:
+    """Yield times or positions that cannot be in s and m, or that repeat, also in rows that cannot be used because of that."""
     columns = [column for column in ('t_s', 'x_m', 'y_m', 'z_m') if column in rows[0].cells]
     numbers = np.array([[row.parse_number(column) for column in columns] for row in rows])
     steps = np.diff(numbers[np.isfinite(numbers).all(axis=1)], axis=0)
     forward, repeated = steps[steps[:, 0] > 0.0], int((steps[:, 0] == 0.0).sum())
-    if len(steps) < 2:
-        return None
-    if 2 * repeated >= len(steps):
-        return 't_s', 'repeats', f'{repeated} of {len(steps)} rows have the time of the row before'
-    if not len(forward):
-        return None
-    step_s = float(np.median(forward[:, 0]))
-    if not 1e-4 <= step_s <= 1.0:  # of a tracker
-        units = {'ns': 1e-9, 'us': 1e-6, 'ms': 1e-3, 'min': 60.0, 'h': 3600.0, 'days': 86400.0}
-        words = f'seems to be in {_find_nearest_unit(units, step_s, 0.01)}'
-        return 't_s', words, f'the median time between two poses is {step_s:.3g} s'
-    speed = float(np.quantile(np.linalg.norm(forward[:, 1:], axis=1) / forward[:, 0], 0.99))
-    if speed <= 20.0:  # beyond that of any hand
-        return None
-    return 'the position', f'seems to be in {_find_nearest_unit(LENGTH_UNITS, speed, 0.5)}', f'the hand moves at {speed:.3g} m/s'
+    if 2 * repeated >= len(steps) > 1:
+        yield 't_s', 'repeats', f'{repeated} of {len(steps)} rows have the time of the row before'
+    elif len(steps) > 1 and len(forward):
+        step_s = float(np.median(forward[:, 0]))
+        speed = float(np.quantile(np.linalg.norm(forward[:, 1:], axis=1) / forward[:, 0], 0.99))
+        if not 1e-4 <= step_s <= 1.0:  # of a tracker
+            unit = _find_nearest_unit(TIME_UNITS, step_s, 0.01)
+            yield 't_s', f'seems to be in {unit}', f'the median time between two poses is {step_s:.3g} s'
+        elif speed > 20.0:  # beyond that of any hand
+            unit = _find_nearest_unit(LENGTH_UNITS, speed, 0.5)
+            yield 'the position', f'seems to be in {unit}', f'the hand moves at {speed:.3g} m/s'
 
 
-def _warn_of_far_scenes(file: Path, recordings: Iterable[TableRecording]) -> None:
-    """Warn of recordings whose goals or obstacles are all too far from the hand, or too large, to be in m; once for each kind.
+def _doubt_scene(recording: TableRecording) -> Iterator[Doubt]:
+    """Yield goals or obstacles that are all too far from the hand, or too large, to be in m.
 
-    Positions that are in another unit themselves give no second warning here: their movement is larger by the same factor.
+    Positions that are in another unit themselves are not doubted again: their movement is larger by the same factor.
     """
-    doubts: list[tuple[str, Doubt]] = []
-    for each in recordings:
-        low, high = each.positions.min(axis=0), each.positions.max(axis=0)
-        extent = max(float(np.linalg.norm(high - low)), 0.1)
-        for kind, rows in (('goals', each.scene.goals), ('obstacles', each.scene.obstacles)):
-            places = np.array([row[:3] for row in (() if rows is None else rows)]).reshape(-1, 3)
-            gap = float(np.linalg.norm(places - np.clip(places, low, high), axis=1).min(initial=math.inf))
-            if max(10.0, 20.0 * extent) < gap < math.inf:
-                words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, gap, extent)}'
-                reason = f'the nearest is {gap:.3g} m from the movement of the hand'
-                doubts.append((each.name, (f'the {kind}', words, reason)))
-            elif kind == 'obstacles' and (least := _find_least_size(each.scene)) > max(1.0, 10.0 * extent):
-                words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, least, 0.1 * extent)}'
-                doubts.append((each.name, ('the sizes of the obstacles', words, f'the smallest is {least:.3g} m')))
-    _warn_once_for_each(file, doubts)
-
-
-def _find_least_size(scene: RecordedScene) -> float:
-    """Return the radius or the larger length of the smallest obstacle [m], 0 if there is none."""
-    return min((max(row[3], *row[6:8]) for row in scene.obstacles), default=0.0)
-
-
-def _warn_once_for_each(file: Path, doubts: Iterable[tuple[str, Doubt]]) -> None:
-    """Warn once of what is doubted in several recordings, given with their names."""
-    grouped: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for name, (what, words, reason) in doubts:
-        grouped.setdefault((what, words), []).append((name, reason))
-    for (what, words), ((name, reason), *rest) in grouped.items():
-        others = f' and {len(rest)} others' if rest else ''
-        warn(f'{file}: {what} of recording {name}{others} {words}: {reason}')
+    low, high, scene = recording.positions.min(axis=0), recording.positions.max(axis=0), recording.scene
+    extent, least = (
+        max(float(np.linalg.norm(high - low)), 0.1),
+        min((max(row[3], *row[6:8]) for row in scene.obstacles), default=0.0),
+    )
+    for kind, rows in (('goals', scene.goals), ('obstacles', scene.obstacles)):
+        places = np.array([row[:3] for row in (() if rows is None else rows)]).reshape(-1, 3)
+        gap = float(np.linalg.norm(places - np.clip(places, low, high), axis=1).min(initial=math.inf))
+        if max(10.0, 20.0 * extent) < gap < math.inf:
+            words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, gap, extent)}'
+            yield f'the {kind}', words, f'the nearest is {gap:.3g} m from the movement of the hand'
+        elif kind == 'obstacles' and least > max(1.0, 10.0 * extent):
+            words = f'seem to be in {_find_nearest_unit(LENGTH_UNITS, least, 0.1 * extent)}'
+            yield 'the sizes of the obstacles', words, f'the smallest is {least:.3g} m'
 
 
 def _find_nearest_unit(units: Mapping[str, float], value: float, usual: float) -> str:
-    """Return the unit in which a value is nearest to a usual one, by their ratio."""
     return min(units, key=lambda each: abs(math.log(value * units[each] / usual)))
+
+
+def _warn_of_doubts(file: Path, doubts: Mapping[str, Iterable[Doubt]]) -> None:
+    """Warn once of what is doubted in several recordings, given by their names."""
+    grouped: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for name, found in doubts.items():
+        for what, words, reason in found:
+            grouped.setdefault((what, words), []).append((name, reason))
+    for (what, words), ((name, reason), *rest) in grouped.items():
+        others = f' and {len(rest)} others' if rest else ''
+        warn(f'{file}: {what} of recording {name}{others} {words}: {reason}')

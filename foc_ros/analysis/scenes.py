@@ -3,9 +3,8 @@
 """The scenes of recordings in CSV tables: circles and boxes in the plane with goals, or boxes in space.
 
 Boxes in space are a table of their own: the boxes, walls and targets among which people reached, one scene for each recording.
-The columns are `recording`, `object`, the centre `x_m`, `y_m`, `z_m`, and the full lengths along these axes `width_m`, `depth_m`
-and `height_m`. The object `Target` is the goal of its recording, and no obstacle. Where a table of trials has the column
-`object`, which is what the hand picked up, all objects that are picked up in any recording are goals, and obstacles.
+The object `Target` is the goal of its recording, and no obstacle. Where a table of trials has the column `object`, which is what
+the hand picked up, all objects that are picked up in any recording are goals, and obstacles.
 """
 
 from __future__ import annotations
@@ -35,9 +34,9 @@ NO_GOAL = -1
 class RecordedScene:
     """What a recording took place in.
 
-    obstacles: rows of `encode_obstacles`; goals (g, 3) [m], None where they are unknown; boxes: by name, instead of the rows,
-    x, y, z of the centre and the full lengths along these axes [m]; goal: row of the goal that was reached, `NO_GOAL` if it is
-    not among them, None where no table says it.
+    obstacles: rows of `encode_obstacles`; goals (g, 3) [m], None where they are unknown; boxes: by name, instead of the rows, x,
+    y, z of the centre and the full lengths along these axes [m]; goal: row of the goal that was reached, `NO_GOAL` if it is not
+    among them, None where no table says it.
     """
 
     obstacles: tuple[tuple[float, ...], ...] = ()
@@ -56,10 +55,7 @@ FindScene = Callable[[str], RecordedScene]
 
 
 def read_scenes(obstacles: Path | None, goals: Path | None) -> FindScene:
-    """Read the tables of obstacles and of goals; a column `recording` gives each recording its own rows.
-
-    Raises one RecordingError for the errors of both.
-    """
+    """Read the tables of obstacles and of goals; a column `recording` gives each recording its own rows."""
     readers = [(read_obstacles, obstacles), (read_goals, goals)]
     rows, targets = collect_all(lambda read, file: {} if file is None else read(file), readers)
 
@@ -77,12 +73,12 @@ def read_scenes(obstacles: Path | None, goals: Path | None) -> FindScene:
 def read_obstacles(file: Path) -> dict[str, tuple[tuple[float, ...], ...]]:
     """Return obstacles by recording as rows x, y, z, radius, radius_stddev, id, size_x, size_y, yaw, possibly none.
 
-    Ids default to the position in the rows of the recording. There are at most as many as a message may contain.
+    Ids default to the position in the rows of the recording.
     """
     found: dict[str, dict[int, tuple[float, ...]]] = {}
 
     def parse(row: Row) -> None:
-        rows = found.setdefault(read_recording(row), {})
+        rows = found.setdefault(row.read_name('recording'), {})
         x, y, z, radius, stddev, *size, yaw = row.read_numbers(*POSITION, *EXTENT, Column('yaw_rad', default=0.0))
         identity = row.read_integer('id', -(2**31), 2**31 - 1, default=len(rows))
         if identity in rows:
@@ -102,7 +98,7 @@ def read_goals(file: Path) -> dict[str, Array]:
     found: dict[str, list[tuple[float, ...]]] = {}
     parse_rows(
         read_rows(file, ('x_m', 'y_m'), ('recording', 'z_m')),
-        lambda row: found.setdefault(read_recording(row), []).append(tuple(row.read_numbers(*POSITION))),
+        lambda row: found.setdefault(row.read_name('recording'), []).append(tuple(row.read_numbers(*POSITION))),
     )
     _check_length(file, found, MAX_GOALS)
     check_not_empty(file, found)
@@ -132,10 +128,8 @@ def read_picked(file: Path) -> Mapping[str, str]:
     found: dict[str, str] = {}
 
     def parse(row: Row) -> None:
-        if row.cells.get('object') == '':
-            raise row.make_error('object', 'a name')
-        if 'object' in row.cells:
-            found[row.cells['recording']] = row.cells['object']
+        if name := row.read_name('object'):
+            found[row.cells['recording']] = name
 
     parse_rows(read_rows(file, ('recording',)), parse)
     return found
@@ -146,23 +140,13 @@ def read_boxes(file: Path) -> Mapping[str, Mapping[str, tuple[float, ...]]]:
     found: dict[str, dict[str, tuple[float, ...]]] = {}
 
     def parse(row: Row) -> None:
-        for column in ('recording', 'object'):
-            if not row.cells[column]:
-                raise row.make_error(column, 'a name')
-        boxes, name = found.setdefault(row.cells['recording'], {}), row.cells['object']
+        boxes, name = found.setdefault(row.read_name('recording'), {}), row.read_name('object')
         if name in boxes:
             raise row.make_error('object', 'another name than the rows above of this recording')
         boxes[name] = tuple(row.read_numbers(*BOX))
 
     parse_rows(read_rows(file, ('recording', 'object', *(each.name for each in BOX))), parse)
     return found
-
-
-def read_recording(row: Row) -> str:
-    """Return the recording of a row, an empty text if the table does not have the column."""
-    if row.cells.get('recording') == '':
-        raise row.make_error('recording', 'a name')
-    return row.cells.get('recording', '')
 
 
 def _check_length(file: Path, found: Mapping[str, Sized], most: int) -> None:

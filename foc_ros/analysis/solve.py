@@ -26,7 +26,6 @@ COLUMNS = {
     'mc_step': '{:.4f}',
     'mc_path': '{:.4f}',
 }
-"""Columns of the table and the formats of their values."""
 
 
 def solve_to_values(scene: ReachingScene, samples: int | None) -> tuple[Prediction, dict[str, Any]]:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands: each signature declares its arguments, each docstring explains them in `--help`.
 
-A command checks its arguments, and reads small files, before it imports what computes: that takes seconds.
+A command checks its arguments before it imports what computes: that takes seconds.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def replay(
     output
         New bag for inputs and predictions.
     report
-        Folder for a page, its numbers and a picture of all movements.
+        Folder for a page and its numbers.
     guidance
         Compute guidance as well, at guidance.rate_hz: into the output bag and, with --json, as a list `guidance`.
     remap
@@ -166,8 +166,7 @@ def replay(
     check_bag(bag)
     if output is not None:
         check_new_bag(output)
-    from foc_ros.analysis.replay import GuidanceReplay, Replay
-    from foc_ros.analysis.replay_output import Summary, facts, replay_to
+    from foc_ros.analysis.replay import GuidanceReplay, Replay, Summary, facts, replay_to
     from foc_ros.io.bags import BagReader
     from foc_ros.io.class_library import extend_library
     from foc_ros.io.terminal import show_address, show_table

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program `foc_ros`.
 
-Exit codes: 0 done; 2 the input is wrong, and a line on standard error for each error names field, value and bound; 3 no candidate
-could be solved; 141 if the reader of standard output has closed it, as in a shell. If standard output cannot be written, for
-example because its disk is full, the code is 2.
+Exit codes: 0 done; 2 the input is wrong, or standard output cannot be written, and a line on standard error for each error names
+field, value and bound; 3 no candidate could be solved; 141 if the reader of standard output has closed it, as in a shell.
 """
 
 from __future__ import annotations

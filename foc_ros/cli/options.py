@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The program, and the types of its commands' arguments: each reads a text, and refuses what cannot be used.
-
-Nothing that computes is imported here, so that a wrong argument is answered at once.
-"""
+"""The program, and the types of its commands' arguments; nothing that computes is imported, so that a wrong one ends at once."""
 
 from __future__ import annotations
 
@@ -45,7 +42,6 @@ RECORDINGS = Group.create_ordered('For recordings of people')
 OTHER = Group.create_ordered('Other')
 
 Table = tuple[str | None, Sequence[str], Iterable[Sequence[str]]]
-"""Title, columns and rows."""
 
 
 def _read(read: Callable[[str], Any], **options: Any) -> Parameter:
@@ -87,8 +83,6 @@ def _read_address(text: str) -> str:
 
 
 def _read_remaps(_: object, tokens: Sequence[Token]) -> tuple[tuple[str, str], ...]:
-    """Return the name of each input and the topic from which it is taken."""
-
     def read(text: str) -> tuple[str, str]:
         role, separator, topic = text.partition(':=')
         if not separator or not topic:

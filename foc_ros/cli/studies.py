@@ -5,11 +5,9 @@
 from __future__ import annotations
 
 import json as json_format
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from foc_ros.analysis.simulation import ASSISTANCE, HUMAN_PATHS, OPERATORS
 from foc_ros.core.errors import InputError, RecordingError, print_messages
@@ -152,19 +150,6 @@ def simulate(
     recordings
         Recordings of people, as for evaluate, for the operator human_paths.
     """
-    return run_simulation(operators, assistance, trials, seed, recordings, study)
-
-
-def run_simulation(
-    operators: tuple[str, ...] | None,
-    assistance: tuple[str, ...],
-    trials: int,
-    seed: int,
-    recordings: Path | None,
-    study: Study,
-    rivals: Mapping[str, Any] | None = None,
-) -> int:
-    """Run the study of `simulate`, with further assistance rules by name; return the exit code."""
     from foc_ros.analysis.recordings import find_recordings
 
     study.check(SIMULATION_PAGE)
@@ -179,7 +164,7 @@ def run_simulation(
 
     tasks = read_tasks(found.values(), study.params) if found else []
     with study.open_workers():
-        run = partial(run_pair, config=study.params, rules={**RULES, **(rivals or {})})
+        run = partial(run_pair, config=study.params, rules=RULES)
         results = collect_all(run, make_pairs(operators, assistance, trials, seed, tasks), 'simulate')
     cells = summarise(results, seed)
     write_report(cells, results, study.params)

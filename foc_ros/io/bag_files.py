@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The files of a recording, MCAP or SQLite: their channels, the messages of those that are needed, and checksums.
 
-A message type is named `pkg/msg/Type`; older recorders leave `msg` out. What is not in the encoding of ROS 2 is not read, and
-its type says so wherever a message lists the topics.
+A message type is named `pkg/msg/Type`; older recorders leave `msg` out. What is not in the encoding of ROS 2 is not read.
 """
 
 from __future__ import annotations
@@ -46,8 +45,8 @@ FOOTER_BYTES = 37
 class Channel:
     """A topic of one file.
 
-    kind: message type; encoding: of the messages; form, definition: language and text of the definition of the type, if it is
-    stored; qos: the offered quality of service as YAML; count: number of messages; key: the channel within its file.
+    kind: message type; form, definition: language and text of its definition, if it is stored; qos: the offered quality of
+    service as YAML; count: number of messages; key: the channel within its file.
     """
 
     key: int
@@ -114,13 +113,11 @@ class McapFile:
     """An MCAP file, read by the library mcap; a stack closes it.
 
     It is read from begin to end once before its messages are, which compares the checksums of the chunks and of the data section.
-    So no optional record is needed: neither the summary nor any index. A file without its footer, whose recorder was killed, is
-    read up to its last whole chunk.
+    So no optional record is needed. A file without its footer, whose recorder was killed, is read up to its last whole chunk.
 
-    Attributes, also of :class:`SqliteFile`: channels; message_count, of all channels and of messages without one; times_ns, of
-    the first and the last message; loss, why messages that the recorder received are missing, empty if the file is whole; doubt,
-    why they may be missing where nothing states their number; is_counted, whether the file itself states how many messages it
-    has, and has them.
+    Attributes, also of :class:`SqliteFile`: channels; message_count, also of messages without a channel; times_ns, of the first
+    and the last message; loss, why messages that the recorder received are missing, empty if the file is whole; doubt, why they
+    may be missing where nothing states their number; is_counted, whether the file itself states how many messages it has.
     """
 
     doubt = ''
@@ -164,7 +161,6 @@ class McapFile:
             yield by_key[message.channel_id], message.log_time, message.data
 
     def _read_records(self, *, is_checked: bool) -> Iterator[object]:
-        """Yield the records of the file, those of its chunks too; without a footer, up to the last whole one."""
         self._stream.seek(0)
         try:
             yield from StreamReader(self._stream, validate_crcs=is_checked).records
@@ -182,10 +178,7 @@ class McapFile:
 
 
 def add_checksums(file: Path) -> None:
-    """Write the checksums (CRC-32) into a whole MCAP file without compression: rosbags writes none. Raises OSError.
-
-    MCAP (https://mcap.dev/spec) has one for each chunk, for the data section, and for the summary with the footer.
-    """
+    """Write the checksums into an MCAP file without compression (https://mcap.dev/spec): rosbags writes none. Raises OSError."""
     chunk, data_end, footer, head = 0x06, 0x0F, 0x02, struct.Struct('<BQ')
     with file.open('r+b') as stream, mmap(stream.fileno(), 0) as content, memoryview(content) as data:
         start, summary, code = len(MAGIC), 0, 0
@@ -207,8 +200,7 @@ def add_checksums(file: Path) -> None:
 class SqliteFile:
     """A file of SQLite in any version that rosbag2 has written; a stack closes it.
 
-    A file whose recorder was killed has a log of its last transactions beside it. It is read with them, from a copy: SQLite would
-    otherwise write into the recording.
+    With the log of a recorder that was killed it is read from a copy: SQLite would otherwise write into the recording.
     """
 
     is_counted = False

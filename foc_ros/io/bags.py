@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS 2 bags, read and written without ROS.
 
-The messages read are counted against the number that the bag states, and its bytes are compared with its checksums, so that none
-is lost or changed unnoticed. Every fault of the file is raised as one :class:`RecordingError` with its name and the reason; what
-is missing from a recording that can be read all the same is a :class:`FocWarning`.
+The messages read are counted against the number that the bag states, and its bytes are compared with its checksums. Every fault
+of the file is raised as one :class:`RecordingError` with its name and the reason; what is missing from a recording that can be
+read all the same is a :class:`FocWarning`.
 """
 
 from __future__ import annotations
@@ -44,10 +44,7 @@ LARGEST_MESSAGE = 100_000_000
 
 @dataclass(frozen=True)
 class Item:
-    """One recorded message: the name of its input, its topic, log time [ns], the decoded message, and its bytes.
-
-    The message is a MessageError where the bytes cannot be decoded.
-    """
+    """One recorded message: the name of its input, its topic, log time [ns], the message or its MessageError, and its bytes."""
 
     role: str
     topic: str
@@ -60,9 +57,8 @@ class BagReader:
     """The predictor's inputs in a recording, as an iterator in order of log time, within a context manager.
 
     path: bag directory, with or without metadata.yaml, or one .mcap or .db3 file; each file may be compressed with zstd. chosen:
-    topic by name of the input, overriding names and types. is_whole: whether a recording of which a part is missing is an error;
-    otherwise it is a warning. Other topics are not read, and their definitions are not parsed. Raises RecordingError on opening
-    and on iteration.
+    topic by name of the input. is_whole: whether a recording of which a part is missing is an error; otherwise it is a warning.
+    Other topics are not read. Raises RecordingError on opening and on iteration.
 
     Attributes: roles, the topic of every input found; message_count, of the bag; duration_s, from its first to its last message.
     """
@@ -82,7 +78,6 @@ class BagReader:
         self._stack.close()
 
     def __iter__(self) -> Iterator[Item]:
-        """Yield every message of an input."""
         with _named_errors(self.path):
             needed = [each for each in self._channels if each.is_read and each.topic in self._names]
             parts = [file.messages([each for each in file.channels if each in needed]) for file in self._files]
@@ -140,10 +135,7 @@ class BagReader:
 
 
 class BagWriter:
-    """A new bag, within a context manager: a directory with metadata.yaml and one .mcap file with checksums, rosbag2 version 9.
-
-    An existing path is refused, and an unfinished bag is removed. Raises RecordingError.
-    """
+    """A new bag, within a context: a directory with metadata.yaml and one .mcap file with checksums; else RecordingError."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
@@ -245,10 +237,7 @@ def _decompress(data: bytes) -> bytes:
 
 
 def _list_files(folder: Path) -> tuple[list[Path], int | None, str]:
-    """Return the files of a bag directory, the number of messages that its metadata.yaml states, and in words which files lack.
-
-    The number is None without a metadata.yaml. That is not needed to read a bag, so a wrong one is only named.
-    """
+    """Return the files of a bag directory, the number of messages that its metadata.yaml states, if any, and which files lack."""
     found: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
         if is_bag_file(path):
@@ -295,11 +284,7 @@ def _find_gap(names: Collection[str]) -> str:
 
 @contextmanager
 def _named_errors(path: Path) -> Iterator[None]:
-    """Turn every error of a reader into one RecordingError with the name of the file.
-
-    A damaged file makes the readers fail in many ways (their own errors, struct, seek, decompression, Unicode, SQLite), so all
-    exceptions are caught; nothing but reading happens inside.
-    """
+    """Turn every error of a reader into one RecordingError with the name of the file: damage makes them fail in many ways."""
     try:
         yield
     except RecordingError as error:

@@ -24,10 +24,7 @@ MOST_WAYS, MOST_OBSTACLES = 500, 4096
 
 
 def load_library(name: str) -> tuple[Demonstration, ...]:
-    """Return the demonstrations of a library file, none for an empty name.
-
-    Raises RecordingError if the file cannot be read, InputError, naming field, value and bound, if it is no library.
-    """
+    """Return the demonstrations of a library file, none for an empty name; RecordingError or InputError where it is none."""
     if not name:
         return ()
     document = read_document(Path(name))
@@ -39,10 +36,7 @@ def load_library(name: str) -> tuple[Demonstration, ...]:
 
 
 def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
-    """Write a library, replacing the file.
-
-    Raises RecordingError if the file cannot be written, InputError for more demonstrations than a library may hold.
-    """
+    """Write a library, replacing the file; RecordingError if that is impossible, InputError for more than it may hold."""
     if len(ways) > MOST_WAYS:
         raise InputError(f'{file}: ways', f'at most {MOST_WAYS}', f'{len(ways)} with the new ones')
     words, rows = {side: word for word, side in SIDES.items()}, []
@@ -66,11 +60,7 @@ def save_library(file: Path, ways: Sequence[Demonstration]) -> None:
 
 
 def extend_library(file: Path, ways: Sequence[Demonstration]) -> int:
-    """Add demonstrations to a library, which is made where there is none; return how many of them it did not contain.
-
-    Processes that do so at once wait for each other, so that the file has what all of them add. Raises as `load_library` and
-    `save_library` do.
-    """
+    """Add demonstrations to a library, made where there is none; return how many are new. Other processes wait meanwhile."""
     with lock_folder(file.resolve().parent):
         given = load_library(str(file)) if file.exists() else ()
         new = [each for each in ways if not any(is_same_recording(each, known) for known in given)]

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""CSV tables of measured numbers, checked cell by cell: every error names file, row, column, value and bound.
-
-The errors of all rows are raised together, as one error with notes.
-"""
+"""CSV tables of measured numbers, checked cell by cell: every error names file, row, column, value and bound."""
 
 from __future__ import annotations
 
@@ -73,6 +70,12 @@ class Row:
             raise self.make_error(column, f'a whole number in [{low}, {high}]')
         return int(value)
 
+    def read_name(self, column: str) -> str:
+        """Return a cell that may not be empty; an empty text if the table does not have the column."""
+        if self.cells.get(column) == '':
+            raise self.make_error(column, 'a name')
+        return self.cells.get(column, '')
+
     def make_error(self, column: str, expected: str) -> RecordingError:
         """Return the error of a cell."""
         return RecordingError(f'{self.file}: row {self.line}, column {column}: expected {expected}, got {self.cells[column]!r}')
@@ -102,9 +105,8 @@ def read_rows(
     """Yield the rows of a CSV file with a header; empty lines are skipped, and other columns are allowed.
 
     The separator is found in the header, before which a spreadsheet may name it (`sep=;`). optional: columns that may be missing;
-    instead: columns that together replace a needed one. Raises RecordingError for a file that cannot be read, for one that lacks
-    a needed column, names a column twice or has a misspelt one, and after the last row for rows with more or fewer cells than the
-    header.
+    instead: columns that together replace a needed one. Raises RecordingError for a file that cannot be read, for a wrong header,
+    and after the last row for rows with more or fewer cells than that.
     """
     try:
         with file.open(newline='', encoding='utf-8-sig') as stream:
@@ -142,7 +144,6 @@ def read_rows(
 def _check_header(
     file: Path, cells: list[str], needed: tuple[str, ...], optional: tuple[str, ...], instead: Mapping[str, tuple[str, ...]]
 ) -> list[str]:
-    """Return the names of the columns; see `read_rows`."""
     header = [name.strip() for name in cells]
     if not header:
         raise RecordingError(f'{file}: the file is empty: expected columns {", ".join(needed)}')

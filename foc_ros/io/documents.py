@@ -16,15 +16,10 @@ from foc_ros.core.errors import RecordingError
 
 MAX_BYTES = 5_000_000
 """Size beyond that of any scene or parameter file; the YAML parser takes half a minute for it."""
-MAX_DEPTH = 20
-"""Mappings and lists within each other; the deepest file, a parameter file with quality of service, needs six."""
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Safe YAML without tags, and without aliases, which can stand for any amount of data.
-
-    PyYAML itself uses the last value of a key that is given twice, and fails in many ways where a value does not fit its tag.
-    """
+    """Safe YAML without tags, without a key that is given twice, and without aliases, which can stand for any amount of data."""
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Return the next node; see :class:`yaml.SafeLoader`."""
@@ -44,20 +39,18 @@ class _StrictLoader(yaml.SafeLoader):
             raise yaml.constructor.ConstructorError(None, None, str(error), node.start_mark) from error
         return super().construct_mapping(node, deep)
 
-    def construct_yaml_int(self, node: yaml.ScalarNode) -> Any:
-        """Return the number; `1:30` and `1_0` remain texts, as they are for ROS and YAML 1.2."""
-        return super().construct_yaml_int(node) if not set(':_') & set(node.value) else node.value
 
-    def construct_yaml_float(self, node: yaml.ScalarNode) -> Any:
-        """Return the number; `1:30.0` and `1_0.0` remain texts, too."""
-        return super().construct_yaml_float(node) if not set(':_') & set(node.value) else node.value
-
-
-_StrictLoader.add_constructor('tag:yaml.org,2002:int', _StrictLoader.construct_yaml_int)
-_StrictLoader.add_constructor('tag:yaml.org,2002:float', _StrictLoader.construct_yaml_float)
-# as for ROS, and YAML 1.2, 1e-3, .5e2 and -.5 are numbers; for PyYAML only 1.0e-3, .5e+2 and -0.5 are
-_NUMBER = re.compile(r'[-+]?([0-9]+\.?|[0-9]*\.[0-9]+)e[-+]?[0-9]+$|[-+]\.[0-9]+$', re.IGNORECASE)
-_StrictLoader.add_implicit_resolver('tag:yaml.org,2002:float', _NUMBER, list('-+.0123456789'))
+# as for ROS and YAML 1.2, and not as for PyYAML, 1e-3, .5e2 and -.5 are numbers, while 1:30 and 1_0 are texts
+NUMBERS = {
+    'tag:yaml.org,2002:int': r'[-+]?(0b[01]+|0x[0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)$',
+    'tag:yaml.org,2002:float': r'(?i)[-+]?(([0-9]+\.?[0-9]*|\.[0-9]+)e[-+]?[0-9]+|[0-9]+\.[0-9]*|\.[0-9]+|\.inf)$|\.nan$',
+}
+_StrictLoader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in rules if tag not in NUMBERS]
+    for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _tag, _pattern in NUMBERS.items():
+    _StrictLoader.add_implicit_resolver(_tag, re.compile(_pattern), list('-+.0123456789'))
 
 
 def read_document(file: Path) -> Any:
@@ -69,13 +62,11 @@ def read_document(file: Path) -> Any:
         if len(held) > MAX_BYTES:
             raise RecordingError(f'{file}: expected at most {MAX_BYTES:,} bytes, got more')
         text = held.decode('utf-8-sig')
-        document = json.loads(text, object_pairs_hook=_build_mapping) if is_json else yaml.load(text, _StrictLoader)  # noqa: S506
-        _check_depth(document)
-        return document
+        return json.loads(text, object_pairs_hook=_build_mapping) if is_json else yaml.load(text, _StrictLoader)  # noqa: S506
     except OSError as error:
         raise RecordingError(f'{file}: cannot be read: {error.strerror}') from error
     except RecursionError as error:
-        raise RecordingError(f'{file}: expected at most {MAX_DEPTH} mappings and lists within each other, got more') from error
+        raise RecordingError(f'{file}: expected fewer mappings and lists within each other') from error
     except (ValueError, yaml.YAMLError) as error:
         raise RecordingError(f'{file}: not a {"JSON" if is_json else "YAML"} file: {error}') from error
 
@@ -91,11 +82,3 @@ def _check_keys(names: Iterable[str]) -> None:
         if name in seen:
             raise ValueError(f'the key {name} is given twice')
         seen.add(name)
-
-
-def _check_depth(value: object, left: int = MAX_DEPTH) -> None:
-    if isinstance(value, (dict, list)):
-        if not left:
-            raise RecursionError
-        for each in value.values() if isinstance(value, dict) else value:
-            _check_depth(each, left - 1)

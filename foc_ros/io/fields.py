@@ -44,8 +44,8 @@ class Fields(BaseModel):
 def describe_errors(invalid: ValidationError, known: Mapping[str, Iterable[str]] | None = None) -> list[tuple[str, str, str]]:
     """Return for each error the field, what was expected, and what was found.
 
-    The tag of a union is part of the name of a field, unless it is in brackets. known: names of fields by such a tag, and for
-    what has none by an empty text, which unknown fields are compared with.
+    The tag of a union is part of the name of a field, unless it is in brackets. known: names of fields by such a tag, '' for
+    none.
     """
     found = []
     for each in invalid.errors(include_url=False):

@@ -33,11 +33,10 @@ def encode_goals(prediction: Prediction) -> list[dict[str, Any]]:
 
 
 def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
-    """Return the class, status, costs and path of a candidate.
+    """Return the class, status, costs and path of a candidate; numbers that are not finite become null.
 
-    goal: row of its goal; effort [m^2/s^6], cost [m^2/s^5], tau [m^2], lambda [1/s^6]; mean and stddev (N + 1, 2) of the position
-    [m] at steps 0..N. Where the height over the plane is predicted, also height, height_velocity and height_stddev (N + 1,) [m,
-    m/s]. Numbers that are not finite become null.
+    effort [m^2/s^6], cost [m^2/s^5], tau [m^2], lambda [1/s^6]; mean and stddev (N + 1, 2) of the position [m]. Where the height
+    over the plane is predicted, also height, height_velocity and height_stddev (N + 1,) [m, m/s].
     """
     solution, height = candidate.solution, candidate.height
     variances = np.diagonal(solution.covariance[:, :2, :2], axis1=1, axis2=2)
@@ -63,11 +62,7 @@ def encode_candidate(candidate: PredictedCandidate) -> dict[str, Any]:
 
 
 def encode_solution(solution: Solution) -> dict[str, Any]:
-    """Return what `encode_candidate` leaves out of a solution; units are those of :class:`Solution`.
-
-    rows: the active contacts; velocity and acceleration (N + 1, 2), where acceleration is null if the state of the plant holds
-    only position and velocity; covariance (N + 1, n, n) of the state; control (N, 2).
-    """
+    """Return what `encode_candidate` leaves out of a solution, whose units are those of :class:`Solution`; rows: the contacts."""
     contacts = zip(solution.multipliers, solution.equivalent_weights, strict=True)
     places = {name: getattr(solution, name) for name in ('eta_at', 'violation_at')}
     values = {
@@ -91,7 +86,6 @@ def encode_solution(solution: Solution) -> dict[str, Any]:
 
 
 def _make_plain(value: Any) -> Any:
-    """Return mappings, lists and arrays of numbers for JSON, which has none that are not finite: they become null."""
     if isinstance(value, dict):
         return {name: _make_plain(each) for name, each in value.items()}
     if isinstance(value, (list, np.ndarray)):

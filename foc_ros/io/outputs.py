@@ -15,8 +15,7 @@ from foc_ros.core.errors import FocError, InputError
 MARK = 'made by foc_ros'
 """Text that every picture and page contains that a command writes."""
 EVALUATION_PAGE, FIT_PAGE, SIMULATION_PAGE = 'evaluation.html', 'fit.html', 'simulation.html'
-REPORT_FILES = ('index.html', 'predictions.json', 'overview.png')
-"""Files of the report of a recording."""
+REPORT_FILES = ('index.html', 'predictions.json')
 PICTURE_SUFFIXES = ('.png', '.pdf', '.svg')
 
 
@@ -29,10 +28,7 @@ def check_file(option: str, file: Path) -> None:
 
 
 def check_new_or_earlier(option: str, file: Path, read: Callable[[Path], object]) -> None:
-    """Raise InputError, which names the option, as `check_file` does, or if a file exists that is no earlier one of the command.
-
-    read: reads an earlier one; raises FocError for another file.
-    """
+    """Raise InputError as `check_file` does, or if a file exists that is no earlier one of the command, by `read`."""
     check_file(option, file)
     try:
         if file.is_file() and file.stat().st_size:
@@ -62,10 +58,7 @@ def make_folder(option: str, directory: Path) -> Iterator[None]:
 
 @contextmanager
 def write_whole(file: Path) -> Iterator[Path]:
-    """Yield the path of an unfinished file, which replaces the file when the context ends without an error.
-
-    An earlier file stays until then. A link stays a link. A device is written directly.
-    """
+    """Yield the path of an unfinished file, which replaces the file, or what it links to, when the context ends well."""
     target = file.resolve()
     if target.exists() and not target.is_file():
         yield target
@@ -80,10 +73,7 @@ def write_whole(file: Path) -> Iterator[Path]:
 
 @contextmanager
 def lock_folder(folder: Path, *, waits: bool = True) -> Iterator[None]:
-    """Let one process at a time continue for a folder, where its system and its file system can; a lock ends with its process.
-
-    Raises BlockingIOError where another process has the lock, unless it `waits`.
-    """
+    """Let one process at a time continue for a folder, where its system can; unless it `waits`, raise BlockingIOError."""
     if sys.platform == 'win32':
         yield
         return

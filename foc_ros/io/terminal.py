@@ -33,10 +33,7 @@ class _Console(Console):
 
 
 def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
-    """Yield the items and show a progress bar, or a line of text every some seconds where there is no terminal.
-
-    words: its description; total: number of items.
-    """
+    """Yield the items and show a progress bar, or a line of text every some seconds where there is no terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
         next_s = time.monotonic() + QUIET_S
@@ -51,7 +48,7 @@ def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
-    """Print a table on standard output, with at most `COLUMNS` characters in a line; texts are shown without rich's markup.
+    """Print a table on standard output, with at most `COLUMNS` characters in a line.
 
     Long texts of its first and last columns are folded, those of the first between words where these are short. If that is not
     enough, the table is divided into parts, each with the first column and as many others as fit.
@@ -84,7 +81,6 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str
 
 
 def _measure(text: str) -> int:
-    """Return the width of the longest line of a text [characters]."""
     return max((cell_len(line) for line in text.splitlines()), default=0)
 
 

@@ -37,10 +37,7 @@ TRANSFORMS, STATIC_TRANSFORMS = 'tf', 'tf_static'
 
 
 def assign_topics(topics: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the topic of every role that the recording contains; topics: message type by topic; chosen: topic by role.
-
-    Raises RecordingError for an impossible choice, for several topics that fit equally, and without a hand, obstacles or goals.
-    """
+    """Return the topic of every role that the recording contains; topics: message type by topic; chosen: topic by role."""
     roles = dict(chosen or {})
     for role, topic in roles.items():
         if role not in TYPES:

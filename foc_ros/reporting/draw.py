@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures for print, by matplotlib: scenes with candidates, and the measured hand.
 
-Every picture shows the same thing in the same way. A path is a solid line that begins at the hand, and is the thicker the more
-likely it is; it is dotted if it is not known to avoid the obstacles as surely as wanted. A path that is no proper prediction,
-because it could not be solved or leads through an obstacle, is a ghost: pale, with the reason beside it. Colours are those of
-Okabe and Ito, which can be told apart without perception of hue, and a letter stands beside each.
+A path is a solid line that begins at the hand, and is the thicker the more likely it is; it is dotted if it is not known to avoid
+the obstacles as surely as wanted. A path that is no proper prediction, because it could not be solved or leads through an
+obstacle, is a ghost: pale, with the reason beside it. Colours are those of Okabe and Ito, which can be told apart without
+perception of hue, and a letter stands beside each.
 """
 
 from __future__ import annotations
@@ -130,28 +130,20 @@ def make_obstacle_patch(obstacles: Obstacles, row: int, growth: float, **look: A
     return Polygon(trace_obstacle(obstacles, row, growth), **look)
 
 
-def compute_bounds(
-    obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array, margin: float = 0.04
-) -> Bounds:
-    """Return limits of x and y [m] around obstacles, goals, paths and further points (m, 2); ellipses do not widen them.
-
-    margin: as a share of the greater side.
-    """
+def compute_bounds(obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array) -> Bounds:
+    """Return limits of x and y [m] around obstacles, goals, paths and further points (m, 2); ellipses do not widen them."""
     shapes = find_limits(obstacles, obstacles.radius_stddev)
     enclosed = np.concatenate([*shapes, *map(find_drawn_curve, candidates), np.reshape(goals, (-1, 2)), *points])
     low, high = (enclosed.min(axis=0), enclosed.max(axis=0)) if len(enclosed) else (np.zeros(2), np.ones(2))
-    added = margin * max(*(high - low), 0.05)
+    added = 0.04 * max(*(high - low), 0.05)
     return float(low[0] - added), float(high[0] + added), float(low[1] - added), float(high[1] + added)
 
 
-def draw_scene(
-    axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, named: bool = True, names: Sequence[str] = ()
-) -> None:
-    """Draw obstacles and goals.
+def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, names: Sequence[str] = ()) -> None:
+    """Draw obstacles and goals (g, 2).
 
-    An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. named: whether the goals (g,
-    2) have their names, by default the numbers in the labels of candidates; a name that is also that of the obstacle is written
-    once.
+    An obstacle has its mean radius, in a pale ring as wide as the standard deviation of the radius. names: of the goals, by
+    default the numbers in the labels of candidates; a name that is also that of the obstacle is written once.
     """
     holds_goal = np.any(find_holders(goals, obstacles), axis=0).tolist()
     for row, (name, centre) in enumerate(zip(obstacles.ids, obstacles.centre, strict=True)):
@@ -162,16 +154,15 @@ def draw_scene(
             look = {'facecolor': '0.88', 'edgecolor': '0.7', 'linewidth': 0.6, 'zorder': 0.9}
             look['label'] = 'standard deviation of its radius'
             axes.add_patch(make_obstacle_patch(obstacles, row, ring, **look))
-        if len(obstacles) <= NAMED_OBSTACLES and not (holds_goal[row] and named and name in names):
+        if len(obstacles) <= NAMED_OBSTACLES and not (holds_goal[row] and name in names):
             below = 12 if holds_goal[row] else 0  # where the sign of the goal does not cover it
             look = {'xytext': (0, -below), 'textcoords': 'offset points', 'ha': 'center', 'va': 'center'}
             axes.annotate(name, centre, fontsize=8, annotation_clip=True, **look)
     for number, goal in enumerate(goals):
         look = {'marker': '*', 'markersize': 12, 'color': 'black', 'markerfacecolor': 'white', 'linestyle': ''}
         axes.plot(*goal, zorder=5, label='goal', **look)
-        if named:
-            name = names[number] if names else f'goal{number}'
-            axes.annotate(name, goal, xytext=(6, 6), textcoords='offset points', fontsize=8, zorder=6)
+        name = names[number] if names else f'goal{number}'
+        axes.annotate(name, goal, xytext=(6, 6), textcoords='offset points', fontsize=8, zorder=6)
     axes.set(xlim=bounds[:2], ylim=bounds[2:], xlabel='x [m]', ylabel='y [m]')
     axes.set_aspect('equal')
 
@@ -180,8 +171,8 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
     Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
-    has its total uncertainty, too. Ghosts have their reasons beside them. The legend has one line for all below NOTED, and the
-    others in the order of their group identities.
+    has its total uncertainty, too. The legend has one line for all below NOTED, and the others in the order of their group
+    identities.
     """
     goals, entered = len(snapshot.goal_positions), set[str]()
     order = {each.label: f'candidate {row:04d}' for row, each in enumerate(snapshot.candidates)}
@@ -241,15 +232,6 @@ def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: Span) -> None:
 def draw_hand_now(axes: Any, position: Array) -> None:
     """Draw positions of the hand (s, 2) [m]."""
     axes.plot(*position.T, marker='o', markersize=6, linestyle='', color='black', zorder=6, label='hand')
-
-
-def draw_movement(axes: Any, positions: Array, number: int) -> None:
-    """Draw a movement (m, 2) with an arrow and its number, counted from 1."""
-    colour, dash = get_class_style(number)
-    axes.plot(*positions.T, color=colour, linestyle=dash, linewidth=1.8)
-    tail, head = positions[len(positions) * 2 // 3], positions[len(positions) * 3 // 4]
-    axes.annotate('', head, tail, arrowprops={'arrowstyle': '-|>', 'color': colour, 'linewidth': 0.0, 'mutation_scale': 16})
-    draw_tag(axes, positions[len(positions) * (2 + number % 2) // 6], str(number + 1), colour)
 
 
 def draw_tag(axes: Any, position: Any, text: str, colour: str) -> None:

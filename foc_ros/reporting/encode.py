@@ -21,7 +21,7 @@ from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, find_drawn_curves
 
-from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Bounds, Span, compute_bounds, compute_ellipse_axes
+from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Span, compute_bounds, compute_ellipse_axes
 from .views import LIKELY, CandidateTracks, HandTrajectory, choose_moment, count_likely_paths, describe_ghosts, list_unsolved
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
@@ -33,19 +33,20 @@ MOST_BYTES = 1_250_000
 PATH_POINTS = 26
 
 
-def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence[Span], bounds: Bounds) -> dict[str, Any]:
+def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence[Span]) -> dict[str, Any]:
     """Return everything that the page of a report draws, of at most MOST_BYTES; spans: of the movements.
 
-    count: of the predictions; times [s] after the first hand sample, solve_ms, and unknown, the share that no candidate has, of
-    those that are drawn; tracks: for each its slot, the row of its first prediction and its likelihoods from there on; frames:
-    the predictions at which the slider stops; openings: the frame at which each movement opens, and opened: the movement that the
-    page shows first. Obstacles, goals and labels are stored once and referred to by their row.
+    count: of the predictions; unknown: the share that no candidate has; tracks: for each its slot, the row of its first
+    prediction and its likelihoods from there on; frames: the predictions at which the slider stops; openings: the frame at which
+    each movement opens, and opened: the movement that the page shows first. Obstacles, goals and labels are stored once and
+    referred to by their row.
     """
     count, most = len(tracks.snapshots), MOST_FRAMES
+    known = {'count': count, 'bounds': [round(each, 4) for each in compute_recording_bounds(hand, tracks.snapshots)]}
     kept = select_evenly(count, MOST_TIMES).tolist() if count else []
     tracks = CandidateTracks([tracks.snapshots[row] for row in kept], [tracks.tracks[row] for row in kept], tracks.slots)
     while True:
-        data = _ReportData(hand, tracks).build(spans, bounds, most) | {'count': count}
+        data = _ReportData(hand, tracks).build(spans, most) | known
         size = len(json.dumps(data, separators=(',', ':')))
         if size <= MOST_BYTES or most <= 1:
             return data
@@ -53,8 +54,6 @@ def encode_report(hand: HandTrajectory, tracks: CandidateTracks, spans: Sequence
 
 
 class _ReportData:
-    """Builder of the data of a report."""
-
     def __init__(self, hand: HandTrajectory, tracks: CandidateTracks) -> None:
         self._hand, self._tracks = hand, tracks
         self._origin_ns = int(hand.stamps_ns[0])
@@ -62,7 +61,7 @@ class _ReportData:
         self._goals: dict[str, int] = {}
         self._labels: dict[str, int] = {'': 0}
 
-    def build(self, spans: Sequence[Span], bounds: Bounds, most: int) -> dict[str, Any]:
+    def build(self, spans: Sequence[Span], most: int) -> dict[str, Any]:
         """Return the data with at most so many frames."""
         snapshots, hand = self._tracks.snapshots, self._hand
         rows = select_evenly(len(snapshots), most).tolist() if snapshots else []
@@ -73,7 +72,6 @@ class _ReportData:
         return {
             'unit': {'speed': SPEED, 'time': TIME},
             'named_obstacles': NAMED_OBSTACLES,
-            'bounds': [round(each, 4) for each in bounds],
             'times': [self._seconds(each.stamp_ns) for each in snapshots],
             'solve_ms': [round(1e3 * each.solve_s, 2) if each.solve_s else None for each in snapshots],
             'tracks': [
@@ -128,10 +126,9 @@ class _ReportData:
 def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
     """Return the candidates with a likelihood, the most likely first.
 
-    ghost: why it is no proper prediction, or ''; ghost_at: share of the path at which that is, or None; t and v: at some of
-    the steps; motor: ellipses of the motor noise, none of a candidate that is less than LIKELY; total: of the uncertainty of the
-    most likely candidate, none if that is the same. An ellipse has x, y, greater and smaller standard deviation, and the angle of
-    the greater one [degrees].
+    ghost, ghost_at: as of `describe_ghosts`; t and v: at some of the steps; motor: ellipses of the motor noise, none of a
+    candidate that is less than LIKELY; total: of the uncertainty of the most likely candidate, none if that is the same. An
+    ellipse has x, y, greater and smaller standard deviation, and the angle of the greater one [degrees].
     """
     shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
     if not shown:
@@ -174,14 +171,14 @@ def encode_unsolved(snapshot: Prediction, candidate: PredictedCandidate) -> dict
     return texts | _encode_points(find_drawn_curve(candidate), PATH_POINTS // 2)
 
 
-def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> Bounds:
+def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> tuple[float, float, float, float]:
     """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying paths."""
     points = [hand.positions]
     for each in snapshots:
         points += [each.goal_positions, *find_limits(each.obstacles, each.obstacles.radius_stddev)]
     paths = [find_drawn_curve(candidate) for each in snapshots for candidate in each]
     points += [np.percentile(np.concatenate(paths), (0.5, 99.5), axis=0)] if paths else []
-    return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
+    return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points)
 
 
 def round_number(value: float) -> float | None:

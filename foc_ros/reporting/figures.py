@@ -1,21 +1,18 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whole figures for print: a prediction, a scene, the movements of a recording, a moment of one of them; and their legends.
+"""Whole figures for print: a prediction, a scene, a moment of a recording; and their legends.
 
 A legend is below the axes, so that it covers nothing: the candidates with their classes in words, and the signs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
@@ -28,8 +25,8 @@ SIZE_PT, COLUMNS = 8.0, 70
 """Size of the text, where there is room for it [pt], and characters in a line of a candidate."""
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
-_PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
-"""Subplot and place of axes before a legend took a part of it."""
+LABELS_IN = 0.5
+"""Height of the labels below axes [in]."""
 
 
 def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array | None = None, is_alone: bool = False) -> None:
@@ -46,21 +43,9 @@ def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array |
 
 
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
-    """Draw a prediction with its obstacles and goals.
+    """Draw a prediction with its obstacles and goals, on axes of a new pyplot figure by default; return the axes.
 
-    Parameters
-    ----------
-    prediction : Prediction
-        Its candidates are drawn from the hand on, the thicker the more likely, with ellipses of one standard deviation of the
-        position: filled for motor noise, dashed for the total uncertainty of the most likely one. Those without a likelihood, and
-        those that lead through an obstacle, are pale, with the reason beside them.
-    axes : matplotlib.axes.Axes, optional
-        Where to draw; axes of a new pyplot figure by default. The legend takes a part of their place.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes that hold the drawing.
+    The legend takes a part of their place.
     """
     import matplotlib.pyplot as plt
 
@@ -87,19 +72,6 @@ def make_scene_figure(snapshot: Prediction) -> Figure:
     return figure
 
 
-def make_recording_figure(
-    hand: HandTrajectory, obstacles: Obstacles, goals: Array, spans: Sequence[Span], bounds: Bounds
-) -> Figure:
-    """Return a figure of all movements of a recording, numbered; spans: start and end [ns] of each movement."""
-    with open_figure(WIDTH_IN, _get_height(bounds)) as figure:
-        axes = figure.subplots()
-        draw.draw_scene(axes, obstacles, goals, bounds, named=False)
-        axes.plot(*hand.positions.T, color='0.8', linewidth=0.8)
-        for number, span in enumerate(spans):
-            draw.draw_movement(axes, hand.positions[hand.between(*span)], number)
-    return figure
-
-
 def make_moment_figure(hand: HandTrajectory, snapshot: Prediction, span: Span) -> Figure:
     """Return a figure of one snapshot with the hand during a movement, whose start and end [ns] are span."""
     paths, during = snapshot.candidates_with_likelihood, hand.positions[hand.between(*span)]
@@ -119,22 +91,21 @@ def _frame_scene(snapshot: Prediction) -> tuple[Array, Bounds]:
 
 
 def _get_height(bounds: Bounds) -> float:
-    """Return the height [in] of a scene with equal axes and its axis labels."""
     return float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.6
 
 
 def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> None:
-    """Write everything that is drawn on axes into a legend, in a part of their place.
+    """Write all that is drawn on axes into a legend, in a part of their place; a second call replaces it.
 
-    is_added: whether the figure becomes higher by it; otherwise the text is as small as the place needs. A second call replaces
-    the legend of the first.
+    is_added: whether the figure becomes higher by it; otherwise the text is as small as the place needs.
     """
     from matplotlib.lines import Line2D
+    from mpl_toolkits.axes_grid1 import make_axes_locatable
 
     figure, name = axes.figure, f'legend {id(axes)}'
     for earlier in [each for each in figure.axes if each.get_gid() == name]:
         earlier.remove()
-    slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
+    place = axes.get_position(original=True)
     width_in = figure.get_figwidth() * place.width
     columns, sign_columns = (40, 1) if width_in < 3.5 else (COLUMNS, 2)
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
@@ -147,30 +118,15 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     size_pt = min(SIZE_PT, 72.0 * width_in / (0.62 * (columns + 5)))
     wanted_in = lines * LINE * size_pt / 72.0 + 0.05
     if is_added:
-        figure.set_figheight(figure.get_figheight() + wanted_in)
+        figure.set_figheight(figure.get_figheight() + wanted_in + LABELS_IN)
     height_in = figure.get_figheight() * place.height
     wanted_in = min(wanted_in, 0.5 * height_in)
     size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (LINE * max(lines, 1)))
-    below = _take_place(axes, slot, place, height_in, wanted_in)
+    below = make_axes_locatable(axes).append_axes('bottom', size=wanted_in, pad=LABELS_IN)
     below.set(gid=name)
     below.axis('off')
     look = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
     font, handles = {'family': 'monospace', 'size': size_pt}, [named[label] for label in candidates]
-    below.add_artist(below.legend(handles, texts, title=title, loc='upper left', prop=font, **look))
+    below.add_artist(below.legend(handles, texts, title=title, loc='upper center', prop=font, **look))
     handles, font = [named[label] for label in signs], {'size': size_pt}
-    below.legend(handles, signs, loc='lower left', ncols=sign_columns, columnspacing=2.0, prop=font, **look)
-
-
-def _take_place(axes: Any, slot: Any, place: Any, height_in: float, wanted_in: float) -> Any:
-    """Return new axes of a height [in] below axes, which become so much smaller."""
-    figure = axes.figure
-    gap_in = 0.0 if figure.get_layout_engine() else 0.5  # of the labels below axes
-    parts = [max(height_in - wanted_in - gap_in, 0.2 * height_in), gap_in, wanted_in]
-    if slot is None:
-        bottom = place.y0 + place.height * (gap_in + wanted_in) / sum(parts)
-        axes.set_position((place.x0, bottom, place.width, place.y1 - bottom))
-        return figure.add_axes((place.x0, place.y0, place.width, place.height * wanted_in / sum(parts)))
-    parts = [each for each in parts if each]
-    rows = slot.subgridspec(len(parts), 1, height_ratios=parts, hspace=0.0)
-    axes.set_subplotspec(rows[0])
-    return figure.add_subplot(rows[-1])
+    below.legend(handles, signs, loc='lower center', ncols=sign_columns, columnspacing=2.0, prop=font, **look)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a recording: a directory with one interactive page, a picture of all movements, and the numbers."""
+"""The report of a recording: a directory with one interactive page, and the numbers."""
 
 from __future__ import annotations
 
@@ -19,9 +19,7 @@ from foc_ros.core.types import NANOSECONDS, HandSample
 from foc_ros.io.outputs import MARK, REPORT_FILES, check_page, make_folder, write_whole
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
-from .draw import save_figure
-from .encode import compute_recording_bounds, encode_report, round_number
-from .figures import make_recording_figure
+from .encode import encode_report, round_number
 from .page import Table, render
 from .views import NOTED, HandTrajectory, build_candidate_tracks, build_hand_trajectory, build_snapshot, is_late, list_unsolved
 
@@ -37,11 +35,7 @@ class PageWarning(NamedTuple):
 
 
 class ReportCollector:
-    """Collects what a report shows.
-
-    Attributes: samples, of the hand; snapshots, as `build_snapshot` and `read_snapshot` make them; runs, of which a replay that
-    begins anew has several.
-    """
+    """Collects what a report shows: samples of the hand, snapshots, and runs, of which a replay that begins anew has several."""
 
     def __init__(self) -> None:
         self.samples: list[HandSample] = []
@@ -63,7 +57,7 @@ class ReportCollector:
     def write(self, directory: Path, title: str, summary: Mapping[str, str], tables: Sequence[Table] = ()) -> Path:
         """Write the report and return its page; see :func:`write_report`."""
         runs = {'runs': f'{self.runs}, of which the last one is shown'} if self.runs > 1 else {}
-        return write_report(directory, title, self.hand, self.snapshots, {**summary, **runs}, tables)[0]
+        return write_report(directory, title, self.hand, self.snapshots, {**summary, **runs}, tables)
 
 
 def write_report(
@@ -73,12 +67,11 @@ def write_report(
     snapshots: Sequence[Prediction],
     summary: Mapping[str, str],
     tables: Sequence[Table] = (),
-) -> list[Path]:
-    """Write index.html, predictions.json and overview.png into a directory, replacing an earlier report; return the files.
+) -> Path:
+    """Write `REPORT_FILES` into a directory, replacing an earlier report; return the page.
 
-    hand: the measured movement; snapshots: the predictions in order of their stamps; summary: facts for a table of the page;
-    tables: further ones. Raises InputError if the directory cannot be written or contains other files of those names, or if the
-    hand has no sample.
+    summary: facts for a table of the page; tables: further ones. Raises InputError if that is impossible, or the hand has no
+    sample.
     """
     check_page('--report', directory, *REPORT_FILES)
     if not len(hand.stamps_ns):
@@ -86,7 +79,7 @@ def write_report(
     spans = hand.find_movements() or [(int(hand.stamps_ns[0]), int(hand.stamps_ns[-1]))]
     tracks = build_candidate_tracks(snapshots)
     facts, warnings = {**_collect_facts(snapshots), **summary}, _collect_warnings(snapshots, int(hand.stamps_ns[0]))
-    data = encode_report(hand, tracks, spans, compute_recording_bounds(hand, snapshots))
+    data = encode_report(hand, tracks, spans)
     folded = {name: facts[name] for name in COUNTERS if name in facts}
     shown = {name: text for name, text in facts.items() if name not in folded}
     html = render('report.html', title=title, warnings=warnings, facts=shown, tables=tables, counters=folded, data=data)
@@ -98,17 +91,11 @@ def write_report(
         'hand_samples': len(hand.stamps_ns),
         'predictions': [_encode_snapshot(each, int(hand.stamps_ns[0])) for each in snapshots],
     }
-    page_file, numbers_file, overview_file = (directory / name for name in REPORT_FILES)
-    solved = [each for each in snapshots if each.candidates_with_likelihood]
     with make_folder('--report', directory):
-        if solved:
-            goals = np.unique(np.concatenate([each.goal_positions for each in solved]), axis=0)
-            bounds = compute_recording_bounds(hand, solved)
-            save_figure(make_recording_figure(hand, solved[0].obstacles, goals, spans, bounds), overview_file)
-        for file, text in ((page_file, html), (numbers_file, json.dumps(numbers, indent=1, allow_nan=False))):
-            with write_whole(file) as unfinished:
+        for name, text in zip(REPORT_FILES, (html, json.dumps(numbers, indent=1, allow_nan=False)), strict=True):
+            with write_whole(directory / name) as unfinished:
                 unfinished.write_text(text, encoding='utf-8', errors='replace')
-    return [page_file, numbers_file, *([overview_file] if solved else [])]
+    return directory / REPORT_FILES[0]
 
 
 def describe_late(snapshots: Sequence[Prediction]) -> str:
@@ -153,11 +140,7 @@ def _collect_warnings(snapshots: Sequence[Prediction], origin_ns: int) -> list[P
         lost = [each for each in snapshots for one in list_unsolved(each) if one.status is status]
         words = f'{len(lost)} candidate{"s" if len(lost) > 1 else ""} ended with status {status.value}. Remedy: {status.remedy}.'
         found.append((words, lost))
-    return [PageWarning(words, _measure_seconds(each[0], origin_ns)) for words, each in found if each]
-
-
-def _measure_seconds(snapshot: Prediction, origin_ns: int) -> float:
-    return round((snapshot.stamp_ns - origin_ns) / NANOSECONDS, 4)
+    return [PageWarning(words, round((each[0].stamp_ns - origin_ns) / NANOSECONDS, 4)) for words, each in found if each]
 
 
 def _encode_snapshot(snapshot: Prediction, origin_ns: int) -> dict[str, Any]:

@@ -34,11 +34,7 @@ ONSET_SPEED, PAUSE_S, LEAST_M = 0.05, 0.15, 0.03
 
 
 def build_snapshot(prediction: Prediction) -> Prediction:
-    """Return a prediction as pictures and reports show it; raises FocError if it holds a number that is not finite.
-
-    The candidate that is called most likely comes first, and of the states only positions and velocities are kept: all of them
-    would fill the memory with a long recording.
-    """
+    """Return a prediction as pictures and reports show it, most likely first; FocError if a number is not finite."""
     kept = []
     for each in (*order_candidates(prediction), *list_unsolved(prediction)):
         solution, motor = each.solution, each.solution.motor_covariance
@@ -122,11 +118,7 @@ def count_likely_paths(snapshot: Prediction) -> float:
 
 
 def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -> int | None:
-    """Return the row of the snapshot of a movement that is the most worth seeing, None where the movement has none.
-
-    It has the most likely paths of those on the way, once the filter of the hand has settled: its ellipses have at most 1.5 times
-    the usual size.
-    """
+    """Return the row of the snapshot of a movement with the most likely paths on the way, None where the movement has none."""
     during = {row: each for row, each in enumerate(snapshots) if start_ns <= each.stamp_ns <= end_ns and each.most_likely}
     if not during:
         return None
@@ -140,9 +132,8 @@ def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -
 def describe_ghosts(snapshot: Prediction) -> list[tuple[str, float | None]]:
     """Return why the path of each candidate is no proper prediction, and at which share of it, None if nowhere in particular.
 
-    It could not be solved, or leads through an obstacle; otherwise the reason is ''. The obstacles have their mean sizes and move
-    on at their velocities. The beginning of a path within an obstacle that the hand is in does not count, nor its end within one
-    that is its goal, nor do depths of less than GRAZE_M.
+    It could not be solved, or leads through an obstacle; otherwise the reason is ''. The beginning of a path within an obstacle
+    that the hand is in does not count, nor its end within one that is its goal, nor do depths of less than GRAZE_M.
     """
     reasons = ['' if each.has_likelihood else each.status.value.replace('_', ' ') for each in snapshot]
     places: list[float | None] = [None] * len(reasons)
@@ -192,10 +183,7 @@ class HandTrajectory(Record):
         return slice(int(np.searchsorted(self.stamps_ns, start_ns)), int(np.searchsorted(self.stamps_ns, end_ns, side='right')))
 
     def find_movements(self) -> list[tuple[int, int]]:
-        """Return start and end [ns] of every movement.
-
-        During it the hand is faster than ONSET_SPEED, pauses shorter than PAUSE_S apart; it extends over more than LEAST_M.
-        """
+        """Return start and end [ns] of every movement."""
         rows = np.flatnonzero(self.speed > ONSET_SPEED)
         breaks = np.flatnonzero(np.diff(self.stamps_ns[rows]) > PAUSE_S * NANOSECONDS)
         return [
@@ -214,10 +202,7 @@ def build_hand_trajectory(samples: Sequence[HandSample]) -> HandTrajectory:
 
 
 def parse_sides(label: str, ids: Collection[str]) -> dict[str, int]:
-    """Return the sides that a label names; ids: of the obstacles of the scene, which may contain signs.
-
-    An obstacle that is not among them may have any name without a sign.
-    """
+    """Return the sides that a label names; ids: of the obstacles of the scene, which may contain signs."""
     names = '|'.join([*(re.escape(name) for name in sorted(ids, key=len, reverse=True)), '[^+-]+'])
     found = re.findall(rf'([+-])({names})(?=[+-]|$)', label.partition(':')[2])
     return {name: LEFT if sign == '+' else RIGHT for sign, name in found}
@@ -225,10 +210,7 @@ def parse_sides(label: str, ids: Collection[str]) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class CandidateTracks:
-    """Snapshots with their candidates associated over time: a track has the candidates of one class.
-
-    tracks: for each snapshot, the number of the track of each candidate, by label; slots: of the tracks with a letter and colour.
-    """
+    """Snapshots, for each of them the track of each candidate by label, and the slots of the tracks with a letter and colour."""
 
     snapshots: Sequence[Prediction]
     tracks: Sequence[Mapping[str, int]]
@@ -255,10 +237,7 @@ class Slots:
         self._turn = 0
 
     def assign(self, ways: Sequence[int]) -> list[int | None]:
-        """Return the slots of the present classes, by their numbers; a class that finds none has None.
-
-        A slot whose colour (slot modulo COLOURS) is unused is preferred, then the one that has been free for longest.
-        """
+        """Return the slots of the present classes, by their numbers: of another colour and long free if possible, or None."""
         self._turn += 1
         slots = {way: slot for slot, way in self._owners.items() if way in ways}
         for way in ways:
@@ -273,10 +252,7 @@ class Slots:
 
 
 def build_candidate_tracks(snapshots: Sequence[Prediction]) -> CandidateTracks:
-    """Return the candidates of successive snapshots by track, and the letters and colours of the tracks.
-
-    A track lasts as long as its class has one letter. Tracks are numbered from 0 in order of their appearance.
-    """
+    """Return the candidates of successive snapshots by track, which lasts as long as its class has one letter."""
     given, numbers, tracks = Slots(), dict[tuple[int, int | None], int](), list[dict[str, int]]()
     for snapshot in snapshots:
         shown = snapshot.candidates_with_likelihood

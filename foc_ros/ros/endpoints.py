@@ -57,9 +57,7 @@ def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dic
     """Create the subscriptions, by topic; each calls `receive(topic, message)`.
 
     A scene that was published once, before the start of the node, is received with
-    `qos_overrides./obstacles.subscription.durability: transient_local`, reliably, but then not from volatile or best-effort
-    publishers. Inputs of `find_missing_packages` have no subscription.
-
+    `qos_overrides./obstacles.subscription.durability: transient_local`, reliably. Inputs of `find_missing_packages` have none.
     The endpoints here have no event callbacks, because each of them lengthens every wake-up of rclpy's plain executor:
     `report_unconnected` finds the same in the graph.
     """
@@ -81,7 +79,7 @@ def create_subscriptions(node: Node, receive: Callable[[str, Any], None]) -> dic
 
 
 def create_publisher(node: Node, name: str, kind: str) -> Any:
-    """Create the publisher of an output; name: of the topic below the node's name; kind: type of its messages."""
+    """Create the publisher of an output; name: of the topic below the node's name."""
     return node.create_publisher(
         find_message_class(kind),
         f'~/{name}',
@@ -110,11 +108,7 @@ def find_missing_packages() -> dict[str, str]:
 
 
 def report_unconnected(node: Node, inputs: Mapping[str, Any], outputs: Iterable[Any], loggers: Mapping[str, Any]) -> list[str]:
-    """Log which endpoints cannot hear each other, and which published inputs need a package that is not installed.
-
-    inputs: subscriptions by topic; outputs: publishers; loggers: of the inputs. Returns a text for each publisher that is not
-    heard.
-    """
+    """Log which endpoints cannot hear each other, or need a package; return a text for each publisher that is not heard."""
     for role, package in find_missing_packages().items():
         if inputs and node.count_publishers(role):
             text = f'{role} is published, but cannot be received: the package {package} is not installed'
@@ -152,10 +146,7 @@ def _find_incompatible(pairs: Iterable[tuple[str, qos.QoSProfile, qos.QoSProfile
 
 
 def answer_refused_transitions(service: Any, logger: Any) -> None:
-    """Make the service `~/change_state` answer `success: false` to a transition that does not start in the present state.
-
-    rclpy raises an exception in the service instead, and the caller waits without end.
-    """
+    """Let `~/change_state` refuse a transition by `success: false`: rclpy raises an exception, and the caller waits."""
     change = service.callback
 
     def change_or_refuse(request: Any, response: Any) -> Any:
@@ -180,11 +171,7 @@ def take_queued(subscription: Any) -> list[Any]:
 
 
 class GoalTopics:
-    """One topic for the likelihood of each goal, `~/goal_likelihood/goal0` and so on, which any tool plots by its name.
-
-    A topic is made with the first prediction that has its goal. `remove_absent`, which the node calls once a second, removes
-    those of goals that are gone, so that goals that come and go do not keep the graph busy.
-    """
+    """One topic for the likelihood of each goal, made with the first prediction of it, which any tool plots by its name."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -208,10 +195,7 @@ class GoalTopics:
 
 
 class TfListener:
-    """A buffer of tf2 and its listener; a jump of the node's clock back in time clears it. Raises ImportError without `tf2_ros`.
-
-    node: subscribes to `/tf` and `/tf_static`; notify: called after each transform that arrives, in the thread of its executor.
-    """
+    """A buffer of tf2 and its listener, which calls `notify` after each transform; a jump of the clock back in time clears it."""
 
     def __init__(self, node: Node, notify: Callable[[], None]) -> None:
         import tf2_ros

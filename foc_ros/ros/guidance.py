@@ -3,8 +3,8 @@
 """Guidance of the node: updates at `guidance.rate_hz` by the steady clock in a thread of their own, and their topics.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the
-other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted; while it is
-disabled, the thread waits without updates. The loop needs no ROS; `play` uses it too.
+other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted. The loop needs
+no ROS; `play` uses it too.
 """
 
 from __future__ import annotations
@@ -47,10 +47,7 @@ ZEROS = 2
 
 @dataclass(frozen=True)
 class Newest:
-    """What guidance knows: the hand and the prediction, and when the hand of each was received [s, steady clock].
-
-    is_released: whether the clutch is open or the node is not active.
-    """
+    """What guidance knows: the hand and the prediction, and when the hand of each was received [s, steady clock]."""
 
     config: Config
     hand: FilterState | None = None
@@ -69,17 +66,17 @@ class Newest:
 class GuidanceLoop:
     """Updates guidance, and publishes it until the force has become zero, and then once more.
 
-    Attributes: newest; output, the last one; sample_header, that of the last one that was published; None before the first.
-    Called in the thread: publish, with each output and its header; report, with an exception of an update, after which guidance
-    begins anew with a force of zero; warn, with a text if it may not have its priority, the first time.
+    Attributes: newest; output, the last one; sample_header, that of the last one that was published. Called in the thread:
+    publish, with each output and its header; report, with an exception of an update, after which guidance begins anew with a
+    force of zero; warn, with a text if it may not have its priority.
     """
 
     def __init__(
         self,
         config: Config,
         publish: Callable[[GuidanceOutput, SampleHeader], None],
-        report: Callable[[Exception], None],
-        warn: Callable[[str], None],
+        report: Callable[[Exception], None] = lambda _: None,
+        warn: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.newest = Newest(config)
         self.output: GuidanceOutput | None = None
@@ -206,10 +203,7 @@ class GuidanceLoop:
 
 
 class GuidanceTopics:
-    """Publishes guidance for a node while `loop` runs; `report` is called with an exception of an update.
-
-    publishers: of the node, by the name of the topic below the node's name. Attributes: loop, which has to be told what is new.
-    """
+    """Publishes guidance for a node while `loop` runs, which has to be told what is new; publishers: of the node, by topic."""
 
     def __init__(self, node: Node, publishers: Mapping[str, Any], config: Config, report: Callable[[Exception], None]) -> None:
         self._node, self._publishers = node, publishers
@@ -241,7 +235,6 @@ class GuidanceTopics:
         self._publish(TWIST, command)
 
     def _publish_output(self, output: GuidanceOutput, header: SampleHeader) -> None:
-        """Publish an output; this happens in the thread of guidance."""
         for name, (_, encode) in LIVE_OUTPUTS.items():
             if name in self._publishers and self._publishers[name].get_subscription_count():
                 self._publish(name, encode(output, header, self._thread_types))

@@ -25,11 +25,9 @@ from .intake import SOURCES, Intake
 from .messages.types import MessageTypes, make_header
 
 SOURCE_TOPICS = {source: role for role, source in SOURCES.items()}
-"""Topic of every source of obstacles in the scene."""
 WINDOW = 1000
 """Number of predictions over which the percentiles are computed."""
 OK, WARN, ERROR = 0, 1, 2
-"""Levels of diagnostic_msgs/DiagnosticStatus."""
 HARMLESS = ('candidate_', 'hand_disengaged', 'hand_duplicate', 'hand_skipped', 'predict_', 'predictions', 'transform_newest_')
 """Prefixes of the counts that are no fault by themselves; the reason why no prediction is made is reported as text."""
 FAULTS = ('predict_failed', 'predict_nothing_solved', 'predict_too_late')
@@ -44,10 +42,7 @@ THROTTLE_S = 5.0
 
 @dataclass
 class Input:
-    """Messages of one input: numbers received, refused, and received before the last report.
-
-    And when the last one was received, used and refused, and why it was refused.
-    """
+    """Messages of one input: numbers received, refused, and received before the last report; times, and the last refusal."""
 
     received: int = 0
     refused: int = 0
@@ -59,10 +54,7 @@ class Input:
 
 
 class Freshness:
-    """Ages of the inputs of a pipeline: the time since their last message, and the age of a hand pose, if it has ROS time.
-
-    Attributes: inputs, by topic.
-    """
+    """Ages of the inputs of a pipeline: the time since their last message, and the age of a hand pose, if it has ROS time."""
 
     def __init__(self, pipeline: Pipeline) -> None:
         self.inputs: defaultdict[str, Input] = defaultdict(Input)
@@ -84,7 +76,7 @@ class Freshness:
         """Store the age of a hand pose by ROS time.
 
         Ages count once a movement has begun with a pose that is not older or newer than the timeout. If a recording is played
-        with its own stamps and without `use_sim_time`, the age of its poses means nothing, and it is not checked.
+        with its own stamps and without `use_sim_time`, the age of its poses means nothing.
         """
         self._age_s = (clock_ns - stamp_ns) / NANOSECONDS
         if clock_ns and (is_restart or not self._is_moving):
@@ -101,10 +93,7 @@ class Freshness:
         return now_s if used_s is None else used_s
 
     def find_not_ready_reason(self, now_s: float) -> tuple[str, str] | None:
-        """Return why the clocks allow no prediction, as (kind, text); None if they allow it. The pipeline judges by stamps.
-
-        If a source of obstacles is silent, nothing is predicted: its obstacles may still be there.
-        """
+        """Return why the clocks allow no prediction, as (kind, text); None if they allow it. The pipeline judges by stamps."""
         hand, limit_s, age_s = self.inputs[HAND], self._pipeline.config.estimator.hand_timeout_s, abs(self._age_s)
         limit, silence_s = f'(estimator.hand_timeout_s is {limit_s:g})', now_s - self.used_s(HAND, now_s)
         if 0.0 < limit_s < silence_s:
@@ -126,10 +115,7 @@ class Freshness:
         return [each for each in sources if 0.0 < limit_s < now_s - self.used_s(SOURCE_TOPICS[each], now_s)]
 
     def find_late_reason(self, stamp_ns: int, received_s: float, now_s: float, clock_ns: int) -> str | None:
-        """Return why a prediction is not published now that it is computed, None if it is.
-
-        stamp_ns, received_s: stamp of its hand pose [ns], and when that arrived.
-        """
+        """Return why a prediction is not published now that it is computed, None if it is; received_s: when its pose arrived."""
         age_s, limit_s = now_s - received_s, self._pipeline.config.estimator.hand_timeout_s
         if self._has_ros_time:
             age_s = max(age_s, (clock_ns - stamp_ns) / NANOSECONDS)
@@ -146,16 +132,13 @@ class Health(NamedTuple):
     values: dict[str, str]
 
     def encode(self, node_name: str, stamp_ns: int, types: MessageTypes) -> Any:
-        """Return a diagnostic_msgs/DiagnosticArray with one status; node_name: the node's full name, such as '/foc'."""
+        """Return a diagnostic_msgs/DiagnosticArray with one status; node_name: the full one, such as '/foc'."""
         status = self.level, f'{node_name[1:]}: prediction', self.message, node_name, list(self.values.items())
         return types.fill('diagnostic_msgs/msg/DiagnosticArray', (make_header(types, stamp_ns, ''), [status]))
 
 
 class Monitor:
-    """Counts and times of what the node did; :meth:`report` judges what happened since its last call. Attributes: counts.
-
-    Times are of the steady clock [s]; now_s: the present one.
-    """
+    """Counts and times of what the node did; :meth:`report` judges what happened since its last call. Attributes: counts."""
 
     def __init__(self, intake: Intake, freshness: Freshness, now_s: float) -> None:
         self._intake, self._freshness = intake, freshness
@@ -169,10 +152,7 @@ class Monitor:
         self._reported_s = now_s
 
     def note_prediction(self, prediction: Prediction, start_s: float, now_s: float, budget_s: float, late: str | None) -> None:
-        """Count a prediction that was computed and published between two times.
-
-        budget_s: the time that it had, exceeded from 2 ms on, 0 for no limit; late: why it was not published, None if it was.
-        """
+        """Count a prediction; budget_s: of it, exceeded from 2 ms on; late: why it was not published, None if it was."""
         self._solve_ms.append(1e3 * prediction.solve_s)
         self.counts['predict_over_budget'] += 0.0 < budget_s < prediction.solve_s - 0.002
         if late is not None:
@@ -190,11 +170,7 @@ class Monitor:
         self._error = f'{type(error).__name__}: {error}'
 
     def report(self, now_s: float, state: str, busy_s: float, unheard: Iterable[str]) -> Health:
-        """Return the health since the last call.
-
-        state: of the managed node; busy_s: for how long the present prediction has been computed, 0 if there is none [s];
-        unheard: a text for each publisher that cannot be heard.
-        """
+        """Return the health since the last call; busy_s: for how long a prediction has been computed, 0 if there is none [s]."""
         pipeline, by_clock = self._intake.pipeline, self._freshness.find_not_ready_reason(now_s)
         not_ready_reason = pipeline.not_ready_reason() or (by_clock and by_clock[1])
         totals = Counter(self._intake.counts) + self.counts

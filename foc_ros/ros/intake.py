@@ -27,10 +27,7 @@ STILL_S = 1.0
 
 
 class Arrival(NamedTuple):
-    """A message that can be taken, when it arrived [s], and the frame and transform of its headers.
-
-    error: why it is not in the working frame, empty if it is; is_inexact: whether the newest transform was taken for another.
-    """
+    """A message that can be taken, when it arrived [s], and the frame and transform of its headers, or the error of these."""
 
     message: Any
     received_s: float
@@ -42,9 +39,7 @@ class Arrival(NamedTuple):
 class Intake:
     """Takes messages by the name of their input; one that cannot be decoded changes nothing and is counted.
 
-    A hand pose less than `estimator.min_interval_s` after the last used one is skipped and counted, and nothing of it but its
-    stamp is looked at. A marker whose lifetime ends before the stamp of the last hand sample does not exist for it. Attributes:
-    pipeline; sample: the last decoded hand sample; last_refusal: why the last refused message was refused.
+    Attributes: pipeline; sample: the last decoded hand sample; last_refusal: why the last refused message was refused.
     """
 
     def __init__(self, pipeline: Pipeline) -> None:
@@ -154,11 +149,7 @@ class Intake:
         return self._update(topics.MARKERS, lambda table: table.with_markers(message, now_ns, plane, look_up))
 
     def _update(self, role: str, change: Callable[[ObjectTable], ObjectTable]) -> SampleStatus:
-        """Change the table of an input.
-
-        Several publishers with different delays may add to a table, so a stamp at most `estimator.gap_s` behind the newest one
-        does not make it late.
-        """
+        """Change the table of an input; a stamp at most `estimator.gap_s` behind the newest one does not make it late."""
         before = self._find_table(role)
         table = change(before)
         if table.stamp_ns and 0 < before.stamp_ns - table.stamp_ns <= self.pipeline.config.estimator.gap_s * NANOSECONDS:
@@ -190,7 +181,6 @@ class Intake:
         return table.count_expired(self._now_ns()), self.pipeline.config.scene.marker_radius_stddev
 
     def _note_dropped(self, role: str, dropped: Mapping[str, int], status: SampleStatus) -> SampleStatus:
-        """Count the parts of a message that were left out, if the others were used."""
         for reason, count in dropped.items() if status.is_taken else ():
             self.count_dropped(role, reason, count)
         return status

@@ -37,9 +37,8 @@ class NodeDiedError(FocError):
 def reserve_domain() -> Iterator[int]:
     """Yield a domain in which no other program of this host has a participant, and reserve it within the context.
 
-    The ports for the discovery of all participants and of each of the first ten have to be free (specification of DDSI-RTPS,
-    9.6.1). The reservation is a port of the domain that DDS does not use; it also excludes a program that has chosen this domain
-    and has not joined it yet.
+    The ports for the discovery of all participants and of each of the first ten have to be free (DDSI-RTPS, 9.6.1). The
+    reservation is a port of the domain that DDS does not use.
     """
     for turn in islice(_turns, len(DOMAINS)):
         domain = DOMAINS[turn % len(DOMAINS)]
@@ -81,8 +80,7 @@ def isolated_graph() -> Iterator[tuple[int, Path]]:
 class NodeProcess:
     """The node as a process that starts on entering the context, and has ended on leaving it or with the thread that started it.
 
-    environment: variables of the process; log: file for its output; arguments: those of ROS. Attributes: pid; is_clean, whether
-    it has ended, without an error.
+    log: file for its output; arguments: those of ROS. Attributes: pid; is_clean, whether it has ended, without an error.
     """
 
     def __init__(self, environment: Mapping[str, str], log: Path, *arguments: str) -> None:

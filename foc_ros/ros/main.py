@@ -21,8 +21,8 @@ from .parameters import check_parameter_files
 class StopSignals:
     """Ends the process on SIGINT and SIGTERM: at once until `is_deferred` is set, and then by `is_requested`.
 
-    rclpy's own handlers shut the context down during a callback, and some of the stops then end with an error. This flag ends
-    the loop between two callbacks. During an import the process ends without an exception, which some imports would hide.
+    rclpy's own handlers shut the context down during a callback, and some of the stops then end with an error. During an import
+    the process ends without an exception, which some imports would hide.
     """
 
     def __init__(self) -> None:

@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ROS 2 node: a prediction for every hand pose that is due, and diagnostics once a second.
 
-The pipeline holds the model and the memory and is driven by message stamps, so the node gives the same answers as a replay of
-the same messages, apart from candidates that `budget_s` leaves to an estimate. The node adds the clocks: it makes no prediction
-from an input that has fallen silent, and publishes none that has become too old.
+The pipeline is driven by message stamps, so the node gives the same answers as a replay of the same messages, apart from
+candidates that `budget_s` leaves to an estimate. The node adds the clocks: it makes no prediction from an input that has fallen
+silent, and publishes none that has become too old.
 
-A prediction is computed in another thread, guidance in a third one (`guidance`), and all else in that of the executor. What
-is received or asked for meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state
-of the managed node, nothing that was computed before is published. A running computation cannot be stopped: its deadline is
+A prediction is computed in another thread, guidance in a third one (`guidance`), and all else in that of the executor. What is
+received or asked for meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state of
+the managed node, nothing that was computed before is published. A running computation cannot be stopped: its deadline is
 cancelled, it ends when it next checks that, and its result is ignored.
 
-It is a managed node. Once configured it subscribes and keeps the scene; it predicts only while it is active, from the first hand
-pose after its activation. With `autostart`, the default, it is active at once.
+It is a managed node. Once configured it subscribes and keeps the scene; it predicts only while it is active. With `autostart`,
+the default, it is active at once.
 """
 
 from __future__ import annotations
@@ -138,10 +138,7 @@ class FocNode(LifecycleNode):
         return self._enter('finalized')
 
     def rest(self) -> None:
-        """Wait after a pose of a fast hand, so that several are taken at once; the end of a prediction ends the wait.
-
-        To wake up for each pose at 1 kHz would cost more than to use it, and would delay the threads of guidance and prediction.
-        """
+        """Wait after a pose of a fast hand, so that several are taken at once: to wake up for each costs more than to use it."""
         if self._is_hand_fast:
             self._is_hand_fast = False
             unneeded_s = 0.0 if self.pipeline.config.guidance.enabled else self.pipeline.until_due_s
@@ -177,7 +174,6 @@ class FocNode(LifecycleNode):
         self._transforms = Transforms(self._tf, self.intake)
 
     def _destroy_topics(self) -> None:
-        """Destroy what `on_configure` creates; a prediction that is being computed is abandoned."""
         self.pipeline.reset()
         self._guidance.loop.stop()
         for subscription in self._inputs.values():
@@ -199,10 +195,7 @@ class FocNode(LifecycleNode):
         self._guidance.loop.reconfigure(config)
 
     def _receive(self, role: str, *messages: Any) -> None:
-        """Take messages and those in the queue behind them, and predict once, from the newest hand pose.
-
-        Markers are taken one message at a time, because every message counts and takes time; the hand has its turn in between.
-        """
+        """Take messages and those queued behind them, markers one at a time, and predict once, from the newest hand pose."""
         if role not in self._inputs:
             return  # the executor still held messages when the node was cleaned up
         if role == COMMAND:
@@ -219,7 +212,6 @@ class FocNode(LifecycleNode):
         self._take_released(role)
 
     def _take_held(self) -> None:
-        """Take the held messages whose transform has arrived, or will not arrive any more."""
         for role in self._transforms.roles:
             self._take_released(role)
         if not self._transforms.roles:
@@ -236,7 +228,6 @@ class FocNode(LifecycleNode):
             self._predict()
 
     def _take(self, role: str, arrival: Arrival) -> bool:
-        """Take a message, and log it if it was refused; return whether it was used."""
         status = self.intake.take_arrival(role, arrival)
         entry = self._freshness.note(role, status, arrival.received_s, self.intake.last_refusal)
         if status is None or status.is_refused:
@@ -250,7 +241,6 @@ class FocNode(LifecycleNode):
         return True
 
     def _predict(self) -> None:
-        """Begin a prediction if one is due; while one is being computed, its end begins the next."""
         if self.is_busy or not self.pipeline.is_due:
             return
         start_s = monotonic()

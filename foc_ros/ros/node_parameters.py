@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of `foc_ros.core.config` on a node: their declaration with ranges, and their changes while it runs.
-
-Parameters that are set together are checked together, and all of them are applied or none.
-"""
+"""The parameters of `foc_ros.core.config` on a node: their declaration with ranges, and their changes, all of them or none."""
 
 from __future__ import annotations
 
@@ -24,8 +21,8 @@ from .parameters import AUTOSTART, KNOWN, NODE_ONLY, describe_meaning
 def declare_parameters(node: Any) -> Config:
     """Declare every parameter and `autostart` on a node, and return the configuration with which it starts.
 
-    The node must be created with `automatically_declare_parameters_from_overrides`: the values that it was started with are
-    checked together. Raises ParameterError, also for an unknown name, with a note for every further error.
+    The node must be created with `automatically_declare_parameters_from_overrides`. Raises ParameterError, also for an unknown
+    name, with a note for every further error.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix('').items()}
     errors: list[FocError] = []

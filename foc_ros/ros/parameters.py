@@ -30,19 +30,15 @@ KNOWN = {parameter.name: parameter for parameter in list_parameters()}
 def load_parameter_file(path: Path | str) -> Config:
     """Return the configuration of a ROS 2 parameter file; parameters that it does not contain have their defaults.
 
-    Later sections override earlier ones; sections that do not apply to the node `NODE` are skipped with a warning, and parameters
-    of the node alone without one. Raises ParameterError, naming the parameter, for one that is unknown or out of bounds, with a
-    note for every further one, and where no section applies, and RecordingError if the file is no YAML.
+    Later sections override earlier ones; sections that do not apply to the node `NODE` are skipped with a warning. Raises
+    ParameterError for a parameter that is unknown or out of bounds, with a note for every further one, and where no section
+    applies, and RecordingError if the file is no YAML.
     """
     return replace_values(Config(), _read_values(path, NODE, is_needed=True))
 
 
 def check_parameter_files(arguments: Sequence[str]) -> None:
-    """Raise FocError for a parameter file in the ROS arguments of a node that the commands would refuse, too.
-
-    ROS reads some of them in another way: of a key that is given twice it takes the last, and it skips a section that is not for
-    the node without a word. The node itself checks the values that result from files and arguments.
-    """
+    """Raise FocError for a parameter file in the ROS arguments of a node that the commands would refuse and ROS would not."""
     given = re.findall(r'__(node|name|ns):=(\S+)', ' '.join(arguments))
     names = {'node': 'foc', 'ns': ''} | {key.replace('name', 'node'): value for key, value in given}
     node = f'/{names["ns"].strip("/")}/{names["node"]}'.replace('//', '/')
@@ -99,7 +95,6 @@ def _applies(section: str, node: str) -> bool:
 
 
 def _flatten_group(group: Mapping[Any, object], prefix: str = '') -> Iterator[tuple[str, object]]:
-    """Yield every value by dotted name; names in the file may be nested, dotted or both."""
     for key, value in group.items():
         name = f'{prefix}{key}'
         if isinstance(value, Mapping) and any(known.startswith(f'{name}.') for known in KNOWN):

@@ -31,10 +31,9 @@ DEPTH = 200
 
 
 class Player:
-    """A ROS node that publishes the raw messages of a recording and subscribes to the outputs of another node.
+    """A ROS node, as a context, that publishes the raw messages of a recording and subscribes to the outputs of another node.
 
-    items: the recording, in order; outputs: type of each topic to receive; receive(topic, raw): takes each message of them;
-    tick: called all the time, returns False where the player is to end; domain: of the ROS graph. Use as a context manager.
+    tick: called all the time, returns False where the player is to end; domain: of the ROS graph.
     """
 
     def __init__(
@@ -74,8 +73,8 @@ class Player:
     def connect(self, is_ready: Callable[[], bool]) -> bool:
         """Wait until all topics are connected and the other node is ready; return False if tick returns False before.
 
-        The two ends of a topic discover each other at different times, and a message sent between is lost. So the first message
-        of every input except the hand is repeated until the node has the scene. Raises NodeDiedError after CONNECT_S.
+        A message that is sent before both ends of a topic have discovered each other is lost. So the first message of every input
+        except the hand is repeated until the node has the scene. Raises NodeDiedError after CONNECT_S.
         """
         deadline = time.monotonic() + CONNECT_S
         first = {item.role: item for item in reversed(self._items) if item.role != topics.HAND}

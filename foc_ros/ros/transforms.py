@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages on their way into the working frame: one whose transform arrives later than itself is held until then.
 
-A transform is usually published after the measurement that needs it. A message is therefore held until the transform for its
-stamp is known. After `frames.tolerance_s` the newest transform is taken instead, if it is not farther from the stamp than that.
-Otherwise the message is passed on unchanged with the reason, and is refused because of its frame. The messages of an input keep
-their order. Node and replay share this: times are those of the steady clock in the node, and those of the log in a replay.
+A message is held until the transform for its stamp is known. After `frames.tolerance_s` the newest transform is taken instead, if
+it is not farther from the stamp than that. Otherwise the message is passed on unchanged with the reason, and is refused because
+of its frame. The messages of an input keep their order. Times are those of the steady clock in the node, and of the log in a
+replay.
 """
 
 from __future__ import annotations
@@ -45,10 +45,7 @@ class TransformSource(Protocol):
 
 
 class Transforms:
-    """Queues of messages, one for each input.
-
-    source: of transforms, or None; intake: that takes the messages. A hand pose that it will skip needs no transform.
-    """
+    """Queues of messages, one for each input, until their transforms are known by a source; intake: that takes the messages."""
 
     def __init__(self, source: TransformSource | None, intake: Intake) -> None:
         self._source, self._intake = source, intake
@@ -64,11 +61,7 @@ class Transforms:
         self._held.setdefault(role, deque()).append((message, now_s))
 
     def release(self, role: str, now_s: float) -> Iterator[Arrival]:
-        """Yield the messages of an input that need not be held any longer at a time [s], in the order of their arrival.
-
-        Each has to be taken before the next one is asked for: it decides whether the next one is skipped. While the working frame
-        is unknown, messages are not transformed.
-        """
+        """Yield the messages of an input that need not be held any longer; each is to be taken before the next is asked for."""
         queue, pipeline = self._held.get(role, ()), self._intake.pipeline
         while queue:
             message, received_s = queue[0]
@@ -120,7 +113,6 @@ class Transforms:
 
 
 def _identify(header: Any) -> tuple[str, int]:
-    """Return frame and stamp [ns] of a header."""
     return decode_frame(header), decode_stamp(header)
 
 
@@ -159,19 +151,13 @@ class _Frame:
 
 
 class TransformTree:
-    """The frames of a recording, each with one parent, looked up as tf2 does, without ROS; a `TransformSource`.
-
-    Between two stamps the translation is interpolated linearly, the rotation along the shortest arc.
-    """
+    """The frames of a recording, each with one parent, looked up as tf2 does, without ROS; a `TransformSource`."""
 
     def __init__(self) -> None:
         self._frames: dict[str, _Frame] = {}
 
     def add(self, message: Any, *, is_static: bool) -> int:
-        """Add the transforms of a tf2_msgs/TFMessage, and return how many are left out.
-
-        These have a wrong stamp, a number that is not finite, no rotation, or one frame as both parent and child.
-        """
+        """Add the transforms of a tf2_msgs/TFMessage, and return how many are left out, because they cannot be used."""
         left_out = 0
         for each in message.transforms:
             shift, turn = each.transform.translation, each.transform.rotation
@@ -204,14 +190,12 @@ class TransformTree:
         return pose._replace(stamp_ns=stamp_ns)
 
     def _list_ancestors(self, name: str) -> list[str]:
-        """Return a frame and the frames above it, its parent first."""
         names = [name]
         while (frame := self._frames.get(names[-1])) is not None and frame.parent not in names:
             names.append(frame.parent)
         return names
 
     def _compose(self, chain: list[str], stamp_ns: int) -> Transform:
-        """Return the pose of the first frame of a chain in the parent of the last one."""
         pose = NO_TRANSFORM
         for name in chain:
             pose = self._frames[name].find(name, stamp_ns).compose(pose)

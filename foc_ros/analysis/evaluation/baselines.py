@@ -3,12 +3,8 @@
 """The predictors that `evaluate` compares, each with the settings among which cross-validation chooses, and their forecasts.
 
 What a predictor leaves over, such as the unknown share, is spread evenly over the possible answers. Every predictor leaves at
-least `UNCERTAINTY`, so that an answer that no candidate gives is unlikely, not impossible. A candidate without a likelihood
-counts as the node publishes it: 0. Constant velocity, nearest gap and shortest path name one answer and get a confidence in it.
-
-A baseline is added from outside by :func:`register_baseline`; the built-in ones are registered in the same way.
-
-**Straight minimum jerk** is the movement to a goal, obstacles disregarded: `core.goals`.
+least `UNCERTAINTY`, so that an answer that no candidate gives is unlikely, not impossible. Straight minimum jerk is the movement
+to a goal, obstacles disregarded.
 """
 
 from __future__ import annotations
@@ -108,8 +104,7 @@ def compute_straight_positions(observation: Observation, goal: int, seconds: Arr
 def _find_movement(observation: Observation) -> tuple[Array, Array]:
     """Return position, velocity and acceleration (3, 2) of the hand, and the time (g,) [s] of its movement to each goal.
 
-    At rest velocity and acceleration are noise, and 0 as in the predictor. The time is that of the predictor, the longest of all
-    where it found no path.
+    Both are those of the predictor: at rest nothing but the position counts. The longest time stands where it found no path.
     """
     candidates, state = observation.candidates, observation.hand.reshape(3, 2).copy()
     if observation.movement_age_s == 0.0:

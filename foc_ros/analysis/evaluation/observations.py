@@ -2,17 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Observations: what was predicted in a recording, beside what really came, and the questions that are put to them.
 
-A recording is replayed once. How costs become likelihoods can then be tried on the observations without a predictor. Scores and
-fits need nothing else. The questions:
+A recording is replayed once. How costs become likelihoods can then be tried on the observations without a predictor.
 
 - `way`: in which homotopy class will the hand pass the obstacles still ahead?
 - `gap`: the same for the next row of obstacles only.
 - `goal`: which goal will it reach?
 
-In a row of m obstacles (`rows`) a path that does not turn back takes one of m + 1 gaps, so that rows of m_1, m_2, ... obstacles
-leave (m_1 + 1)(m_2 + 1)... homotopy classes. A gap that is too narrow for the hand is none. A question is put only where at least
-two answers are possible. Candidates may also weave through a row; such an answer can be given, but a uniform guess does not count
-it. The true answer always counts as possible.
+Through a row of m obstacles (`rows`) a path that does not turn back takes one of m + 1 gaps, of which those too narrow for the
+hand are none. A question is put only where at least two answers are possible. A candidate may also weave through a row: such an
+answer can be given, but a uniform guess does not count it. The true answer always counts as possible.
 """
 
 from __future__ import annotations
@@ -55,13 +53,12 @@ Questions = list[tuple['Observation', 'Question']]
 class CandidateTable(Record):
     """The k candidates of one prediction, about n obstacles.
 
-    labels; goal (k,): row of the goals; has_likelihood (k,): whether each takes part; cost_to_go (k,) [m^2/s^5]: integral of the
-    squared control, comparable between goals; safety_shortfall (k,): by how much the safety factor is below the wanted one;
-    likelihood (k,): as published; length (k,) [m]: of the shortest path in its class; time_s (k,): time to the goal; named:
-    obstacles in any label; sides (k, n): LEFT or RIGHT, on which the candidate passes each obstacle; mean
-    (k, h, 2) [m]: the positions at `TIMES_S`; covariance (k, 3, 2, 2) [m^2], positive definite: of those at `HORIZONS_S`;
-    plans (4, k, 3, 2, 2) [m^2]: that of the plan without `WIDENINGS`, and with each of them at 1, none if not asked for;
-    branch_times: when the candidates part; decisions: of those that take part.
+    has_likelihood: whether each takes part; cost_to_go [m^2/s^5]: integral of the squared control, comparable between goals;
+    safety_shortfall: by how much the safety factor is below the wanted one; likelihood: as published; length [m]: of the shortest
+    path in its class; time_s: to the goal; named: obstacles in any label; sides (k, n): LEFT or RIGHT; mean (k, h, 2) [m]: the
+    positions at `TIMES_S`; covariance (k, 3, 2, 2) [m^2], positive definite: of those at `HORIZONS_S`; plans (4, k, 3, 2, 2)
+    [m^2]: that of the plan without `WIDENINGS`, and with each of them at 1, none if not asked for; decisions: of those that take
+    part.
     """
 
     labels: tuple[str, ...]
@@ -92,12 +89,11 @@ class CandidateTable(Record):
 
 @dataclass(frozen=True, eq=False)
 class Observation(Record):
-    """One prediction at stamp_ns, from a hand with mean hand (6,), movement_age_s after the onset of its movement (0 at rest).
+    """One prediction, from a hand with mean hand (6,), movement_age_s after the onset of its movement (0 at rest).
 
-    ids, centre (n, 2) [m]: of the obstacles at that stamp; row (n,): the row of each obstacle, 0 first, -1 for a wall; gaps: for
-    each row the sides (k, n) on which paths through its open gaps pass its obstacles; direction (2,): the unit vector along which
-    rows are ordered; goals (g, 2) [m]; candidates; most_likely: the leading label after hysteresis; truth;
-    other: share of a goal that nobody announced.
+    ids, centre (n, 2) [m]: of the obstacles at that stamp; row (n,): 0 first, -1 for a wall; gaps: for each row the sides (k, n)
+    on which paths through its open gaps pass its obstacles; direction (2,): the unit vector along which rows are ordered;
+    most_likely: the leading label after hysteresis; other: share of a goal that nobody announced.
     """
 
     stamp_ns: int
@@ -165,10 +161,7 @@ def observe(
 
 
 def observe_in_order(recordings: Sequence[Recording], config: Config) -> tuple[list[ObservedRecording], dict[str, str]]:
-    """Replay the recordings of an operator in their order, each with what was learnt of the operator in those before.
-
-    Return what was observed, and the reason by name for each recording that cannot be used.
-    """
+    """Replay the recordings of an operator in their order, each with what was learnt before; return the failures by name, too."""
     replayed, observed, failed = Replay(config), list[ObservedRecording](), dict[str, str]()
     for recording in recordings:
         try:
@@ -181,10 +174,7 @@ def observe_in_order(recordings: Sequence[Recording], config: Config) -> tuple[l
 def observe_all(
     recordings: Mapping[str, Recording], config: Config, in_order: bool = False
 ) -> tuple[list[ObservedRecording], dict[str, str]]:
-    """Observe recordings in parallel, with a progress bar; return the failures by name as well.
-
-    in_order: the recordings of an operator follow one another, with what is learnt from one to the next.
-    """
+    """Observe recordings in parallel with a progress bar, or as `observe_in_order`; return the failures by name as well."""
     groups = group_by_operator(recordings) if in_order else {name: [each] for name, each in recordings.items()}
     parts, failed = collect(partial(observe_in_order, config=config), list(groups.items()), 'replay')
     failed |= {name: reason for _, reasons in parts for name, reason in reasons.items()}
@@ -192,10 +182,7 @@ def observe_all(
 
 
 def make_observation(step: Step, hand: HandState, config: Config, path: RecordedPath, *, with_plans: bool) -> Observation:
-    """Return one prediction, with the hand that it was made from, beside what came.
-
-    config: adapted to the operator, as for the prediction; path: the whole path of the hand; with_plans: as of `observe`.
-    """
+    """Return one prediction, with the hand that it was made from, beside what came; config: adapted to the operator."""
     prediction, goals = step.prediction, step.scene.goals
     assert prediction is not None and goals is not None
     obstacles = step.scene.obstacles(prediction.stamp_ns)
@@ -276,9 +263,9 @@ def interpolate_steps(values: Array, dt: float) -> Array:
 class Question(Record):
     """One question to one prediction.
 
-    name; obstacles (a,): rows of those in question; possible: number of possible answers; answers: those that a candidate gives,
-    and the true one; given (k,): index of the answer of each candidate; is_possible: whether each answer is one of the possible
-    ones; truth: index of the true answer.
+    obstacles (a,): rows of those in question; possible: number of possible answers; answers: those that a candidate gives, and
+    the true one; given (k,): index of the answer of each candidate; is_possible: whether each answer is one of the possible ones;
+    truth: index of the true answer.
     """
 
     name: str

@@ -4,16 +4,12 @@
 
 The ellipse of a candidate says where the hand is if it follows this candidate. The whole prediction is the mixture of all
 candidates, each with its likelihood. Its smallest region of probability p is where the density f is above a level (Hyndman 1996,
-doi:10.2307/2684423). A position x lies within it if less than p of the probability is denser:
+doi:10.2307/2684423): a position x lies within it if Pr(f(Y) > f(x)) < p for Y distributed by the mixture. This is summed over the
+same points of every candidate: rings of equal probability, with points evenly spaced in angle.
 
-    Pr(f(Y) > f(x)) < p,  Y distributed by the mixture.
-
-This is summed over the same points of every candidate: rings of equal probability, with points evenly spaced in angle.
-
-**The Singer model** of a manoeuvring target (Singer 1970, doi:10.1109/TAES.1970.310128) knows no scene. Per axis the state is
-(position, velocity, acceleration). The acceleration has the standard deviation sigma and decays with the time constant tau. It
-is driven by white noise, a' = -a / tau + w, of spectral density 2 sigma^2 / tau. A Kalman filter follows the recorded positions,
-and its state is propagated ahead. All settings are filtered together.
+**The Singer model** of a manoeuvring target (Singer 1970, doi:10.1109/TAES.1970.310128) knows no scene. Per axis the acceleration
+has the standard deviation sigma and decays with the time constant tau. It is driven by white noise, a' = -a / tau + w, of
+spectral density 2 sigma^2 / tau. A Kalman filter follows the recorded positions, and its state is propagated ahead.
 """
 
 from __future__ import annotations
@@ -36,8 +32,6 @@ from .scores import choose_held_out
 from .truth import HORIZONS, HORIZONS_S, TIMES_S
 
 LEVELS = (0.5, 0.9)
-"""Probabilities of the ellipses and regions."""
-TIMES = np.array(TIMES_S)
 RINGS, SPOKES = 25, 4
 """Rings of a Gaussian, and points of a ring. A region is exact at 50 and 90 %, because the border lies between two rings."""
 Shares = dict[str, float | None]
@@ -48,9 +42,8 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
     """Return average and final displacement errors [m] by predictor and horizon, and shares of true positions inside.
 
     inside: the ellipse of the most likely candidate; inside_taken: of the candidate that was taken; inside_all: the smallest
-    region of all candidates. nlpd: the mean negative logarithm of the density [1/m^2] at the true position, under the mixture of
-    all candidates, and under the Singer model with the setting that is best for the other recordings. The average is over the
-    times up to the horizon; recordings that end before a horizon do not count.
+    region of all candidates. nlpd: the mean negative logarithm of the density [1/m^2] at the true position. The average is over
+    the times up to the horizon; recordings that end before a horizon do not count.
     """
     observations = [each for recording in recordings for each in recording.observations]
     means = [each.candidates.mean for each in observations]
@@ -59,18 +52,18 @@ def compute_position_scores(recordings: Sequence[ObservedRecording]) -> dict[str
         'most likely': [np.tensordot(*each, 1) for each in zip(leading, means, strict=True)],
         'likelihood-weighted': [np.tensordot(*each, 1) for each in zip(mixture, means, strict=True)],
         'constant velocity': [
-            each.hand[:2] + TIMES[:, None] * (each.hand[2:4] if each.movement_age_s > 0.0 else np.zeros(2))
+            each.hand[:2] + TIMES_S[:, None] * (each.hand[2:4] if each.movement_age_s > 0.0 else np.zeros(2))
             for each in observations
         ],
         'straight minimum jerk': [
-            compute_straight_positions(each, int(compute_straight_costs(each).argmin()), TIMES) for each in observations
+            compute_straight_positions(each, int(compute_straight_costs(each).argmin()), TIMES_S) for each in observations
         ],
     }
     densities = [compute_log_densities(each, each.candidates.mixture, each.candidates.covariance) for each in observations]
     true, errors = np.array([each.truth.positions for each in observations]), {}
     for name, each in predicted.items():
         distance = np.hypot(*(np.array(each) - true).transpose(2, 0, 1))
-        mean = np.cumsum(distance, axis=1) / np.arange(1, len(TIMES) + 1)
+        mean = np.cumsum(distance, axis=1) / np.arange(1, len(TIMES_S) + 1)
         errors[name] = {'average': average(mean[:, HORIZONS]), 'final': average(distance[:, HORIZONS])}
     return {
         'displacement_m': errors,
@@ -88,10 +81,7 @@ def average(values: Array) -> Shares:
 
 
 def measure_inside(observations: Sequence[Observation], weights: Sequence[Array]) -> dict[str, Shares]:
-    """Return the share of true positions inside the smallest region of each of `LEVELS`, by horizon.
-
-    weights: those (k,) of the candidates in the region of each observation. The region of one candidate is its ellipse.
-    """
+    """Return the share of true positions in the smallest region of each of `LEVELS`, by horizon; weights (k,): of candidates."""
     given = (
         (each.candidates.mean[:, HORIZONS], each.candidates.covariance, each.truth.positions[HORIZONS]) for each in observations
     )
@@ -100,19 +90,15 @@ def measure_inside(observations: Sequence[Observation], weights: Sequence[Array]
 
 
 def compute_log_densities(observation: Observation, shares: Array, covariance: Array) -> Array:
-    """Return the log-density (..., 3) of the true positions at the horizons [nat, metres], nan where the movement has ended.
-
-    shares (k,): weights of the candidates; covariance (..., k, 3, 2, 2) [m^2]: of their positions.
-    """
+    """Return the log-density (..., 3) of the true positions at the horizons [nat, metres], nan where the movement has ended."""
     offset = (observation.truth.positions - observation.candidates.mean)[:, HORIZONS]
     return log_mixture_density(shares, offset, covariance)
 
 
 def find_denser_share(weight: Array, mean: Array, covariance: Array, position: Array) -> Array:
-    """Return the probability (h,) of all that is denser than a position, nan where the position is not known.
+    """Return the probability (h,) of all that is denser than a position (h, 2) [m], nan where the position is not known.
 
-    weight (k,) of normal distributions with mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2], positive definite;
-    position (h, 2) [m].
+    weight (k,) of normal distributions with mean (k, h, 2) [m] and covariance (k, h, 2, 2) [m^2], positive definite.
     """
     counted = weight > 1e-4
     weight, mean, covariance = weight[counted] / weight[counted].sum(), mean[counted], covariance[counted]
@@ -123,10 +109,7 @@ def find_denser_share(weight: Array, mean: Array, covariance: Array, position: A
 
 
 def log_mixture_density(weight: Array, offset: Array, covariance: Array) -> Array:
-    """Return the logarithm of the density (..., h) of a mixture of normal distributions with weights (k,).
-
-    offset (..., k, h, 2) [m]: from the mean of each; covariance (..., k, h, 2, 2) [m^2].
-    """
+    """Return the log-density (..., h) of a mixture of normal distributions at offsets (..., k, h, 2) [m] from their means."""
     x, y, xx, yy, xy = *np.moveaxis(offset, -1, 0), covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
     determinant = xx * yy - xy**2
     distance = (yy * x**2 - 2.0 * xy * x * y + xx * y**2) / determinant
@@ -144,16 +127,10 @@ def _make_points() -> Array:
 POINTS = _make_points()
 
 
-def choose_row(row: int, count: int) -> Array:
-    """Return weights (count,) of which one is 1, and the others are 0."""
-    weights: Array = np.eye(count)[row]
-    return weights
-
-
 def _choose_leading(observation: Observation) -> Array:
-    """Return weights (k,) that choose the most likely candidate, as published."""
     candidates, label = observation.candidates, observation.most_likely
-    return choose_row(candidates.labels.index(label) if label else int(candidates.likelihood.argmax()), len(candidates))
+    row = candidates.labels.index(label) if label else int(candidates.likelihood.argmax())
+    return np.asarray(np.eye(len(candidates))[row])
 
 
 def _choose_taken(recordings: Sequence[ObservedRecording]) -> list[Array]:
@@ -164,7 +141,7 @@ def _choose_taken(recordings: Sequence[ObservedRecording]) -> list[Array]:
         for each in recording.observations:
             question, likelihood = questions.get(each.stamp_ns), each.candidates.likelihood
             if question is not None and (is_true := question.given == question.truth).any():
-                found.append(choose_row(int(np.where(is_true, likelihood, -1.0).argmax()), len(likelihood)))
+                found.append(np.eye(len(likelihood))[np.where(is_true, likelihood, -1.0).argmax()])
             else:
                 found.append(_choose_leading(each))
     return found
@@ -179,7 +156,7 @@ def forecast_singer(stamps_ns: NDArray[np.int64], positions: Array, at_ns: Array
     """Forecast the positions some times (h,) [s] after each of some stamps (m,) [ns], which are among those of the samples.
 
     stamps_ns (n,), rising, and positions (n, 2) [m] of the samples. Returns the mean (m, s, h, 2) [m] and the variance (m, s, h)
-    [m^2] per axis under each of the s `SINGER_SETTINGS`; each forecast uses the samples up to its stamp.
+    [m^2] per axis under each of the s `SINGER_SETTINGS`.
     """
     accelerations, noises, _ = SINGER_SETTINGS.T
     mean, covariance = np.zeros((len(noises), 3, 2)), np.zeros((len(noises), 3, 3))
@@ -230,5 +207,5 @@ def score_singer(recordings: Sequence[ObservedRecording]) -> Array:
         squared = ((true[:, None] - mean) ** 2).sum(axis=-1)
         tables.append(np.log(2.0 * np.pi * variance) + squared / (2.0 * variance))  # (m, s, 3), under each setting
     table = np.array([-np.nansum(each, axis=(0, 2)) for each in tables])
-    chosen = choose_held_out(table, [each.name for each in recordings])
+    chosen = choose_held_out(table)
     return np.concatenate([each[:, setting] for each, setting in zip(tables, chosen, strict=True)])

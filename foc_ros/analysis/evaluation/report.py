@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,6 @@ OURS = 'likelihood-weighted'
 COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
 """Horizon and probability of the region that is judged."""
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
-"""Title, columns, rows."""
 GAP_TITLE = 'Gap in the next row: correct [%], by tenths of the distance from row to row'
 TOTALS = {
     'gain': ('gain', 1.0, 3),
@@ -51,23 +50,16 @@ REGIONS = {
 
 
 def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[str, Any]:
-    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON.
-
-    What is fitted is scored on recordings that it was not fitted to. `questions`: values of `scores.summarise` by question and
-    predictor; for `gap`, tenths and `right_from_half_way` count from row to row, else over the whole movement. `settings`: by
-    question and predictor, the best for all recordings. `comparisons`: of the published predictions with each baseline, by
-    question. `positions`: values of `positions.compute_position_scores`. `verdict`: sentences.
-    """
+    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON."""
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
     # log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor
     tables = collect_all(_tabulate_log_likelihoods, items, 'compare')
     table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
-    names = [each.name for each in recordings]
     asked = {name: [ask_all(each, name) for each in recordings] for name in FITTED_TO}
     asked = {name: questions for name, questions in asked.items() if any(questions)}
     scores = {
-        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], names, questions) for each in baselines}
+        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], questions) for each in baselines}
         for name, questions in asked.items()
     }
     best = {key: int(each.sum(axis=0).argmax()) for key, each in table.items()}
@@ -100,9 +92,9 @@ def _tabulate_log_likelihoods(item: tuple[ObservedRecording, Sequence[Baseline]]
     return {(name, each.name): compute_log_likelihoods(questions[name], each) for name in questions for each in baselines}
 
 
-def _score_held_out(baseline: Baseline, table: Array, names: Sequence[str], questions: Sequence[Questions]) -> Scores:
+def _score_held_out(baseline: Baseline, table: Array, questions: Sequence[Questions]) -> Scores:
     """Score a predictor, on the questions of each recording with the setting that is best for the others by a table (r, s)."""
-    choices = choose_held_out(table, names)
+    choices = choose_held_out(table)
     return score_forecasts(
         (number, observation, question, baseline.forecast(observation, question, baseline.settings[choice]))
         for number, (choice, asked) in enumerate(zip(choices, questions, strict=True))
@@ -118,8 +110,7 @@ def find_label_mismatches(data: Path, recordings: Sequence[ObservedRecording]) -
     """Return both texts for each recording whose label is not the path class that was taken; none where there are no labels.
 
     The columns of labels.csv after the first are the gaps taken, row by row, counted from low x. The column `sides` of trials.csv
-    has the side of each box by the end of its name; where it says which object was picked up instead, that is the truth already.
-    Raises RecordingError for a table that cannot be read.
+    has the side of each box by the end of its name. Raises RecordingError for a table that cannot be read.
     """
     trials, labels = data / TRIALS, data / LABELS
     compare: Callable[[Observation, Mapping[str, str]], str]
@@ -198,45 +189,36 @@ def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
     """Yield the tables of an answer of `evaluate --json`."""
-    questions = answer['questions']
-    tenths = ('', *(str(tenth + 1) for tenth in range(TENTHS)))
+    questions, tenths = answer['questions'], ('', *(str(tenth + 1) for tenth in range(TENTHS)))
     for name, subject in ((PATH_CLASS, 'Homotopy class'), (GOAL, 'Goal')):
         if name in questions:
             title, scores = f'{subject}: log-likelihood above uniform [nat]', questions[name].items()
-            gains = [(predictor, *(_number(tenth['gain'], 1.0, 2) for tenth in each['by_tenth'])) for predictor, each in scores]
+            gains = [_show_row(predictor, (tenth['gain'] for tenth in each['by_tenth'])) for predictor, each in scores]
             yield f'{title}, by tenths of the movement', tenths, gains
             totals = [
-                (predictor, *(_number(each[score], factor, digits) for score, factor, digits in TOTALS.values()))
+                (predictor, *(_show(each[score], factor, digits) for score, factor, digits in TOTALS.values()))
                 for predictor, each in scores
             ]
             yield f'{title}, of all', ('', *TOTALS), totals
     if GAP in questions:
         scores = questions[GAP].items()
-        yield (
-            GAP_TITLE,
-            tenths,
-            [(predictor, *(_number(tenth['right'], 100.0, 0) for tenth in each['by_tenth'])) for predictor, each in scores],
-        )
-        halves: list[tuple[str, ...]] = [
-            (predictor, _number(each['right_from_half_way'], 100.0, 1)) for predictor, each in scores
-        ]
+        shares = [_show_row(predictor, (tenth['right'] for tenth in each['by_tenth']), 100.0, 0) for predictor, each in scores]
+        yield GAP_TITLE, tenths, shares
+        halves = [_show_row(predictor, [each['right_from_half_way']], 100.0, 1) for predictor, each in scores]
         yield 'Gap in the next row', ('', 'correct in the second half [%]'), halves
-    positions = answer['positions']
-    horizons = [f'{each:g}' for each in HORIZONS_S]
-    columns = ('', *(f'{each} s' for each in horizons))
-    errors = [
-        (name, *(_number(by[each], 1e3, 1) for by in kinds.values() for each in horizons))
-        for name, kinds in positions['displacement_m'].items()
-    ]
-    yield 'Displacement error [mm]', ('', *(f'{kind}\n{each} s' for kind in ('average', 'final') for each in horizons)), errors
-    densities = [(name, *(_number(by[each], 1.0, 2) for each in horizons)) for name, by in positions['nlpd'].items()]
-    yield 'Negative log-density of the true position [nat, metres]', columns, densities
-    inside = [
-        (f'{words}, {100 * float(level):g} %', *(_number(by[each], 100.0, 1) for each in horizons))
+    positions, horizons = answer['positions'], [f'{each:g} s' for each in HORIZONS_S]
+    columns = ('', *(f'{kind}\n{each}' for kind in ('average', 'final') for each in horizons))
+    errors = positions['displacement_m'].items()
+    rows = [_show_row(name, (error for by in kinds.values() for error in by.values()), 1e3, 1) for name, kinds in errors]
+    yield 'Displacement error [mm]', columns, rows
+    rows = [_show_row(name, by.values()) for name, by in positions['nlpd'].items()]
+    yield 'Negative log-density of the true position [nat, metres]', ('', *horizons), rows
+    rows = [
+        _show_row(f'{words}, {100 * float(level):g} %', by.values(), 100.0, 1)
         for name, words in REGIONS.items()
         for level, by in positions[name].items()
     ]
-    yield 'True positions inside [%]', columns, inside
+    yield 'True positions inside [%]', ('', *horizons), rows
     facts: list[tuple[str, ...]] = [
         ('recordings', f'{answer["recordings"]}, {len(answer["failed"])} failed'),
         ('predictions', str(answer['predictions'])),
@@ -255,5 +237,9 @@ def _format_setting(setting: Any) -> str:
     return f'{setting:.4g}' if isinstance(setting, float) else str(setting)
 
 
-def _number(value: float | None, factor: float, digits: int) -> str:
+def _show_row(name: str, values: Iterable[float | None], factor: float = 1.0, digits: int = 2) -> tuple[str, ...]:
+    return name, *(_show(each, factor, digits) for each in values)
+
+
+def _show(value: float | None, factor: float, digits: int) -> str:
     return '-' if value is None else f'{factor * value:.{digits}f}'

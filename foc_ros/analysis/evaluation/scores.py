@@ -2,22 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores of forecasts against the true answers, what is chosen by held-out scores, and bootstrap intervals.
 
-Every setting is tried on every recording once, and each recording is scored with the setting best for the others, so that what it
-says about itself never helps it.
+Every setting is tried on every recording once, and each recording is scored with the setting best for the others.
 
 **Intervals** are by bootstrap (Efron 1979, doi:10.1214/aos/1176344552); equal data give equal ones. What is drawn are recordings
 or trials, because predictions within one recording are not independent.
 
 **A goal that nobody announced** is tried out: each recording is replayed again with its goal left out of the list. The share
-`other` is then right in the second replay and wrong in the first. It is judged by the area under the curve of the receiver
-operating characteristic, half way and over all predictions, and by its calibration error: the mean distance of share and
+`other` is then right in the second replay and wrong in the first. Its calibration error is the mean distance of share and
 frequency over ten bins, with the replays without the goal as frequent as `likelihood.other_goal` says. The loss is what the share
 costs where the goal is on the list, the mean of -log(1 - other).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -48,24 +46,18 @@ def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
     return np.array([np.log(each).sum() for each in probabilities])
 
 
-def choose_held_out(table: Array, groups: Sequence[Hashable]) -> NDArray[np.intp]:
-    """Choose for each recording the setting (r,) that is best for the recordings of all other groups, the first of equal ones.
-
-    table (r, s): log-likelihoods of recordings under settings; groups: the group of each recording. Where each is its own group,
-    this is leave-one-out cross-validation. A single group has no others, and all recordings are used.
-    """
-    rows = {group: [row for row, each in enumerate(groups) if each == group] for group in groups}
-    total = table.sum(axis=0)
-    best = {group: int((total - table[own].sum(axis=0) if len(rows) > 1 else total).argmax()) for group, own in rows.items()}
-    return np.array([best[group] for group in groups], dtype=np.intp)
+def choose_held_out(table: Array) -> NDArray[np.intp]:
+    """Choose for each recording the setting (r,) that is best for all others, by a table of log-likelihoods (r, s)."""
+    others: Array = table.sum(axis=0) - table if len(table) > 1 else table
+    return np.asarray(others.argmax(axis=1))
 
 
 class Scores(NamedTuple):
     """The m forecasts of one predictor for one question.
 
     recording (m,): its number; progress (m,) in [0, 1]; left_s (m,): time to the end of the movement [s]; possible (m,): number
-    of possible answers; log_likelihood (m,): of the true answer; confidence (m,): probability of the likeliest answer; correct
-    (m,): whether that is the true one, a part of 1 if one of several; brier (m,).
+    of possible answers; confidence (m,): probability of the likeliest answer; correct (m,): whether that is the true one, a part
+    of 1 if one of several.
     """
 
     recording: Array
@@ -113,12 +105,7 @@ def score_forecasts(rows: Iterable[tuple[int, Observation, Question, Forecast]])
 
 
 def compare_scores(ours: Scores, other: Scores, is_share: bool) -> dict[str, Any]:
-    """Return the mean difference of two predictors in the same predictions, with its interval, and the tenths that are worse.
-
-    The interval of one recording is None, because it shows no differences between recordings.
-
-    is_share: compare the shares of correct answers instead of the log-likelihoods of the true ones.
-    """
+    """Return the mean difference of two predictors, its interval, None of one recording, and the tenths that are worse."""
     difference = ours.correct - other.correct if is_share else ours.log_likelihood - other.log_likelihood
     tenths = find_tenths(ours.progress)
     by_tenth, is_one = [difference[tenths == each] for each in range(TENTHS)], np.ptp(ours.recording) == 0.0
@@ -160,10 +147,7 @@ def find_tenths(progress: Array) -> NDArray[np.int64]:
 
 
 def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
-    """Return count, mean confidence and share of correct answers for each bin of the confidence in the likeliest answer.
-
-    interval: of the share, 95 % by bootstrap over the recordings; None without a prediction.
-    """
+    """Return count, mean confidence and share of correct answers, with its interval, for each bin of the confidence."""
     number = np.minimum((scores.confidence * BINS).astype(int), BINS - 1)
     return [
         {
@@ -185,10 +169,7 @@ def find_mean(values: Array) -> float | None:
 
 
 def leave_goals_out(recordings: Mapping[str, Recording], plane: str = 'xy') -> dict[str, Recording]:
-    """Return the recordings of tables that have several goals without the goal that was reached; the others are left away.
-
-    plane: the task plane, in which the goal reached is found where no table says it.
-    """
+    """Return the recordings of tables that have several goals without the goal that was reached in the task plane."""
     found: dict[str, Recording] = {}
     for name, each in recordings.items():
         if not isinstance(each, TableRecording) or each.scene.goals is None or len(each.scene.goals) < 2:
@@ -204,10 +185,7 @@ def leave_goals_out(recordings: Mapping[str, Recording], plane: str = 'xy') -> d
 def score_other_goal(
     announced: Sequence[ObservedRecording], left_out: Sequence[ObservedRecording], prior: float
 ) -> dict[str, float] | None:
-    """Return the scores of the share `other`, None where no recording was replayed both ways or the prior is zero.
-
-    announced, left_out: the same recordings with all goals and without the right one; prior: `likelihood.other_goal`.
-    """
+    """Return the scores of the share `other`, None where no recording was replayed both ways or the prior is zero."""
     without = {(each.name, seen.stamp_ns): seen.other for each in left_out for seen in each.observations}
     rows = []
     for recording in announced:

@@ -24,12 +24,11 @@ from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
 
-TIMES_S = tuple(0.125 * step for step in range(1, 9))
+TIMES_S: Array = np.arange(1.0, 9.0) * 0.125
 """Times ahead at which predicted positions are compared with the true ones [s]."""
 HORIZONS_S = (0.25, 0.5, 1.0)
 """Those of them that are reported."""
-HORIZONS = np.array([TIMES_S.index(horizon) for horizon in HORIZONS_S])
-"""Their indices."""
+HORIZONS = np.searchsorted(TIMES_S, HORIZONS_S)
 MIN_SAMPLES = 10
 
 Bools = NDArray[np.bool_]
@@ -39,9 +38,9 @@ Sides = NDArray[np.int8]
 class RecordedPath:
     """A recorded path, whose movement ends where it is nearest to the goal that it reached.
 
-    goal: row of the one that was reached, or `NO_GOAL`; None to find it. Attributes: stamps_ns (m,), positions (m, 2) [m], goals
-    (g, 2) [m]; goal: row of the goal reached, None where none was; end_ns: when the movement ends; travelled (m,): distance
-    travelled so far [m]; progress (m,): its share of the movement.
+    Attributes: stamps_ns (m,), positions (m, 2) [m], goals (g, 2) [m]; goal: row of the goal reached, None where none was;
+    end_ns: when the movement ends; travelled (m,) [m]: so far; progress (m,): its share of the movement. The argument goal is
+    None to find it.
     """
 
     def __init__(self, stamps_ns: NDArray[np.int64], positions: Array, goals: Array, goal: int | None = None) -> None:
@@ -115,11 +114,10 @@ def read_hand(recording: Recording, config: Config) -> RecordedHand:
 class GroundTruth(Record):
     """What the hand really did after one prediction.
 
-    sides (n,): LEFT or RIGHT, the side of each obstacle on which the rest of the path runs; is_ahead (n,): whether the row of the
-    obstacle is still to be passed; goal: row of the goal that was reached, None where none was, or where the goals were other
-    ones; positions (h, 2) [m]: at `TIMES_S`, nan beyond the end; progress in [0, 1]: share of the movement so far; approach in
-    [0, 1]: share of the distance from the last row, or the start, to the next one, nan where no row is to come; left_s: time to
-    the end of the movement [s].
+    sides (n,): LEFT or RIGHT, on which the rest of the path passes each obstacle; is_ahead (n,): whether its row is still to be
+    passed; goal: row of the goal that was reached, None where none was, or where the goals were other ones; positions (h, 2) [m]:
+    at `TIMES_S`, nan beyond the end; progress: share of the movement so far; approach: share of the distance from the last row,
+    or the start, to the next one, nan where no row is to come; left_s: time to the end of the movement [s].
     """
 
     sides: Sides
@@ -151,7 +149,7 @@ def find_ground_truth(
         sides=np.where(compute_swept_angles(path.positions[now:], centres) < 0.0, LEFT, RIGHT).astype(np.int8),
         is_ahead=np.append(crosses[now:].any(axis=0), False)[row],
         goal=path.goal if np.array_equal(goals, path.goals) else None,
-        positions=path.interpolate(stamp_ns, np.array(TIMES_S)),
+        positions=path.interpolate(stamp_ns, TIMES_S),
         progress=float(path.progress[now]),
         approach=float((path.travelled[now] - path.travelled[last]) / whole) if whole != 0.0 else 0.0,
         left_s=(path.end_ns - stamp_ns) / NANOSECONDS,
@@ -161,7 +159,7 @@ def find_ground_truth(
 def find_open_gaps(obstacles: Obstacles, row: Rows, direction: Array, hand_radius: float) -> tuple[Sides, ...]:
     """Return for each row the sides (k, n) on which a path through one of its k open gaps passes its obstacles, 0 for all others.
 
-    A gap is open if it is wider than the hand, hand_radius [m]; the outer gaps of a row are those between it and the walls.
+    A gap is open if it is wider than the hand; the outer gaps of a row are those between it and the walls.
     """
     left = np.array([-direction[1], direction[0]])
     corners = obstacles.centre[:, None] + obstacles.vertices  # two convex polygons that are apart are nearest at a vertex of one

@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fitting: recordings of an operator enter; the parameters that explain them best leave.
 
-What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings (Efron 1979,
-doi:10.1214/aos/1176344552) and the cross-validation are exact. A parameter that the recordings do not determine keeps its given
-value: where its profile, the best log-likelihood over all other parameters, is flat, hardly better than at the given value, or
-best at the end of what was tried.
+What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings and the
+cross-validation are exact. A parameter that the recordings do not determine keeps its given value: where its profile, the best
+log-likelihood over all other parameters, is flat, hardly better than at the given value, or best at the end of what was tried.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
@@ -23,6 +22,8 @@ from foc_ros.core.config import list_parameters
 from foc_ros.core.types import Array
 
 BOUNDS = {parameter.name: parameter.bound for parameter in list_parameters()}
+FEWEST = 3
+"""Recordings of which one can be held out."""
 FLAT_NAT = 2.0
 """A profile that varies by less is flat: settings this far apart are not distinguished (95 % of chi-square, halved)."""
 Setting = Mapping[str, float]
@@ -31,27 +32,26 @@ Setting = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted value by dotted name, its 95 % interval by bootstrap over recordings, and its data."""
+    """A fitted value, its 95 % interval by bootstrap over recordings, and its data."""
 
-    name: str
     value: float
     low: float
     high: float
     how: str
 
     @classmethod
-    def from_resamples(cls, name: str, value: float, resampled: Array | Sequence[float], how: str) -> Estimate:
+    def from_resamples(cls, value: float, resampled: Array | Sequence[float], how: str) -> Estimate:
         """Return the estimate whose interval holds the value and the central values of a bootstrap, (b,)."""
         low, high = np.percentile(resampled, CENTRAL).tolist()
-        return cls(name, value, min(low, value), max(high, value), how)
+        return cls(value, min(low, value), max(high, value), how)
 
 
 @dataclass
 class Findings:
     """What one step of a fit found.
 
-    estimates by name; chosen: values that are no numbers; undetermined: why a parameter keeps its given value, by name; scores:
-    as plain values; warnings.
+    chosen: values that are no numbers, by name; undetermined: why a parameter keeps its given value, by name; scores: as plain
+    values.
     """
 
     estimates: dict[str, Estimate] = field(default_factory=dict)
@@ -77,11 +77,6 @@ class Findings:
         self.undetermined = {name: why for name, why in undetermined.items() if name not in self.values}
         self.scores |= later.scores
         self.warnings += later.warnings
-
-
-def is_cross_validated(recordings: Sequence[object]) -> bool:
-    """Return whether there are enough recordings to hold one out."""
-    return len(recordings) >= 3
 
 
 def clip_to_bounds(name: str, value: float) -> float:
@@ -117,24 +112,22 @@ class SettingTable:
         """The setting that is best for all recordings, the first of equal ones."""
         return self.settings[int(np.nansum(self.values, axis=0).argmax())]
 
-    def choose_held_out(self, groups: Sequence[Hashable]) -> list[Setting]:
-        """Return the setting for each recording (n,) that is best for the other groups."""
-        return [self.settings[each] for each in choose_held_out(np.nan_to_num(self.values), groups)]
-
-    def list_choices(self, given: Setting, names: Sequence[str]) -> dict[str, list[Setting]]:
-        """Return the settings chosen for the recordings (n,), of these names, by how they were chosen."""
-        choices = {'as given': [given] * len(names), 'fitted': [self.best] * len(names)}
-        return choices | ({'without the recording': self.choose_held_out(names)} if is_cross_validated(names) else {})
+    def list_choices(self, given: Setting) -> dict[str, list[Setting]]:
+        """Return the settings chosen for the recordings (n,), by how they were chosen: for each of them, or for all others."""
+        choices, count = {'as given': given, 'fitted': self.best}, len(self.values)
+        found = {how: [setting] * count for how, setting in choices.items()}
+        if count >= FEWEST:
+            found['without the recording'] = [self.settings[each] for each in choose_held_out(np.nan_to_num(self.values))]
+        return found
 
     def score(self, chosen: Sequence[Setting]) -> float:
         """Return the mean over the recordings under the setting chosen for each of them (n,)."""
         return float(np.nanmean([row[self.settings.index(each)] for row, each in zip(self.values, chosen, strict=True)]))
 
     def determine(self, given: Setting) -> tuple[SettingTable, dict[str, str]]:
-        """Find the parameters that the recordings do not determine.
+        """Return the settings that are left without the parameters that are not determined, and why they are not, by name.
 
-        They keep their given values, one after the other, the flattest first, because one that is kept may determine another.
-        Return the settings that are left, and the reasons by name. The given values are among the settings.
+        These keep their given values, one after the other, the flattest first, because one that is kept may determine another.
         """
         left, undetermined = self, dict[str, str]()
         while True:
@@ -173,5 +166,5 @@ class SettingTable:
         drawn = resample(lambda rows: int(values[rows].sum(axis=0).argmax()), len(values)).astype(int)
         for name in [each for each in given if each not in undetermined]:
             resampled = [left.settings[each][name] for each in drawn]
-            found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, best[name]), resampled, how)
+            found.estimates[name] = Estimate.from_resamples(clip_to_bounds(name, best[name]), resampled, how)
         return found, left

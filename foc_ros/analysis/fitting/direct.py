@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters that need no prediction: of the estimator, of durations, and the number of candidates.
 
-**Deviations of the Kalman filter** are those under which its innovations are likeliest. A filter with the right deviations leaves
-innovations v that are white and normal, so that with the expected variance S, which both axes share,
+**Deviations of the Kalman filter** are those under which its innovations v, which are white and normal in a filter with the right
+ones, are likeliest: with the expected variance S, which both axes share,
 
     log p(z) = -1/2 sum_k (2 log(2 pi S_k) + |v_k|^2 / S_k)
 
@@ -13,16 +13,15 @@ is exact (Schweppe 1965, doi:10.1109/TIT.1965.1053737).
 
     v t + tau (t - tau (1 - exp(-t / tau))) a,
 
-the model that predictions start from with `estimator.acceleration_time_s` = tau. Where that is 0 the acceleration lasts, and the
-hand moves by v t + a t^2 / 2. The estimate minimises the mean absolute error of the mean velocity until 0.25, 0.5 and 1 s ahead,
-over the samples of a movement and then over the recordings. The acceleration is that of the filter, and so is the noise in it.
+the model that predictions start from with `estimator.acceleration_time_s` = tau, where 0 means that the acceleration lasts. The
+estimate minimises the mean absolute error of the mean velocity until 0.25, 0.5 and 1 s ahead, over the samples of a movement and
+then over the recordings.
 
-**Durations.** Their constants minimise the mean absolute error of the time to go, over the samples of a movement and then over
-the recordings. They are the likeliest values where errors follow Laplace's distribution, so that a few slow movements have little
-weight. With Fitts' law, only distances that differ tell intercept and slope apart; otherwise their ratio is kept.
+**Durations.** Their constants minimise the mean absolute error of the time to go, which gives a few slow movements little weight.
+With Fitts' law, only distances that differ tell intercept and slope apart; otherwise their ratio is kept.
 
-**The wait** is the mean time to the next movement over all samples at rest. That is the likeliest mean of an exponential
-distribution, which does not depend on how long the hand has waited already.
+**The wait** is the mean time to the next movement over all samples at rest: the likeliest mean of an exponential distribution,
+which does not depend on how long the hand has waited already.
 """
 
 from __future__ import annotations
@@ -172,7 +171,7 @@ def fit_duration(hands: Sequence[RecordedHand], config: Config) -> Findings:
             )
     factors = np.percentile(resample(lambda rows: _find_best_factor(errors[:, rows]), errors.shape[1]) / best, CENTRAL)
     for name, each in zip(names, value.tolist(), strict=True):
-        found.estimates[name] = Estimate.from_resamples(name, clip_to_bounds(name, each), each * factors, 'time to go')
+        found.estimates[name] = Estimate.from_resamples(clip_to_bounds(name, each), each * factors, 'time to go')
     return found
 
 
@@ -201,4 +200,4 @@ def fit_wait(hands: Sequence[RecordedHand], config: Config) -> Findings:
         return Findings(undetermined={WAIT: 'no hand waits before a movement'})
     value, table = clip_to_bounds(WAIT, float(np.mean(means))), np.array(means)
     resampled = resample(lambda rows: table[rows].mean(), len(table))
-    return Findings({WAIT: Estimate.from_resamples(WAIT, value, resampled, 'time until movements begin')})
+    return Findings({WAIT: Estimate.from_resamples(value, resampled, 'time until movements begin')})

@@ -26,7 +26,7 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
-from . import Findings, clip_to_bounds, is_cross_validated
+from . import FEWEST, Findings, clip_to_bounds
 from .direct import fit_duration, fit_estimator, fit_fading, fit_wait
 from .one_replay import fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
@@ -56,10 +56,7 @@ Rows = list[tuple[str, ...]]
 
 @dataclass
 class Fit(Findings):
-    """The findings of all steps so far, and the configuration with them.
-
-    recordings: how many are used; failed recordings with reasons; comparison: of given and fitted parameters.
-    """
+    """The findings of all steps so far, and the configuration with them; comparison: of given and fitted parameters."""
 
     config: Config = field(default_factory=Config)
     recordings: int = 0
@@ -123,8 +120,8 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
     for step in (fit_likelihood, fit_widening):
         fit.take(step(observed, fit.config))
-    if not is_cross_validated(observed):
-        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, 3 are needed')
+    if len(observed) < FEWEST:
+        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, {FEWEST} are needed')
     if len(observed) == 1:
         fit.warnings.append('intervals: one recording, which shows no differences between recordings')
 
@@ -132,10 +129,9 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
 def compare_configs(
     recordings: Mapping[str, Recording], configs: tuple[Config, Config], thinned: Mapping[str, object]
 ) -> dict[str, dict[str, float | None]]:
-    """Return the measures of two configurations, `before` and `after`, by measure, from the recordings that both predict.
+    """Return the measures `COMPARISON_TITLES` of two configurations, `before` and `after`, from the recordings that both predict.
 
-    thinned: parameters of these replays alone. The measures are those of `COMPARISON_TITLES`; the position is the
-    likelihood-weighted one.
+    thinned: parameters of these replays alone.
     """
     replays = []
     for config, words in zip(configs, ('before', 'after'), strict=True):

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters for which one replay of the recordings is enough: of the likelihood, and those that widen the covariance.
 
-The latter, process noise, scatter of the end point and spread of the duration, change no plan. In the covariances they can be
-exchanged, so that all of them are tried on observations with the given ones, by the density of the true positions under the
-mixture of the candidates.
+The latter, process noise, scatter of the end point and spread of the duration, change no plan. All of them are tried on
+observations with the given ones, by the density of the true positions under the mixture of the candidates.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import numpy as np
 
 from foc_ros.analysis.evaluation.baselines import Baseline, forecast_shares, power_rule_shares
 from foc_ros.analysis.evaluation.observations import WIDENINGS, Observation, ObservedRecording, ask_main
-from foc_ros.analysis.evaluation.positions import choose_row, compute_log_densities, measure_inside
+from foc_ros.analysis.evaluation.positions import compute_log_densities, measure_inside
 from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S
 from foc_ros.analysis.evaluation.scores import compute_log_likelihoods
 from foc_ros.analysis.evaluation.truth import HORIZONS
@@ -26,7 +25,7 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, flatten, replace_values
 from foc_ros.core.types import Array
 
-from . import Findings, Setting, SettingTable, is_cross_validated, list_settings
+from . import Findings, Setting, SettingTable, list_settings
 
 RULES = tuple(
     LikelihoodConfig(beta=beta, planning_horizon_s=horizon_s, lookahead_s=lookahead_s)
@@ -58,8 +57,7 @@ FEW_WIDENINGS = tuple(product((0.0, *PROCESS_NOISES[1::4]), (0.0, 3e-3, 8e-3, 24
 def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
     """Return the parameters of the likelihood, from one replay of the recordings.
 
-    Scores `ways`: mean log-likelihoods by how the setting was chosen, with at least three recordings also held out, by recording
-    and by the class taken; none where no class or goal is in question.
+    Scores `ways`: mean log-likelihoods by how the setting was chosen, none where no class or goal is in question.
     """
     questions = [ask_main(each) for each in recordings]
     if not any(questions):
@@ -81,13 +79,8 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> F
         words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
         found.warnings.append(f'likelihood.beta: in {100 * missed:.0f} % of the predictions {words}')
     uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
-    names = [each.name for each in recordings]
-    found.scores['ways'] = scores = {'uniform': float(np.mean(uniform))}
-    scores |= {how: left.score(each) for how, each in left.list_choices(given, names).items()}
-    if is_cross_validated(recordings):
-        taken = [each[0][1].answers[each[0][1].truth] if each else name for each, name in zip(questions, names, strict=True)]
-        if len(set(taken)) > 1:
-            scores['without its way'] = left.score(left.choose_held_out(taken))
+    found.scores['ways'] = {'uniform': float(np.mean(uniform))}
+    found.scores['ways'] |= {how: left.score(each) for how, each in left.list_choices(given).items()}
     return found
 
 
@@ -97,10 +90,7 @@ def _tabulate_classes(recording: ObservedRecording, rule: Baseline) -> Array:
 
 
 def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
-    """Return the parameters that widen the covariance.
-
-    Scores: mean log-densities and coverage by how the widening was chosen, with at least three recordings also held out.
-    """
+    """Return the parameters that widen the covariance; scores: mean log-densities and coverage by how the widening was chosen."""
     before = flatten(config)
     given = {name: float(before[name]) for name in WIDENINGS}
     settings = list_settings({name: (0.0, given[name], *TRIED_WIDENINGS[name]) for name in WIDENINGS})
@@ -115,7 +105,7 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Fin
     found, left = table.estimate(given, 'density of true positions')
     none: Setting = dict.fromkeys(WIDENINGS, 0.0)
     chosen = {'motor noise alone': [none] * len(recordings)}
-    chosen |= left.list_choices(given, [each.name for each in recordings])
+    chosen |= left.list_choices(given)
     found.scores = {'positions': {name: table.score(each) for name, each in chosen.items()}, 'inside_90': {}, 'inside_all_90': {}}
     for name, each in chosen.items():
         for kind, share in compute_coverage(recordings, config, each).items():
@@ -124,10 +114,9 @@ def fit_widening(recordings: Sequence[ObservedRecording], config: Config) -> Fin
 
 
 def compute_mean_densities(observation: Observation, shares: Array, widenings: Iterable[Sequence[float]]) -> Array | None:
-    """Return the log-density of the true positions, the mean over the horizons, under each widening, (q,) [nat, metres].
+    """Return the log-density of the true positions, the mean over the horizons, under each of the `WIDENINGS` (q,) [nat, metres].
 
-    shares (k,): of the candidates; widenings: values of `WIDENINGS`. None where the movement ends before the first horizon
-    or has not begun, because a hand at rest shows how long it waits, not how it moves.
+    None where the movement ends before the first horizon, and of a hand at rest, which shows how long it waits, not how it moves.
     """
     if observation.movement_age_s == 0.0 or not shares.any() or np.isnan(observation.truth.positions[HORIZONS[0], 0]):
         return None
@@ -144,11 +133,7 @@ def widen_covariances(observation: Observation, widenings: Iterable[Sequence[flo
 def compute_coverage(
     recordings: Sequence[ObservedRecording], config: Config, chosen: Sequence[Setting]
 ) -> dict[str, float | None]:
-    """Return the shares of true positions of moving hands after 0.5 s inside 90 % ellipses and regions.
-
-    inside_90: the ellipse of the likeliest candidate; inside_all_90: the smallest region of all candidates; chosen (n,): the
-    widening of each recording, so that each can be judged by one that it did not influence.
-    """
+    """Return the shares of true positions of moving hands in 90 % ellipses and regions after 0.5 s; chosen (n,): widenings."""
     moving = []
     for recording, setting in zip(recordings, chosen, strict=True):
         for each in recording.observations:
@@ -158,5 +143,5 @@ def compute_coverage(
     if not moving:
         return {'inside_90': None, 'inside_all_90': None}
     shares = [power_rule_shares(each, config.likelihood) for each in moving]
-    weights = {'inside_90': [choose_row(int(each.argmax()), len(each)) for each in shares], 'inside_all_90': shares}
+    weights = {'inside_90': [np.eye(len(each))[each.argmax()] for each in shares], 'inside_all_90': shares}
     return {name: measure_inside(moving, each)[f'{COVERAGE_LEVEL:g}'][COVERAGE_S] for name, each in weights.items()}

@@ -3,13 +3,12 @@
 """Parameters of the predictor itself, each setting of which needs replays: a race of settings.
 
 A setting has two scores, means over the recordings. The score of classes is the log-likelihood of the homotopy class that was
-taken plus that of the gap taken in the next row, or without obstacles that of the goal. (Assistance acts on the next gap first,
-and less chance is in it than in choices that the operator has yet to make.) The score of positions is the log-density of the true
-ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates, by which settings are ranked that are alike in classes. Both are
-proper scores: no setting gains by claiming more or less than it knows. What needs no replay, the parameters of the likelihood and
-the widening of the covariance, is at its best for each setting. The race is successive halving (Jamieson and Talwalkar 2016,
-arXiv:1502.07943): all settings predict a few recordings, the better half of them twice as many, and so on. The given setting
-stays unless another one is better by more than chance.
+taken plus that of the gap taken in the next row, on which assistance acts first, or without obstacles that of the goal. The score
+of positions is the log-density of the true ones 0.25, 0.5 and 1 s ahead under the mixture of the candidates, by which settings
+are ranked that are alike in classes. What needs no replay, the parameters of the likelihood and the widening of the covariance,
+is at its best for each setting. The race is successive halving (Jamieson and Talwalkar 2016, arXiv:1502.07943): all settings
+predict a few recordings, the better half of them twice as many, and so on. The given setting stays unless another one is better
+by more than chance.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from foc_ros.analysis.evaluation.baselines import Forecast, power_rule_shares
@@ -43,8 +41,6 @@ FIRST = 6
 """Recordings that all settings predict."""
 MAX_RECORDINGS = 48
 """Recordings in which settings are compared; more make no difference that counts."""
-PLAINLY_WORSE = 3.0
-"""Standard errors by which a setting behind the best is plainly worse."""
 CONFIDENT = 0.95
 """Probability with which a setting is better than the given one, and share of the resamples with which a choice is sure."""
 Key = tuple[str, int]
@@ -65,8 +61,7 @@ def make_eta_settings(config: Config, may_be_lower: bool) -> list[Config]:
 def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> list[Config]:
     """Return every combination of model, duration, arrival and whether accelerations fade, the given one first.
 
-    Where a goal that is passed is modelled as one where the hand stops, no duration is right, nor where an acceleration that
-    lasts is modelled as one that fades.
+    Where a goal that is passed is modelled as one where the hand stops, no duration is right.
     """
     models = [config]
     if config.duration.model != 'fitts':
@@ -84,7 +79,6 @@ def make_movement_settings(hands: Sequence[RecordedHand], config: Config) -> lis
 
 
 def _scale(config: Config, names: Iterable[str], factor: float) -> Config:
-    """Multiply each of the parameters by a factor."""
     before = flatten(config)
     return replace_values(config, {name: clip_to_bounds(name, factor * float(before[name])) for name in names})
 
@@ -107,8 +101,7 @@ class Replays:
     def score(self, settings: Sequence[Config], names: Sequence[str], description: str) -> Array:
         """Return the scores of settings in recordings, of classes and of positions, (2, s, n) [nat]; description: for a bar.
 
-        A prediction that a setting could not make counts as the worst of those that others made in its place; of classes at most
-        as a uniform guess.
+        A prediction that a setting could not make counts as the worst of the others', of classes at most as a uniform guess.
         """
         missing = [key for key in product(settings, names) if key not in self._known]
         items = [
@@ -132,7 +125,6 @@ class Replays:
 
 
 def _score_replay(item: tuple[int, Recording, Config, Mapping[str, object]]) -> tuple[int, ReplayScores]:
-    """Score the predictions of one setting in a recording; return its number and the scores."""
     number, given, config, thinned = item
     config = replace_values(config, thinned)
     recording, found = observe(given, config, with_plans=True), ReplayScores({}, {})
@@ -162,20 +154,13 @@ def _average_by_recording(found: Sequence[Mapping[Key, float]], most: float, nam
 
 def search_settings(kind: str, settings: Sequence[Config], replays: Replays) -> Findings:
     """Return what is new in the best of some settings, of which the first is the given one."""
-    finalists, scores, first_scores = race(kind, settings, replays)
-    winners, best = list(range(len(finalists))), rank(scores)[0]
+    finalists, scores = race(kind, settings, replays)
+    best, winners = rank(scores)[0], list(range(len(finalists)))
     if scores.shape[2] > 1:  # else any of them may be the best by chance
         winners = resample(lambda rows: rank(scores[:, :, rows])[0], scores.shape[2]).astype(int).tolist()
-    if settings[0] in finalists and not is_better(scores[:, best], scores[:, given := finalists.index(settings[0])]):
-        best = given
-    found = _describe_choice(finalists[best], settings, [finalists[each] for each in winners])
-    positions = first_scores[1].mean(axis=1)
-    if (loss := float(positions[0] - positions[settings.index(finalists[best])])) > 0.05:
-        found.warnings.append(
-            f'{kind}: the setting that explains the classes best predicts positions worse: the mean log-density of the true ones '
-            f'falls by {loss:.2g} nat'
-        )
-    return found
+    if not is_better(scores[:, best], scores[:, 0]):
+        best = 0
+    return _describe_choice(finalists[best], settings, [finalists[each] for each in winners])
 
 
 def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequence[Config]) -> Findings:
@@ -195,24 +180,20 @@ def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequen
         else:
             # of another model of duration, a constant has no other values
             values = [float(each[name]) for each in drawn if each['duration.model'] == after['duration.model']] or [float(value)]
-            found.estimates[name] = Estimate.from_resamples(name, float(value), values, 'predicted positions and classes')
+            found.estimates[name] = Estimate.from_resamples(float(value), values, 'predicted positions and classes')
         if value != before and share < CONFIDENT:
             found.warnings.append(f'{name}: {value} is the best, but only in {100 * share:.0f} % of the resamples')
     return found
 
 
-def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array, Array]:
-    """Return the finalists, in the given order, with their scores, and all scores of the first round."""
+def race(kind: str, settings: Sequence[Config], replays: Replays) -> tuple[list[Config], Array]:
+    """Return the finalists, the given one first, with their scores."""
     names, left, count = sample_names(list(replays.recordings)), list(settings), FIRST
-    rounds: list[Array] = []
     while True:
-        rounds.append(replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}'))
+        scores = replays.score(left, names[:count], f'replays of {len(left)} settings of {kind}')
         if count >= len(names) or len(left) == 1:
-            return left, rounds[-1], rounds[0]
-        is_behind = find_behind(rounds[-1], PLAINLY_WORSE)
-        kept = {index for index in rank(rounds[-1])[: max(-(-len(left) // 2), 4)] if not is_behind[index]}
-        if left[0] == settings[0] and not is_behind[0]:
-            kept.add(0)
+            return left, scores
+        kept = {0, *rank(scores)[: max(-(-len(left) // 2), 4)]}
         left, count = [left[index] for index in sorted(kept)], 2 * count
 
 
@@ -227,23 +208,14 @@ def rank(scores: Array) -> list[int]:
     Alike are those within one standard error (Breiman et al. 1984).
     """
     classes, positions = scores.mean(axis=2)
-    is_behind = find_behind(scores, 1.0)
+    behind = scores[0, classes.argmax()] - scores[0]
+    is_behind = behind.mean(axis=1) > behind.std(axis=1) / np.sqrt(scores.shape[2])
     order: list[int] = np.lexsort((-classes, np.where(is_behind, 0.0, -positions), is_behind)).tolist()
     return order
 
 
-def find_behind(scores: Array, errors: float) -> NDArray[np.bool_]:
-    """Tell which settings are behind the best in classes by more than some standard errors."""
-    classes = scores[0]
-    behind = classes[classes.mean(axis=1).argmax()] - classes
-    return np.asarray(behind.mean(axis=1) > errors * behind.std(axis=1) / np.sqrt(classes.shape[1]))
-
-
 def is_better(scores: Array, given: Array) -> bool:
-    """Return whether a setting is better than the given one, in classes or in positions, by more than chance (Student's t).
-
-    scores, given (2, n): of classes and of positions.
-    """
+    """Return whether a setting beats the given one in classes or in positions (2, n), by more than chance (Student's t)."""
     difference, n = scores - given, scores.shape[1]
     if n < 2:
         return False

@@ -106,9 +106,8 @@ ARMS = {
 class Task(Record):
     """One movement: the scene, what the assistance is told of it, and what the operator intends.
 
-    obstacles: as they are; goals (g, 2): announced ones [m]; goal (2,): the one of the operator [m]; goal_row: its row, -1 if it
-    is not announced; path (n, 3, 2): intended positions, velocities and accelerations at steps of `DT`, in SI units; hand_radius
-    [m].
+    goals (g, 2): announced ones [m]; goal (2,): the one of the operator [m]; goal_row: its row, -1 if it is not announced; path
+    (n, 3, 2): intended positions, velocities and accelerations at steps of `DT`, in SI units; hand_radius [m].
     """
 
     arm: Arm
@@ -155,9 +154,8 @@ class SimulatedArm:
 
         m a = u + n + f - b v,    u = m a_d + b v_d + K (x_d - x)(t - delay) + D (v_d - v)(t - delay),
 
-    with the intended path x_d, the force f of the assistance and a noise n whose standard deviation grows with |u|
-    (signal-dependent noise, Harris and Wolpert 1998, doi 10.1038/29528). Attributes: position [m], velocity [m/s] and force u [N]
-    of the hand.
+    with the intended path x_d, the force f of the assistance and a noise n whose standard deviation grows with |u| (Harris and
+    Wolpert 1998, doi 10.1038/29528). Attributes: position [m], velocity [m/s] and force u [N] of the hand.
     """
 
     def __init__(self, arm: Arm, path: Array) -> None:

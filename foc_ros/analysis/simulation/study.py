@@ -101,9 +101,8 @@ class FocAssistance(Assistance):
         return False
 
 
-Rules = Mapping[str, type[Assistance]]
-RULES: Rules = {NONE: Assistance, FOC: FocAssistance}
-"""The rules of `simulate` by name. A study may have others: they need a task and a configuration, as `Assistance` has them."""
+RULES: dict[str, type[Assistance]] = {NONE: Assistance, FOC: FocAssistance}
+"""The rules of `simulate` by name. A study may add others, which are made from a task and a configuration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +143,7 @@ def run_trial(task: Task, assistance: type[Assistance], config: Config, noise: A
 
 
 def measure_trial(trial: Trial, task: Task, f_max: float) -> dict[str, float]:
-    """Return the measures of a trial by name.
-
-    The opposing impulse is the integral of the force of the assistance against the direction in which the operator intends to
-    move, and the opposing share its mean as a share of the largest force.
-    """
+    """Return the measures of a trial by name; the opposing impulse integrates the force against the intended movement."""
     clearance, duration_s = float(trial.measure_clearances(task).min()), DT * len(trial.position)
     velocity = task.path[: len(trial.position), 1]
     speed = np.hypot(*velocity.T)
@@ -200,7 +195,7 @@ def make_pairs(
     ]
 
 
-def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
+def run_pair(pair: Pair, config: Config, rules: Mapping[str, type[Assistance]] = RULES) -> PairResult:
     """Run all rules of a pair."""
     rng = np.random.default_rng([pair.seed, OPERATORS.index(pair.operator), pair.number])
     task = pair.task or draw_task(pair.operator, rng, config.scene.hand_radius)
@@ -218,8 +213,7 @@ def run_pair(pair: Pair, config: Config, rules: Rules = RULES) -> PairResult:
 def summarise(results: Sequence[PairResult], seed: int) -> list[dict[str, Any]]:
     """Return a cell for each operator and rule: number of trials, and every measure with its interval.
 
-    `<name>_interval` is a bootstrap interval of 95 % of the mean; `<name>_difference` and `<name>_difference_interval` are those
-    of the paired difference to `none`. None where there is nothing to average, or the value is not finite.
+    `<name>_difference` is the paired difference to `none`. None where there is nothing to average, or the value is not finite.
     """
     cells = []
     for operator in dict.fromkeys(each.operator for each in results):

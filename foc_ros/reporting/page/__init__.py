@@ -27,7 +27,6 @@ except ImportError as error:
 
 Picture = tuple[str, str]
 Table = tuple[str, Sequence[str], Sequence[Sequence[str]]]
-"""Heading, columns and rows."""
 FOLDER = Path(__file__).parent
 POLICY = "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """Content security policy of every page: a browser shows what the page holds and fetches nothing."""
@@ -44,10 +43,7 @@ def render(template: str, **values: Any) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: sentences, pictures, and a table below notes that explain it, whichever of them it has.
-
-    pictures: each as PNG in base64, and its caption; the first cell of a row is its heading.
-    """
+    """A part of a page: sentences, pictures, and a table below notes that explain it, whichever of them it has."""
 
     heading: str = ''
     sentences: Sequence[str] = ()
@@ -60,11 +56,7 @@ class Section:
 def write_page(
     directory: Path, name: str, title: str, sections: Sequence[Section], warnings: Sequence[str], config: Config | None
 ) -> None:
-    """Write a page with warnings on top, and what made it below: program, date, machine, and parameters unlike their defaults.
-
-    The folder is made if necessary. A page that foc_ros has made is replaced. Raises InputError where that cannot be done, or
-    another file has its name.
-    """
+    """Write a page with warnings on top, and what made it below; raises InputError where it cannot be written, or replaced."""
     check_replaceable('--report', directory / name)
     system = f'{platform.system()} on {platform.machine()} with {os.cpu_count()} processors, Python {platform.python_version()}'
     made = f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; {system}.'

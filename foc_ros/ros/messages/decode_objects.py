@@ -3,8 +3,7 @@
 """Decoding of markers (visualization_msgs/MarkerArray), of a planning scene (moveit_msgs/CollisionObject) and of detections.
 
 Each is a set of solids: boxes, spheres and cylinders, which become rounded polygons in the task plane, with their heights. A
-message is read by the names of its fields, so the packages of collision objects and of vision_msgs/Detection3DArray need not be
-installed. A table of markers or objects is not changed: an update returns a new one.
+message is read by the names of its fields, so the packages of collision objects and of vision_msgs need not be installed.
 """
 
 from __future__ import annotations
@@ -30,17 +29,13 @@ from .decode_poses import MAX_COORDINATE, FrameLookup, check_coordinates, decode
 from .plane import NO_TRANSFORM, Transform, compute_rotation, lift, make_heights, project
 
 ADD, DELETE, DELETE_ALL = 0, 2, 3
-"""Actions of a marker."""
 REMOVE, APPEND, MOVE = 1, 2, 3
 """Operations on a collision object besides ADD."""
 BOX, SPHERE, CYLINDER = 1, 2, 3
 """Types that become obstacles, of markers and of primitives alike."""
 DIMENSIONS = {BOX: 3, SPHERE: 1, CYLINDER: 2}
-"""Number of dimensions of each shape_msgs/SolidPrimitive that becomes an obstacle."""
 POINT = np.zeros((1, 2))
-"""The polygon of a circle."""
 CORNERS = np.array([*product((-0.5, 0.5), repeat=3)])
-"""Corners of a box of the size 1."""
 NORMALS = {plane: lift(np.zeros(2), 1.0, plane) for plane in ('xy', 'xz', 'yz')}
 UPRIGHT = {plane: np.outer(normal, [0.0, 0.0, 1.0]) for plane, normal in NORMALS.items()}
 """Matrices whose last column, the axis of a cylinder, is the normal of each plane."""
@@ -60,7 +55,7 @@ class Outline(NamedTuple):
 def outline(solid: Solid, plane: str, field: str) -> Outline:
     """Return a solid in the plane: the hull of a box, the circle of a sphere, all within the radius of a cylinder of its axis.
 
-    The height of a sphere is not known. Raises MessageError, with the name of a field, for a box without an extent in the plane.
+    Raises MessageError, with the name of a field, for a box without an extent in the plane.
     """
     kind, size, pose = solid
     centre, height = project(pose.translation, plane)
@@ -81,10 +76,7 @@ def outline(solid: Solid, plane: str, field: str) -> Outline:
 
 
 class Present(NamedTuple):
-    """A marker or a collision object.
-
-    outlines: of its obstacles, by their names; end_ns: of its lifetime; solids: of a collision object, relative to its pose.
-    """
+    """A marker or a collision object: its obstacles by name, the end of its lifetime, and its solids relative to its pose."""
 
     outlines: dict[str, Outline]
     end_ns: float = math.inf
@@ -93,10 +85,9 @@ class Present(NamedTuple):
 
 @dataclass(frozen=True)
 class ObjectTable:
-    """The present markers, updated as RViz updates its own, or the present collision objects.
+    """The present markers, updated as RViz updates its own, or the present collision objects; an update returns a new table.
 
-    held: markers by (ns, id), or objects by id; frame_id: of all of them; stamp_ns: newest stamp of the last message, 0 if it had
-    none; dropped: parts of the last message that are no obstacles, by reason (`not_finite`, `not_a_shape`).
+    held: markers by (ns, id), or objects by id; stamp_ns: newest of the last message; dropped: its parts that are no obstacles.
     """
 
     held: Mapping[Any, Present] = field(default_factory=dict)
@@ -105,18 +96,15 @@ class ObjectTable:
     dropped: Mapping[str, int] = field(default_factory=dict)
 
     def with_markers(self, message: Any, now_ns: int, plane: str, look_up: FrameLookup = keep_frame) -> ObjectTable:
-        """Return the table after a MarkerArray.
+        """Return the table after a MarkerArray; now_ns: start of the lifetime of an unstamped marker, 0 if unknown.
 
-        now_ns: start of the lifetime of an unstamped marker; 0 if unknown, and the marker does not expire.
-
-        ADD inserts or replaces a marker, DELETE removes it, DELETEALL removes those of its ns, or all of them if ns is empty. A
-        marker with a lifetime expires when that has passed since its stamp. The radius of a sphere is half its largest scale,
-        that of a cylinder half the larger of scale.x and scale.y; their orientation is not used. A cylinder stands on the plane,
-        with the height scale.z; the height of a sphere, and of any marker without an extent along the normal, is not known. A
-        cube is the convex hull of its corners, with the radius 0. A marker with a number that is not finite is dropped, and the
-        marker that it would replace stays. A marker of another type replaces an obstacle, but is none; both are counted. Raises
-        MessageError, and then nothing is changed, for an unknown action, a negative scale or lifetime, a cube without an extent
-        in the plane, a coordinate beyond MAX_COORDINATE, two frames, or more markers than MAX_ROWS.
+        ADD inserts or replaces a marker, DELETE removes it, DELETEALL removes those of its ns, or all of them if ns is empty. The
+        radius of a sphere is half its largest scale, that of a cylinder, which stands on the plane, half the larger of scale.x
+        and scale.y; the height of a sphere, and of any marker without an extent along the normal, is not known. A cube is the
+        convex hull of its corners. A marker with a number that is not finite is dropped, and the marker that it would replace
+        stays. A marker of another type replaces an obstacle, but is none; both are counted. Raises MessageError, and then nothing
+        is changed, for an unknown action, a negative scale or lifetime, a cube without an extent in the plane, a coordinate
+        beyond MAX_COORDINATE, two frames, or more markers than MAX_ROWS.
         """
         held = self._find_existing(now_ns)
         frame_id, newest_ns, dropped = self.frame_id, 0, Counter[str]()
@@ -154,8 +142,8 @@ class ObjectTable:
         """Return the table after a CollisionObject; the name of an obstacle is the id of its object and its number in it.
 
         ADD replaces an object, APPEND adds primitives to it, MOVE changes its pose, REMOVE removes it, or all if the id is empty.
-        Boxes, spheres and cylinders are obstacles; other primitives, meshes and planes are counted. Raises MessageError, and then
-        nothing is changed, for a wrong operation, number of dimensions or poses, size or coordinate, or another frame.
+        Boxes, spheres and cylinders are obstacles; other parts are counted. Raises MessageError, and then nothing is changed, for
+        a wrong operation, number of dimensions or poses, size or coordinate, or another frame.
         """
         stamp_ns, name = decode_stamp(message.header), str(message.id)
         frame_id, transform = look_up(message.header)
@@ -277,7 +265,6 @@ def _is_finite(pose: Any, size: Any, *, is_turned: bool) -> bool:
 
 
 def _read_pose(name: str, pose: Any, transform: Transform = NO_TRANSFORM) -> Transform:
-    """Return a pose after a transform, if its numbers are within their bounds."""
     check_coordinates(f'{name}.orientation', [*_read(pose.orientation), pose.orientation.w], unit='')
     position = decode_point(pose.position, f'{name}.position', transform)
     return Transform(transform.rotation @ compute_rotation(pose.orientation), position)

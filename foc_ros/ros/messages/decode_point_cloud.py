@@ -43,14 +43,13 @@ class DecodedCloud:
 def decode_point_cloud(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> DecodedCloud:
     """Decode the obstacles of a PointCloud2 and project them onto the task plane; a cloud without rows is an empty scene.
 
-    An obstacle is a circle, or a box with rounded corners if its `size_x` or `size_y` is larger than 0. `size_z` is its full
-    length along the normal of the plane; the height of an obstacle without it, or that moves along the normal, is not known.
-
-    Coordinates, sizes and radii are floats of 4 or 8 bytes, `id` is an integer of any size (without it, the row number is the
-    id), in either byte order, organised or not; other fields are skipped. A row with a number that is not finite is dropped and
-    counted; of several rows with one id the last is used. Raises MessageError if the layout does not fit the data, a field is
-    missing or of the wrong type, a radius, size or deviation is negative, a row with the fields of a box has neither size nor
-    radius, a number is beyond MAX_COORDINATE, or a transform tilts sizes out of the plane, or turns boxes without a yaw.
+    An obstacle is a circle, or a box with rounded corners if its `size_x` or `size_y` is larger than 0. The height of an obstacle
+    without `size_z`, or that moves along the normal, is not known. Coordinates, sizes and radii are floats of 4 or 8 bytes, `id`
+    is an integer of any size (without it, the row number is the id), in either byte order, organised or not; other fields are
+    skipped. A row with a number that is not finite is dropped and counted; of several rows with one id the last is used. Raises
+    MessageError if the layout does not fit the data, a field is missing or of the wrong type, a radius, size or deviation is
+    negative, a row with the fields of a box has neither size nor radius, a number is beyond MAX_COORDINATE, or a transform tilts
+    sizes out of the plane, or turns boxes without a yaw.
     """
     stamp_ns = decode_stamp(message.header)
     frame_id, transform = look_up(message.header)
@@ -128,7 +127,6 @@ def _stack(columns: Columns, *names: str) -> Array:
 
 
 def _transform(columns: Columns, given: set[str], transform: Transform, plane: str) -> Columns:
-    """Return positions, velocities and the yaw of boxes after a transform; given: names of the columns of the message."""
     rotation, sizes = transform.rotation, [name for name in ('size_x', 'size_y', 'size_z') if name in given]
     if sizes:
         tilt = float(np.abs(project(lift(np.eye(2), 0.0, plane) @ rotation.T, plane)[1]).max())
@@ -149,7 +147,6 @@ def _transform(columns: Columns, given: set[str], transform: Transform, plane: s
 
 
 def _check_numbers(columns: Columns, is_finite: NDArray[np.bool_], is_box: bool) -> None:
-    """Raise MessageError for a number out of its bounds, and where boxes are possible, for a row without any extent."""
     for name, column in columns.items():
         low = 0.0 if name.startswith(('radius', 'size')) else -MAX_COORDINATE
         for row in np.flatnonzero(((column < low) | (column > MAX_COORDINATE)) & is_finite)[:1]:

@@ -28,11 +28,7 @@ def keep_frame(header: Any) -> tuple[str, Transform]:
 
 
 def decode_hand_sample(message: Any, plane: str, look_up: FrameLookup = keep_frame) -> HandSample:
-    """Decode a geometry_msgs/PoseStamped as a hand sample; the orientation only tells a lost hand.
-
-    Raises LostHandError for a pose without data, MessageError for a coordinate beyond MAX_COORDINATE and a stamp that is not set
-    or not valid.
-    """
+    """Decode a geometry_msgs/PoseStamped as a hand sample; raises LostHandError or MessageError where its numbers are wrong."""
     check_hand_pose(message.pose)
     stamp_ns = decode_stamp(message.header)
     if stamp_ns == 0:
@@ -43,11 +39,7 @@ def decode_hand_sample(message: Any, plane: str, look_up: FrameLookup = keep_fra
 
 
 def check_hand_pose(pose: Any) -> None:
-    """Raise LostHandError for a geometry_msgs/Pose by which a tracker says that it does not see the hand.
-
-    It has no finite position, or the position 0 with an orientation that is none. A tracker that measures no orientation may
-    leave it empty, but then its hand is hardly ever at 0 exactly.
-    """
+    """Raise LostHandError for a pose that is not finite, or 0 with an orientation that is none: the tracker is blind."""
     place, turn = (pose.position.x, pose.position.y, pose.position.z), pose.orientation
     for axis, value in zip('xyz', place, strict=True):
         if not math.isfinite(value):

@@ -55,10 +55,7 @@ def encode_stiffness(output: GuidanceOutput, header: SampleHeader, types: Messag
 
 
 def blend_twist(output: GuidanceOutput, header: SampleHeader, command: Any, types: MessageTypes) -> Any:
-    """Return a geometry_msgs/TwistStamped command with the part in the plane blended; the rest of it is kept.
-
-    Raises InputError for a command in another frame, and for a number that is not finite.
-    """
+    """Return a TwistStamped command with the part in the plane blended; InputError for another frame or no finite number."""
     frame_id, linear = decode_frame(command.header), command.twist.linear
     if frame_id != header.frame_id:
         raise MessageError('header.frame_id', f'the working frame {header.frame_id!r}', repr(frame_id))

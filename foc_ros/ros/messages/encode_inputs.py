@@ -38,11 +38,7 @@ def encode_goals(types: MessageTypes, stamp_ns: int, frame_id: str, positions: A
 
 
 def encode_obstacles(types: MessageTypes, stamp_ns: int, frame_id: str, rows: Sequence[tuple[float, ...]]) -> Any:
-    """Encode obstacles (x, y, z, radius, radius_stddev, id[, size_x, size_y, yaw]) as a sensor_msgs/PointCloud2.
-
-    Rows without the last three are circles. The message has their fields only if a row has a size. No row can tell the corners of
-    a hull that is no box.
-    """
+    """Encode obstacles x, y, z, radius, radius_stddev, id and, unless they are circles, size_x, size_y, yaw as a PointCloud2."""
     columns, count = (BOX_ROW, 9) if any(any(row[6:8]) for row in rows) else (CLOUD_ROW, 6)
     table = np.array([(*row, 0.0, 0.0, 0.0)[:count] for row in rows], dtype=columns)
     return encode_table(types, make_header(types, stamp_ns, frame_id), table)

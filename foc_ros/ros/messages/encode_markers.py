@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Encoding of a prediction as a MarkerArray: paths, ellipses and labels of all candidates, and the uncertain obstacles.
 
-Each labelled path has ellipses of one standard deviation of the motor noise, which eta is about. The most likely one also has
-outer ones of the total uncertainty; those of all candidates would cover the scene. Namespaces and a legend name the two. Where
-the height is predicted, they are cylinders of one standard deviation of it up and down.
-
-Every array first deletes the markers of the one before, and all markers expire after LIFETIME_S, so that the drawing of a
-prediction that is not renewed disappears.
+Each labelled path has ellipses of one standard deviation of the motor noise; the most likely one also has outer ones of the total
+uncertainty. Where the height is predicted, they are cylinders of one standard deviation of it up and down. Every array first
+deletes the markers of the one before, and all markers expire after LIFETIME_S.
 """
 
 from __future__ import annotations
@@ -29,17 +26,14 @@ from .ranking import describe_candidate, find_drawn_curve, order_candidates
 from .types import MessageTypes, make_header
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
-"""Types of markers."""
 LIFETIME_S = 1.0
 ELLIPSES = 6
-"""Number of ellipses along each path."""
 MAX_DRAWN = 128
 """Number of obstacles drawn, the nearest to the hand: thousands of markers would take longer than the prediction."""
 THICKNESS, TEXT_HEIGHT = 0.002, 0.01
 TALL = 10 * THICKNESS
 """Height of round obstacles [m]; texts are above them."""
 MOTOR, TOTAL = 'motor_noise', 'total_uncertainty'
-"""Namespaces of the two ellipses."""
 ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
 """Opacity as a share of that of the path, and thickness [m]: the inner ellipse stands out of the outer one."""
 LEGEND = 'ellipses of one standard deviation\ninner: motor noise, which eta is about\nouter: total uncertainty'
@@ -115,7 +109,6 @@ class _MarkerEncoder:
             yield self._encode_text('label', index, '\n'.join(lines).replace('\0', ' '), place, colour, 1.0)
 
     def _encode_ellipses(self, name: str, index: int, outcome: PredictedCandidate, colour: Colour) -> Iterator[Any]:
-        """Yield ellipses of one standard deviation about the mean, spread over the path."""
         path, height, is_motor = outcome.solution.path, outcome.height, name == MOTOR
         steps = np.unique(np.linspace(0, len(path) - 1, ELLIPSES + 1).round().astype(np.intp)[1:])
         covariance = outcome.motor_covariance if is_motor else outcome.covariance
@@ -132,10 +125,7 @@ class _MarkerEncoder:
             yield self.encode(name, 1000 * index + i, CYLINDER, faint, (*diameters[i], float(thick[i])), centre, angles[i])
 
     def encode_names(self) -> Iterator[Any]:
-        """Yield the names of several goals and of the obstacles that the labels of paths name, and the legend below the hand.
-
-        The legend explains the ellipses, if any are drawn, and has the shares that no candidate has.
-        """
+        """Yield the names of several goals and of the obstacles in the labels of paths, and the legend."""
         given, near = self._prediction, self._prediction.obstacles
         if len(given.goals) > 1:
             for row, place in enumerate(self._lift(given.goal_positions)):
@@ -196,11 +186,9 @@ class _MarkerEncoder:
         return self._types.make('visualization_msgs/msg/Marker', **own, **self._shared, **rest)
 
     def _lift(self, positions: Array) -> Array:
-        """Return positions in the plane (..., 2) as points in space, at the height of the hand."""
         return lift(positions, self._prediction.height, self._plane)
 
     def _lift_curve(self, curve: Array, outcome: PredictedCandidate) -> Array:
-        """Return a curve (m, 2) along the whole way of a candidate as points in space, at its predicted heights."""
         if outcome.height is None:
             return self._lift(curve)
         heights = outcome.height.mean[:, 0]

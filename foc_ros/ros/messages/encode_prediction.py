@@ -90,9 +90,7 @@ def _tabulate(outcomes: Sequence[PredictedCandidate], height: float, plane: str)
 def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
     """Encode one row per candidate with a likelihood, with the columns LIKELIHOOD_COLUMNS, as a Float64MultiArray.
 
-    The first dimension's label joins the labels of the candidates by ';', and that of the third one, of size 1, has the stamp.
-    effort: the remaining one [m^2/s^6]. Shares that no candidate has come last, without the other numbers: rows `UNKNOWN` and
-    `OTHER`, each only if its share is above 0.
+    Shares that no candidate has come last, without the other numbers: rows `UNKNOWN` and `OTHER`, if above 0.
     """
     outcomes, shares = order_candidates(prediction), _list_shares(prediction)
     ratios = compute_cost_ratios(outcomes)
@@ -105,17 +103,12 @@ def encode_likelihoods(prediction: Prediction, types: MessageTypes) -> Any:
 
 
 def _list_shares(prediction: Prediction) -> dict[str, float]:
-    """Return the shares above 0 that no candidate has, by their labels."""
     shares = {UNKNOWN: prediction.unknown, OTHER: prediction.other}
     return {name: share for name, share in shares.items() if share > 0.0}
 
 
 def encode_likelihoods_by_name(prediction: Prediction, types: MessageTypes) -> Any:
-    """Encode the likelihoods as a diagnostic_msgs/DiagnosticArray, which tools plot by name: status `goals`, status `classes`.
-
-    The key of a value is the name of a goal or the label of a candidate; there is none for what is not known. Both have the keys
-    `UNKNOWN` and `OTHER` where such a share is above 0.
-    """
+    """Encode the likelihoods by the names of goals and the labels of classes as a DiagnosticArray, which tools plot by name."""
     classes = {outcome.label: outcome.likelihood for outcome in order_candidates(prediction)}
     goals = {goal.name: goal.likelihood for goal in prediction.goals if goal.likelihood is not None}
     statuses = []

@@ -3,7 +3,7 @@
 """Points in space and in the task plane, which is named by its two axes of the working frame: 'xy', 'xz' or 'yz'.
 
 The height of a point is its coordinate along the third axis. Left and right are those of a drawing with the first axis to the
-right and the second axis up. For 'xy' and 'yz' that is the view against the third axis, for 'xz' the view along it.
+right and the second axis up.
 """
 
 from __future__ import annotations
@@ -63,10 +63,7 @@ def compute_rotation(quaternion: Any) -> Array:
 
 
 def make_heights(middle: ArrayLike, size: ArrayLike) -> Array:
-    """Return the lowest and the highest point (..., 2) of bodies of sizes (...) about their middles (...) along the normal [m].
-
-    The height of a body without a size is not known: it is unbounded.
-    """
+    """Return lowest and highest points (..., 2) of bodies about their middles along the normal [m]; unbounded without a size."""
     half = np.where(np.asarray(size) >= FLAT, np.asarray(size) / 2.0, np.inf)
     heights: Array = np.stack((middle - half, middle + half), axis=-1)
     return heights

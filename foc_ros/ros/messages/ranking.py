@@ -25,8 +25,7 @@ MAX_RATIO = 1e9
 def order_candidates(prediction: Prediction) -> tuple[PredictedCandidate, ...]:
     """Return the candidates with a likelihood: the one called most likely (which changes only by a margin), then by likelihood.
 
-    The result for the last prediction is cached, because every output needs it. Raises FocError, naming the candidate, for a
-    number that is not finite or beyond MAX_NUMBER: no such number is published.
+    Cached for the last prediction. Raises FocError, naming the candidate, for a number that is not finite or beyond MAX_NUMBER.
     """
     for outcome in prediction.candidates_with_likelihood:
         solution = outcome.solution

@@ -37,8 +37,7 @@ class MessageTypes(ABC):
 
         A message in a field may be given as a message, as a dictionary of its fields, or as the values of all its fields in their
         order; a list of messages also as an array as in `fill_each`. Messages may share the values of their fields, so they must
-        not be changed. rosbags knows no defaults but zero: give a Quaternion its w. Raises TypeError for a field that the type
-        does not have.
+        not be changed. rosbags knows no defaults but zero. Raises TypeError for a field that the type does not have.
         """
         blank, converters = self._find_layout(name)
         if unknown := values.keys() - converters.keys():
@@ -63,7 +62,6 @@ class MessageTypes(ABC):
         return [message_class(**dict(zip(fields, row, strict=True))) for row in rows.tolist()]
 
     def _describe(self, name: str) -> tuple[Any, dict[str, Converter]]:
-        """Return a message whose fields have their defaults, and the converter of each field."""
         blank, fields = self._make_blank(name)
         return blank, {field: self._find_converter(getattr(blank, field), inner) for field, inner in fields.items()}
 
@@ -122,7 +120,6 @@ class RosbagsTypes(MessageTypes):
         return self.typestore.types[name](**defaults), inner
 
     def _find_default(self, kind: tuple[Any, Any]) -> Any:
-        """Return the default of a field definition of the typestore."""
         node, detail = kind
         if node.name == 'NAME':
             return self.make(detail)
