@@ -4,6 +4,7 @@
 
 import json
 import os
+import shutil
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -66,6 +67,20 @@ def test_a_recording_that_does_not_reach_its_goal_is_named(tmp_path, capsys):
     assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 2
     assert 'r1: expected a movement' in capsys.readouterr().err
     assert len(load_library(str(tmp_path / 'ways.json'))) == 1
+
+
+def test_copies_of_a_bag_count_once(tmp_path, capsys):
+    bags = tmp_path / 'bags'
+    bags.mkdir()
+    bag = write_bag(bags / 'a', messages(seconds=1.02))
+    write_bag(bags / 'c', messages(seconds=1.04))
+    (file,) = bag.glob('*.mcap')
+    shutil.copytree(bag, bags / 'b')
+    shutil.copy(file, bags / 'd.mcap')
+    assert main(['learn', str(bags), '--output', str(tmp_path / 'ways.json')]) == 0
+    assert len(load_library(str(tmp_path / 'ways.json'))) == 2
+    copies = [f'foc_ros learn: {bags / name}: left out, because it is a copy of {file}' for name in ('b', 'd.mcap')]
+    assert [line for line in capsys.readouterr().err.splitlines() if 'copy' in line] == copies
 
 
 PARAMETERS = '/**: {ros__parameters: {rate_hz: 1.0, foc.steps: 20, homotopy.library: "%s"}}'

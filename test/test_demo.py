@@ -54,7 +54,7 @@ def test_end_to_end(tmp_path, capsys):
         'The node starts ...',
         ' of 2.0 s   hand samples ',
         'The report is written ...',
-        'written to ',
+        'predictions were',
         'report/index.html',
     )
     places = [printed.find(words) for words in told]
@@ -72,6 +72,7 @@ def test_end_to_end(tmp_path, capsys):
     assert any(each['candidates'] for each in numbers['predictions'])
     page = (tmp_path / 'out' / 'report' / 'index.html').read_text(encoding='utf-8')
     assert 'id="scene"' in page and '"frames"' in page, 'the page draws by itself what the pictures beside it show'
+    assert (tmp_path / 'out' / 'report' / 'overview.png').read_bytes().startswith(b'\x89PNG')
 
 
 def start(output):

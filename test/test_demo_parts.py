@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from bag_helpers import TYPES
 from play_helpers import has_ended, until
-from report_samples import START_NS, prediction
+from report_samples import START_NS, prediction, predictions, samples
 from rich.console import Console
 from rosbags.highlevel import AnyReader
 
 from foc_ros.cli import demo
-from foc_ros.cli.demo import Recorder
+from foc_ros.cli.demo import Recorder, describe_lead
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
@@ -29,7 +29,7 @@ from foc_ros.core.solution import LEFT, RIGHT
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import Item
 from foc_ros.reporting.live_text import show_live
-from foc_ros.reporting.views import build_snapshot
+from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 from foc_ros.ros import isolated_node
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
@@ -89,7 +89,7 @@ def shown(recorder, terminal, times):
     items = [Item('goals', '/goals', START_NS + after_ns, None, b'') for after_ns in (0, 5 * NANOSECONDS)]
     with show_live(console) as show:
         for now in times if recorder.snapshots else ():
-            show(float(now), recorder.snapshots[-1], recorder.describe(items))
+            show(float(now), recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
     return screen.getvalue()
 
 
@@ -108,6 +108,7 @@ def test_on_a_terminal_a_table_is_shown():
     text = shown(filled(), True, np.array([0.2]))
     for part in ('likely', 'cost', 'eta', 'A goal0: right of 1', '56 %', 'C goal1: left of 1, right of post', '0.90', 'x 1.15'):
         assert part in text
+    assert 'AAAA' in text and 'BBBB' in text and '▒1▒' in text, 'paths have letters, and the obstacle has its number'
     assert '█' in text
     assert '…' not in text and '...  ' not in text
 
@@ -161,6 +162,20 @@ def test_without_rclpy_one_line_says_how_to_install_it(monkeypatch, tmp_path, ca
     assert error.count('\n') == 1
     assert 'make setup' in error
     assert not (tmp_path / 'out').exists()
+
+
+def test_the_lead_of_the_goal_that_was_reached_is_described():
+    made = samples(1)
+    snapshots = [build_snapshot(each) for each in predictions(made)]
+    words = describe_lead(build_hand_trajectory(made), snapshots)
+    # the most likely candidate always leads to goal0, where the hand arrives
+    assert words.startswith(
+        f'{len(snapshots)} predictions were made. The hand moved to a goal 1 times, for 0.8 s; this goal was the most '
+    )
+    assert 'most likely one from 0.8 s before the arrival' in words
+    others = [replace(each, candidates=each.candidates[::-1]) for each in snapshots]
+    assert 'from 0.0 s before the arrival' in describe_lead(build_hand_trajectory(made), others)
+    assert describe_lead(build_hand_trajectory(made[:5]), snapshots).endswith('no movement ended at a goal.')
 
 
 def test_a_domain_in_use_is_not_taken(monkeypatch):

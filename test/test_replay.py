@@ -295,6 +295,9 @@ def test_guidance_of_a_recording_takes_no_jump_for_work():
     assert max(output.force[1] for _, output, _ in outputs) > 2.0
     assert min(output.tank for _, output, _ in outputs) > 0.4
     assert outputs[-1][1].status is GuidanceStatus.NO_PREDICTION
+    later = HandSample(3 * 10**18, np.zeros(2))  # a century: while nothing is guided, nothing is updated
+    pipeline.add_hand_sample(later)
+    assert len(guidance.add(Step(None, later, None, pipeline.scene))) < 100
 
 
 def test_guidance_is_the_same_each_time_and_within_its_limits(tmp_path, capsys):

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from filecmp import cmp
 from functools import partial
 from heapq import merge
 from pathlib import Path
@@ -121,7 +122,21 @@ def find_recordings(data: Path) -> dict[str, Recording]:
         raise RecordingError(f'{data}: no such file or directory')
     if not bags:
         raise RecordingError(f'{data}: expected bags, or {RECORDINGS} with {GOALS} or {SCENES}, got neither')
-    return {path.name: BagRecording(path.name, path) for path in bags}
+    return {path.name: BagRecording(path.name, path) for path in _leave_out_copies(bags)}
+
+
+def _leave_out_copies(bags: Iterable[Path]) -> Iterator[Path]:
+    """Yield the bags; warn of those with the same files as one before, which would count twice, and leave them out."""
+    of_sizes: dict[tuple[int, ...], list[list[Path]]] = {}
+    for bag in bags:
+        files = [path for path in sorted(bag.iterdir()) if is_bag_file(path)] if bag.is_dir() else [bag]
+        known = of_sizes.setdefault(tuple(path.stat().st_size for path in files), [])
+        same = next((each for each in known if all(map(partial(cmp, shallow=False), files, each))), None)
+        if same is None:
+            known.append(files)
+            yield bag
+        else:
+            warn(f'{bag}: left out, because it is a copy of {same[0]}')
 
 
 def group_by_operator(found: Mapping[str, Recording]) -> dict[str, list[Recording]]:

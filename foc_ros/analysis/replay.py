@@ -199,6 +199,8 @@ class GuidanceReplay:
         while self._next_ns < stamp_ns:
             self._loop.update(self._seconds(self._next_ns))
             self._next_ns += self._period_ns
+            if self._loop.is_idle:  # it stays so until the next sample, which may be years later
+                self._next_ns = max(self._next_ns, stamp_ns)
         self._loop.note_hand(self._pipeline.hand_state, self._seconds(stamp_ns))
         if step.prediction is not None:
             self._loop.note_prediction(step.prediction, self._seconds(stamp_ns))

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""`demo`: plays the packaged recording over DDS in real time to the real node, which runs in a process of its own."""
+"""`demo`: plays the packaged recording over DDS in real time to the real node, which runs in a process of its own.
+
+It shows the predictions, and leaves a bag and a report.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,9 @@ import numpy as np
 
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError, print_messages
+from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.prediction import Prediction
 from foc_ros.core.scene import Scene
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io import topics
@@ -27,7 +32,7 @@ from foc_ros.io.outputs import lock_folder, make_folder
 from foc_ros.io.terminal import show_address, show_table, show_text
 from foc_ros.reporting.live_text import show_live
 from foc_ros.reporting.report import ReportCollector, describe_late
-from foc_ros.reporting.views import read_snapshot
+from foc_ros.reporting.views import HandTrajectory, read_snapshot
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.isolated_node import NodeDiedError, NodeProcess, isolated_graph
 from foc_ros.ros.messages.decode_poses import decode_stamp
@@ -37,11 +42,15 @@ RECORDING = Path(__file__).resolve().parents[1] / 'recordings' / 'reaching.mcap'
 MARK = '.foc_ros_demo'
 """File that marks the output directory of a demo: the next demo may replace its bag and report."""
 RECEIVED = {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()} | {'/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray'}
+"""Types of the outputs of the node."""
 PAIR, DIAGNOSTICS = ('prediction', 'likelihoods'), 'diagnostics'
 
 
 class Recorder(ReportCollector):
-    """Keeps the hand samples that a demo sends, the predictions that it receives, their delays [s], and the diagnostics."""
+    """Keeps the hand samples that a demo sends and the predictions that it receives.
+
+    Attributes: delays [s], from a hand sample to its prediction; health, the values of the node's diagnostics by name.
+    """
 
     def __init__(self, config: Config) -> None:
         super().__init__()
@@ -125,6 +134,7 @@ def _play_and_report(items: list[Item], output: Path) -> int:
     counters = {'counters of the node': ', '.join(counts)}
     page = recorder.write(output / 'report', 'Reaching among obstacles, live', {**facts, **counters})
     show_table(('', str(output)), [('predictions', str(len(recorder.snapshots))), *facts.items()])
+    show_text(describe_lead(recorder.hand, recorder.snapshots))
     print(f'written to {output}: bag (inputs and outputs, MCAP) and the report')
     show_address(page)
     if words := describe_late(recorder.snapshots):
@@ -134,7 +144,10 @@ def _play_and_report(items: list[Item], output: Path) -> int:
 
 @contextmanager
 def prepare(output: Path) -> Iterator[None]:
-    """Make the output directory and remove bag and report of an earlier demo; no other demo has it within the context."""
+    """Make the output directory and remove bag and report of an earlier demo; no other demo has it within the context.
+
+    Raises InputError for a directory with other contents, and for that of a demo that runs.
+    """
     if output.exists() and not (output / MARK).exists() and (not output.is_dir() or any(output.iterdir())):
         raise InputError('--output', 'a new or empty directory, or one of an earlier demo', f'{output}, which has other contents')
     with make_folder('--output', output):
@@ -169,7 +182,7 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: thread
             node.check()
             now = time.monotonic()
             if recorder.snapshots:
-                show(now, recorder.snapshots[-1], recorder.describe(items))
+                show(now, recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
             return not stopped.is_set()
 
         with Player(items, RECEIVED, receive, tick, domain) as player:
@@ -192,6 +205,27 @@ def _catch_interrupts() -> Iterator[threading.Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def describe_lead(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> str:
+    """Return how long before the end of the movements the goals that were reached had become the most likely ones."""
+    leads = []
+    for start_ns, end_ns in hand.find_movements():
+        inside = [each for each in snapshots if start_ns <= each.stamp_ns <= end_ns and each.most_likely is not None]
+        if not inside:
+            continue
+        goal, distance = find_goal_at_end(hand.positions[hand.between(start_ns, end_ns)], inside[-1].goal_positions)
+        if distance <= AT_GOAL_M:
+            others = [each.stamp_ns for each in inside if each.candidates[0].candidate.goal != goal]
+            first = next((each.stamp_ns for each in inside if not others or each.stamp_ns > others[-1]), end_ns)
+            leads.append(((end_ns - first) / NANOSECONDS, (end_ns - start_ns) / NANOSECONDS))
+    if not leads:
+        return f'{len(snapshots)} predictions were made; no movement ended at a goal.'
+    median, duration_s = np.median(leads, axis=0).tolist()
+    return (
+        f'{len(snapshots)} predictions were made. The hand moved to a goal {len(leads)} times, for {duration_s:.1f} s; this goal '
+        f'was the most likely one from {median:.1f} s before the arrival on (medians).'
+    )
 
 
 def _measure_duration_s(items: Sequence[Item]) -> float:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Predictions as they come, on a terminal: a table of the candidates."""
+"""Predictions as they come, on a terminal: the scene as lines of text, and a table of candidates."""
 
 from __future__ import annotations
 
@@ -11,35 +11,51 @@ from string import ascii_uppercase
 import numpy as np
 from rich.bar import Bar
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.prediction import Prediction
-from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
+from foc_ros.core.types import Array
+from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve
 
+from .draw import Bounds, compute_bounds
+
+WIDTH, HEIGHT = 72, 13
+"""Size of the drawing [characters]; with the table it fits into 24 lines."""
+OBSTACLE, GOAL, HAND = '▒', '*', '@'
+LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   A B C candidates, most likely first'
 ROWS = 4
 """Rows of the table: the default number of candidates, so that its height stays the same."""
-Show = Callable[[float, Prediction, str], None]
-"""Function that shows a snapshot at a time [s], with a heading; it may be called often."""
+Show = Callable[[float, Prediction, str, Array], None]
+"""Function that shows a snapshot at a time [s], with a heading and the position of the hand (2,) [m]; it may be called often."""
 
 
 @contextmanager
 def show_live(console: Console | None = None) -> Iterator[Show]:
-    """Yield a function that shows snapshots: as a live table on a terminal, else as a line each second."""
+    """Yield a function that shows snapshots: as a live scene and table on a terminal, else as a line each second."""
     console = console or Console()
     waiting = 'Waiting for the first prediction of the node ...'
     live = Live(waiting, console=console, auto_refresh=False) if console.is_terminal else None
     next_update = -np.inf
+    bounds: Bounds | None = None
 
-    def show(now: float, snapshot: Prediction, heading: str) -> None:
-        nonlocal next_update
+    def show(now: float, snapshot: Prediction, heading: str, hand: Array) -> None:
+        nonlocal next_update, bounds
         if now < next_update:
             return
         next_update = now + (1.0 if live is None else 0.125)
         if live is not None:
-            live.update(_make_table(snapshot, heading), refresh=True)
+            left, right, bottom, top = compute_bounds(snapshot.obstacles, snapshot.goal_positions, (), hand[None])
+            if bounds is not None:  # with those before, the drawing rarely moves
+                left, right = min(left, bounds[0]), max(right, bounds[1])
+                bottom, top = min(bottom, bounds[2]), max(top, bounds[3])
+            bounds = left, right, bottom, top
+            drawing = Text(draw_scene(snapshot, hand, bounds))
+            live.update(Group(drawing, Text(LEGEND), _make_table(snapshot, heading)), refresh=True)
             return
         goals, shown = len(snapshot.goal_positions), snapshot.candidates_with_likelihood
         listed = [f'{100 * each.likelihood:.0f} % {describe_candidate(each, goals)}' for each in shown[:2]]
@@ -64,3 +80,27 @@ def _make_table(snapshot: Prediction, title: str) -> Table:
     for row in range(len(shown), ROWS):
         table.add_row('' if row else 'no solved candidate')
     return table
+
+
+def draw_scene(snapshot: Prediction, hand: Array, bounds: Bounds) -> str:
+    """Return the drawing; hand (2,) [m]; bounds: left, right, bottom and top [m]."""
+    left, right, bottom, top = bounds
+    x, y = np.linspace(left, right, WIDTH), np.linspace(top, bottom, HEIGHT)
+    cells = np.full((HEIGHT, WIDTH), ' ')
+    if len(snapshot.obstacles):
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        is_inside = (measure_offsets(points, snapshot.obstacles)[1] <= snapshot.obstacles.radius).any(axis=1)
+        cells[is_inside.reshape(cells.shape)] = OBSTACLE
+    drawn: list[tuple[Array, str]] = [(hand[None], HAND), (snapshot.goal_positions, GOAL)]
+    obstacles = snapshot.obstacles
+    drawn += [(obstacles.centre[[row]], name) for row, name in enumerate(obstacles.ids) if len(name) == 1]
+    for letter, each in zip(ascii_uppercase[:9], snapshot.candidates_with_likelihood, strict=False):
+        curve = find_drawn_curve(each)
+        rows = np.linspace(0.0, len(curve) - 1.0, 4 * WIDTH)  # so many points that a line has no gaps
+        drawn.append((np.column_stack([np.interp(rows, np.arange(len(curve)), axis) for axis in curve.T]), letter))
+    for points, mark in reversed(drawn):
+        column = np.rint((points[:, 0] - left) / (right - left) * (WIDTH - 1)).astype(int)
+        row = np.rint((top - points[:, 1]) / (top - bottom) * (HEIGHT - 1)).astype(int)
+        is_visible = (column >= 0) & (column < WIDTH) & (row >= 0) & (row < HEIGHT)
+        cells[row[is_visible], column[is_visible]] = mark
+    return '\n'.join(''.join(line).rstrip() for line in cells)

@@ -165,13 +165,21 @@ def write_fit(
     recordings: Mapping[str, Recording] | None = None,
     config: Config | None = None,
 ) -> None:
-    """Write the page; answer: as of `fit --json`, of recordings, with the fitted configuration; InputError where it cannot."""
+    """Write the page; answer: as of `fit --json`, of recordings, with the fitted configuration.
+
+    Raises InputError where that cannot be done.
+    """
     count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
     fitted = f'{len(answer["parameters"])} parameters were fitted to {count} recordings.'
+    caption = 'Fitted values as multiples of the given ones, with 95 % intervals by bootstrap over recordings; '
+    caption += 'the line is the given value.'
+    drawn = {name: each for name, each in answer['parameters'].items() if each['given'] > 0.0 and each['value'] > 0.0}
+    pictures = [make_chart((6.4, 0.9 + 0.34 * len(drawn)), caption, _draw_multiples, drawn)] if drawn else []
     sections = [
         Section('In short', [fitted, *fitting.make_verdict(answer)]),
         *draw_example(recordings, config),
+        Section(pictures=pictures),
         *explain_tables(fitting.make_tables(answer), FIT_WORDS),
         Section('Run the node with these parameters', rows=commands),
     ]
@@ -179,10 +187,29 @@ def write_fit(
     write_page(directory, FIT_PAGE, f'Fit: {title}', sections, warnings, config)
 
 
+def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
+    colour, _ = get_class_style(0)
+    for row, each in enumerate(drawn.values()):
+        ends = [end / each['given'] for end in each['interval'] if end > 0.0]
+        axes.plot(ends, [row] * len(ends), color=colour, linewidth=3.0, alpha=0.5, solid_capstyle='butt')
+        axes.plot(each['value'] / each['given'], row, marker='o', color=colour)
+    axes.axvline(1.0, color='0.4', linewidth=1.0)
+    axes.set_yticks(range(len(drawn)), list(drawn))
+    axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
+    for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+        set_format('{x:g}')
+    axes.tick_params(axis='x', which='minor', labelsize=7, rotation=90)
+
+
 def write_simulation(
     directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[study.PairResult], config: Config | None = None
 ) -> None:
     """Write the page; cells: of `simulate --json`. Raises InputError where that cannot be done."""
+    words = 'mean over the paired trials, with its bootstrap interval of 95 %.'
+    measures = [
+        make_chart((6.4, 4.2), f'{study.COLUMNS[name][0]}: {words}', _draw_measure, cells, name)
+        for name in ('collision_rate', 'completion_s', 'opposing_impulse')
+    ]
     words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
     trials = [
         make_chart((6.4, 4.2), f'Operator {each.operator}. {words}', _draw_trial, each.task, each.trials)
@@ -190,7 +217,7 @@ def write_simulation(
         if each.task
     ]
     sections = [
-        Section('In short', summarise_simulation(cells)),
+        Section('In short', summarise_simulation(cells), measures),
         *explain_tables(study.make_tables(cells), SIMULATION_WORDS),
         Section('Single trials', pictures=trials),
     ]
@@ -211,6 +238,22 @@ def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
                 told.append(f'{" and ".join(known)} {words}')
         sentences.append(f'{operator.replace("_", " ").capitalize()}: {"; ".join(told)}.')
     return sentences
+
+
+def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
+    """Draw the mean of a measure with its interval for every operator and rule."""
+    operators, rules = (list(dict.fromkeys(cell[key] for cell in cells)) for key in ('operator', 'assistance'))
+    heading, factor, _ = study.COLUMNS[name]
+    for number, rule in enumerate(rules):
+        drawn = [cell for cell in cells if cell['assistance'] == rule and cell[name] is not None]
+        at = [operators.index(cell['operator']) + 0.14 * (number - (len(rules) - 1) / 2) for cell in drawn]
+        means = factor * np.array([cell[name] for cell in drawn])
+        bounds = factor * np.array([cell[f'{name}_interval'] for cell in drawn]).reshape(-1, 2)
+        errors = np.maximum(np.abs(bounds.T - means), 0.0)
+        axes.errorbar(at, means, errors, fmt='o', markersize=4, capsize=2, color=get_class_style(number)[0], label=rule)
+    axes.set_xticks(range(len(operators)), [name.replace('_', '\n') for name in operators])
+    axes.set(ylabel=heading, xlim=(-0.5, len(operators) - 0.5))
+    axes.set_ylim(bottom=0.0)
 
 
 def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> None:

@@ -130,6 +130,11 @@ class GuidanceLoop:
             self._thread = None
         self._state, self._zeros = GuidanceState(), ZEROS
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing is published until a hand is guided again."""
+        return self._zeros > ZEROS
+
     def describe(self) -> dict[str, str]:
         """Return the values for the diagnostics."""
         output, settings = self.output, self.newest.config.guidance
@@ -160,7 +165,7 @@ class GuidanceLoop:
         self.output, self._state = guide(newest.config, self._state, given)
         has_ended = self.output.status is not GuidanceStatus.GUIDING and not self.output.force.any() and not self.output.authority
         self._zeros = self._zeros + 1 if has_ended else 0
-        if self._zeros <= ZEROS:
+        if not self.is_idle:
             self.sample_header = newest.sample_header or self.sample_header
             if self.sample_header is not None:
                 self._publish(self.output, self.sample_header)
