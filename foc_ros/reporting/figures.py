@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from textwrap import fill
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -25,8 +26,8 @@ SIZE_PT, COLUMNS = 8.0, 70
 """Size of the text, where there is room for it [pt], and characters in a line of a candidate."""
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
-LABELS_IN = 0.5
-"""Height of the labels below axes [in]."""
+_PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
+"""Subplot and place of axes before a legend took a part of it."""
 
 
 def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array | None = None, is_alone: bool = False) -> None:
@@ -100,12 +101,11 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     is_added: whether the figure becomes higher by it; otherwise the text is as small as the place needs.
     """
     from matplotlib.lines import Line2D
-    from mpl_toolkits.axes_grid1 import make_axes_locatable
 
     figure, name = axes.figure, f'legend {id(axes)}'
     for earlier in [each for each in figure.axes if each.get_gid() == name]:
         earlier.remove()
-    place = axes.get_position(original=True)
+    slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
     width_in = figure.get_figwidth() * place.width
     columns, sign_columns = (40, 1) if width_in < 3.5 else (COLUMNS, 2)
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
@@ -118,15 +118,30 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     size_pt = min(SIZE_PT, 72.0 * width_in / (0.62 * (columns + 5)))
     wanted_in = lines * LINE * size_pt / 72.0 + 0.05
     if is_added:
-        figure.set_figheight(figure.get_figheight() + wanted_in + LABELS_IN)
+        figure.set_figheight(figure.get_figheight() + wanted_in)
     height_in = figure.get_figheight() * place.height
     wanted_in = min(wanted_in, 0.5 * height_in)
     size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (LINE * max(lines, 1)))
-    below = make_axes_locatable(axes).append_axes('bottom', size=wanted_in, pad=LABELS_IN)
+    below = _take_place(axes, slot, place, height_in, wanted_in)
     below.set(gid=name)
     below.axis('off')
     look = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
     font, handles = {'family': 'monospace', 'size': size_pt}, [named[label] for label in candidates]
-    below.add_artist(below.legend(handles, texts, title=title, loc='upper center', prop=font, **look))
+    below.add_artist(below.legend(handles, texts, title=title, loc='upper left', prop=font, **look))
     handles, font = [named[label] for label in signs], {'size': size_pt}
-    below.legend(handles, signs, loc='lower center', ncols=sign_columns, columnspacing=2.0, prop=font, **look)
+    below.legend(handles, signs, loc='lower left', ncols=sign_columns, columnspacing=2.0, prop=font, **look)
+
+
+def _take_place(axes: Any, slot: Any, place: Any, height_in: float, wanted_in: float) -> Any:
+    """Return new axes of a height [in] below axes, which become so much smaller."""
+    figure = axes.figure
+    gap_in = 0.0 if figure.get_layout_engine() else 0.5  # of the labels below axes
+    parts = [max(height_in - wanted_in - gap_in, 0.2 * height_in), gap_in, wanted_in]
+    if slot is None:
+        bottom = place.y0 + place.height * (gap_in + wanted_in) / sum(parts)
+        axes.set_position((place.x0, bottom, place.width, place.y1 - bottom))
+        return figure.add_axes((place.x0, place.y0, place.width, place.height * wanted_in / sum(parts)))
+    parts = [each for each in parts if each]
+    rows = slot.subgridspec(len(parts), 1, height_ratios=parts, hspace=0.0)
+    axes.set_subplotspec(rows[0])
+    return figure.add_subplot(rows[-1])
