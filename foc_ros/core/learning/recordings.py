@@ -258,7 +258,7 @@ def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand
     share = (at - before)[..., None]
     paths = (1.0 - share) * library.states[row, before, :2] + share * library.states[row, before + 1, :2]
     paths += (hand.mean[:2] - library.states[evidence.row, evidence.state, :2])[:, None]
-    left_s = np.minimum(STEP_S * (ends - evidence.state), until_s)
+    left_s = np.minimum(np.minimum(STEP_S * (ends - evidence.state), until_s), times[-1])
     return paths, evidence.weight[:, None] * np.clip((left_s[:, None] - times) / FADE_S, 0.0, 1.0)
 
 
