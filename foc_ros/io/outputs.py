@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -73,12 +73,7 @@ def write_whole(file: Path) -> Iterator[Path]:
 
 @contextmanager
 def lock_folder(folder: Path, *, waits: bool = True) -> Iterator[None]:
-    """Let one process at a time continue for a folder, where its system can; unless it `waits`, raise BlockingIOError."""
-    if sys.platform == 'win32':
-        yield
-        return
-    import fcntl
-
+    """Let one process at a time continue for a folder, where its file system can; unless it `waits`, raise BlockingIOError."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         try:

@@ -130,12 +130,14 @@ def make_obstacle_patch(obstacles: Obstacles, row: int, growth: float, **look: A
     return Polygon(trace_obstacle(obstacles, row, growth), **look)
 
 
-def compute_bounds(obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array) -> Bounds:
-    """Return limits of x and y [m] around obstacles, goals, paths and further points (m, 2); ellipses do not widen them."""
+def compute_bounds(
+    obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array, margin: float = 0.04
+) -> Bounds:
+    """Return limits of x and y [m] around obstacles, goals, paths and further points (m, 2), with a share of them as margin."""
     shapes = find_limits(obstacles, obstacles.radius_stddev)
     enclosed = np.concatenate([*shapes, *map(find_drawn_curve, candidates), np.reshape(goals, (-1, 2)), *points])
     low, high = (enclosed.min(axis=0), enclosed.max(axis=0)) if len(enclosed) else (np.zeros(2), np.ones(2))
-    added = 0.04 * max(*(high - low), 0.05)
+    added = margin * max(*(high - low), 0.05)
     return float(low[0] - added), float(high[0] + added), float(low[1] - added), float(high[1] + added)
 
 

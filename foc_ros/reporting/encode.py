@@ -178,7 +178,7 @@ def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Predictio
         points += [each.goal_positions, *find_limits(each.obstacles, each.obstacles.radius_stddev)]
     paths = [find_drawn_curve(candidate) for each in snapshots for candidate in each]
     points += [np.percentile(np.concatenate(paths), (0.5, 99.5), axis=0)] if paths else []
-    return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points)
+    return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
 
 
 def round_number(value: float) -> float | None:
