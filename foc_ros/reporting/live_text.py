@@ -27,7 +27,7 @@ from .draw import Bounds, compute_bounds
 WIDTH, HEIGHT = 72, 13
 """Size of the drawing [characters]; with the table it fits into 24 lines."""
 OBSTACLE, GOAL, HAND = '▒', '*', '@'
-LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   A B C candidates, most likely first'
+LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   A B C candidates, the leading one first'
 ROWS = 4
 """Rows of the table: the default number of candidates, so that its height stays the same."""
 Show = Callable[[float, Prediction, str, Array], None]
@@ -69,7 +69,7 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
 def _make_table(snapshot: Prediction, title: str) -> Table:
     table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
     table.caption = '* not known to keep the wanted eta: compromised, or estimated'
-    for name, width in (('candidate', 54), ('', 4), ('likely', 6), ('cost', 6), ('eta', 5)):
+    for name, width in (('candidate', 53), ('', 4), ('likely', 6), ('cost', 6), ('eta', 5)):
         table.add_column(name, width=width, no_wrap=True, justify='right' if width < 10 else 'left')
     shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
     for letter, each, ratio in zip(ascii_uppercase[:ROWS], shown, compute_cost_ratios(shown), strict=False):

@@ -45,6 +45,8 @@ EVALUATION_WORDS = {
     'Brier': 'the mean squared error of the probabilities. 0 is best.',
     'correct': 'how often the likeliest answer is the true one.',
     'leads from': 'the part of the movement from which on the true answer stays the likeliest one. Less is better.',
+    'leads for': 'how long before the arrival, or the decision, the true answer led for good. More is better.',
+    'second half': 'of the way, when the hand has come nearer to the decision.',
     'average': 'the distance of the predicted from the true position, over all times until then.',
     'final': 'this distance at that time alone.',
     'Negative log-density': 'how improbable the true position was. Less is better: both a wrong place and a wrong width count.',

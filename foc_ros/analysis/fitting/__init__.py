@@ -4,7 +4,8 @@
 
 What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings and the
 cross-validation are exact. A parameter that the recordings do not determine keeps its given value: where its profile, the best
-log-likelihood over all other parameters, is flat, hardly better than at the given value, or best at the end of what was tried.
+log-likelihood over all other parameters, is flat, hardly better than at the given value, or best at the end of what was tried,
+unless that is a bound of the parameter.
 """
 
 from __future__ import annotations

@@ -33,7 +33,8 @@ hand, all is the model. Recordings of the running program change likelihoods of 
 
 **Pooled paths.**
 The recordings e that pass the next row as a candidate does, displaced so that they begin at the hand, are at a time t from now at
-x_e with weights w_e, which fade out over the FADE_S before a recording ends or parts from the class. With P the covariance of the
+x_e with weights w_e, which fade out over the FADE_S before a recording ends or parts from the class, and before the plan ends, so
+that every path leads to its goal. With P the covariance of the
 position of the hand, b = `VELOCITY_STDDEV`, by which their velocities differ from that of the hand, and the covariance S of the
 plan, which tells as much of their spread as n_0 recordings,
 
@@ -78,7 +79,7 @@ paths than plans do."""
 LEAST_WEIGHT = 1e-3
 """Weight of a recording below which it is not near."""
 FADE_S = 0.25
-"""Time over which the weight of a recording falls to zero before its end [s]."""
+"""Time over which the weight of a recording falls to zero [s]."""
 SEEN_AFTER_S = 0.1
 """Time from the beginning of a movement to its onset [s]: the onset is seen when the hand already moves."""
 ROUNDING_M = 1e-5
@@ -250,7 +251,7 @@ def compare_with_class(
 def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand: HandState, times: Array) -> tuple[Array, Array]:
     """Return where recordings lead the hand at times (m,) [s] from now, (e, m, 2) [m], and their weights (e, m).
 
-    They have a weight up to until_s (e,) [s]. Paths are linear between states, and stay at the last one.
+    They have a weight up to until_s (e,) [s], and before the last time. Paths are linear between states, and stay at the last one.
     """
     row, ends = evidence.row[:, None], library.ends[evidence.row]
     at = np.minimum(evidence.state[:, None] + times / STEP_S, ends[:, None])

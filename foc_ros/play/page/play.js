@@ -13,7 +13,7 @@ const EVENT_MS = 6;
 const FRAME_MS = 12;
 const METRES_PER_NEWTON = 0.02;
 const HAND_RADIUS = 0.006;
-const [START_COLOUR, FORCE_COLOUR, TOUCHED_COLOUR] = ['#009E73', '#009E73', '#D55E00'];
+const [START_COLOUR, TOUCHED_COLOUR] = ['#009E73', '#D55E00'];
 const TASK_WORDS = {
   none: '', return: 'Go to the green start and rest there.', wait: 'Rest at the start until a goal is lit.', reach: 'Reach the lit goal, and stay there.',
   over: '',
@@ -89,7 +89,7 @@ function draw(now) {
   if (!view.hidden) scene.candidates(view.candidates);
   const { position, target, force } = hand;
   if (!view.hidden) { // the distance between pointer and hand tells whether there is guidance
-    if (Math.hypot(...force) > 0.01) scene.line([position, position.map((value, axis) => value + METRES_PER_NEWTON * force[axis])], FORCE_COLOUR, 4);
+    if (Math.hypot(...force) > 0.01) scene.line([position, position.map((value, axis) => value + METRES_PER_NEWTON * force[axis])], ink('--ink'), 4);
     scene.line([target, position], ink('--soft'), 1);
     scene.disc(target, 0.6 * HAND_RADIUS, ink('--soft'), { width: 1 });
   }
@@ -203,7 +203,7 @@ function nameRecordButton() {
 function showJob() {
   if (!job) return;
   const seconds = Math.floor((performance.now() - job.begunMs) / 1000);
-  const text = `${job.name}: ${job.text}, for ${seconds} s${job.name === 'report' ? '' : ' of some minutes'}; you can go on playing`;
+  const text = `${job.name}: ${job.text}, for ${seconds} s${job.name === 'report' ? '' : ' so far, it takes some minutes'}; you can go on playing`;
   if (byId('job').textContent !== text) byId('job').textContent = text;
   const [, done, whole] = job.text.match(/(\d+) of (\d+)/) || [];
   if (whole) [byId('progress').max, byId('progress').value] = [Number(whole), Number(done)];
