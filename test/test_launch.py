@@ -13,7 +13,7 @@ import xml.etree.ElementTree as ET
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
-from types import ModuleType
+from unittest.mock import MagicMock
 
 import pytest
 import yaml
@@ -46,72 +46,52 @@ STARTER = (
 """What `ros2 launch` does."""
 
 
-class Recorded:
-    """In place of a class of launch: keeps what it was made with."""
-
-    def __init__(self, *given, **named):
-        self.given, self.named = given, named
-
-
-class Substitute(ModuleType):
-    """In place of a module of launch: every class of it is recorded."""
-
-    def __getattr__(self, name):
-        if name.startswith('__'):
-            raise AttributeError(name)
-        return type(name, (Recorded,), {})
-
-
 MODULES = [f'launch{part}' for part in ('', '.actions', '.launch_description_sources', '.substitutions')]
 MODULES += [f'launch_ros{part}' for part in ('', '.actions', '.parameter_descriptions')]
 
 
 @pytest.fixture
-def described(monkeypatch):
-    """Return a function that runs a launch file with substitutes for launch, and returns its names and its description."""
-    for name in MODULES:
-        monkeypatch.setitem(sys.modules, name, Substitute(name))
+def describe(monkeypatch):
+    """Return a function that runs a launch file, and returns its names; the calls of substitutes for launch are recorded."""
 
     def run(name):
+        for module in MODULES:
+            monkeypatch.setitem(sys.modules, module, MagicMock())
         names = runpy.run_path(str(ROOT / 'launch' / f'{name}.launch.py'))
-        return names, names['generate_launch_description']().given[0]
+        names['generate_launch_description']()
+        return names, sys.modules['launch.actions']
 
     return run
 
 
-def arguments(actions):
-    return {each.given[0]: each.named['default_value'] for each in actions if type(each).__name__ == 'DeclareLaunchArgument'}
+def list_arguments(actions):
+    return {each.args[0]: each.kwargs['default_value'] for each in actions.DeclareLaunchArgument.call_args_list}
 
 
-def test_every_input_and_only_known_parameters_are_arguments(described):
-    names, actions = described('foc')
-    declared = arguments(actions)
+def test_every_input_and_only_known_parameters_are_arguments(describe):
+    names, actions = describe('foc')
+    declared = list_arguments(actions)
     assert set(TYPES) <= set(declared)
     assert set(names['PARAMETERS']) <= {'autostart', *(each.name for each in list_parameters())}
-    context = type('Context', (), {'launch_configurations': declared | {'plane': 'xz', 'autostart': 'false'}})
-    (node,) = names['create_node'](context)
-    assert (node.named['package'], node.named['executable']) == ('foc_ros', 'foc_node')
-    (overrides,) = node.named['parameters']
-    found = {name: (each.given[0], each.named['value_type']) for name, each in overrides.items()}
-    assert found == {'plane': ('xz', str), 'autostart': ('false', bool)}
+    names['create_node'](MagicMock(launch_configurations=declared | {'plane': 'xz', 'autostart': 'false'}))
+    node = sys.modules['launch_ros.actions'].Node.call_args.kwargs
+    assert (node['package'], node['executable'], [*node['parameters'][-1]]) == ('foc_ros', 'foc_node', ['plane', 'autostart'])
+    values = sys.modules['launch_ros.parameter_descriptions'].ParameterValue.call_args_list
+    assert [(each.args[0], each.kwargs['value_type']) for each in values] == [('xz', str), ('false', bool)]
 
 
 @pytest.mark.parametrize('name', ['two_arms', 'foc_rviz'])
-def test_included_files_are_given_arguments_that_they_have(described, name):
-    known = arguments(described('foc')[1])
-    _, actions = described(name)
-    included = [each for each in actions if type(each).__name__ == 'IncludeLaunchDescription']
-    assert included
-    for each in included:
-        assert Path(each.given[0].given[0]) == ROOT / 'launch' / 'foc.launch.py'
-        assert {argument for argument, _ in each.named.get('launch_arguments', [])} <= set(known)
-
-
-def test_rviz_is_remapped_to_every_topic_of_its_configuration(described):
-    _, actions = described('foc_rviz')
-    remapped = {source for source, _ in actions[-1].named['remappings']}
-    lines = (ROOT / 'config' / 'foc.rviz').read_text('utf-8').splitlines()
-    assert {line.partition('Value: ')[2] for line in lines if 'Value: /' in line} == remapped
+def test_included_files_are_given_arguments_that_they_have_and_rviz_every_topic_of_its_configuration(describe, name):
+    known = list_arguments(describe('foc')[1])
+    _, actions = describe(name)
+    sources = sys.modules['launch.launch_description_sources'].PythonLaunchDescriptionSource.call_args_list
+    assert {Path(each.args[0]) for each in sources} == {ROOT / 'launch' / 'foc.launch.py'}
+    for each in actions.IncludeLaunchDescription.call_args_list:
+        assert {argument for argument, _ in each.kwargs.get('launch_arguments', [])} <= set(known)
+    if name == 'foc_rviz':
+        remapped = {source for source, _ in sys.modules['launch_ros.actions'].Node.call_args.kwargs['remappings']}
+        lines = (ROOT / 'config' / 'foc.rviz').read_text('utf-8').splitlines()
+        assert {line.partition('Value: ')[2] for line in lines if 'Value: /' in line} == remapped
 
 
 @pytest.fixture
