@@ -253,15 +253,12 @@ def reaching(hand=(0.0,) * 6):
     return observation(candidates, **NO_OBSTACLES, goals=[(1.0, 0.0), (0.0, 2.0)], hand=hand)
 
 
-def test_straight_minimum_jerk_from_rest_has_the_known_effort_and_path():
+def test_straight_minimum_jerk_has_the_known_effort_and_path_from_rest_and_the_effort_of_its_own_jerk_from_any_state():
     np.testing.assert_allclose(compute_straight_costs(reaching()), [720.0 / 2.0**5, 720.0 * 4.0 / 2.0**5])
     s = np.array([0.5, 1.0])
     expected = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     np.testing.assert_allclose(compute_straight_positions(reaching(), 0, 2.0 * s)[:, 0], expected)
     np.testing.assert_allclose(compute_straight_positions(reaching(), 0, np.array([5.0])), [[1.0, 0.0]])
-
-
-def test_straight_minimum_jerk_from_any_state_has_the_effort_of_its_own_jerk():
     observed = reaching((0.2, -0.1, 0.5, 0.3, -1.0, 2.0))
     t = np.linspace(0.0, 2.0, 4001)
     for goal in (0, 1):

@@ -109,16 +109,13 @@ def test_the_command_prints_equal_cells_whatever_the_workers_and_writes_a_report
     assert page.count('<figure>') == 3 + 1 and 'foc' in page
 
 
-def test_recorded_paths_are_intended_paths(tmp_path, capsys):
-    write_tables(tmp_path, {'a': reach(0.05, (0.3, 0.0))}, [(0.3, 0.0), (0.3, 0.2)], [(0.15, 0.0, 0.02)])
+def test_recorded_paths_are_intended_paths_and_one_that_comes_back_arrives_at_its_end(tmp_path, capsys):
+    """The second one among no obstacles, which have no clearance."""
+    past = write_tables(tmp_path / 'past', {'a': reach(0.05, (0.3, 0.0))}, [(0.3, 0.0), (0.3, 0.2)], [(0.15, 0.0, 0.02)])
     options = ['--operators', 'human_paths', '--assistance', 'none', '--trials', '1', '--workers', '1']
-    (cell,) = run(tmp_path, capsys, *options, '--recordings', str(tmp_path))
+    (cell,) = run(tmp_path, capsys, *options, '--recordings', str(past))
     assert cell['collision_rate'] == 0.0
     assert cell['min_clearance_m'] == pytest.approx(0.03, abs=0.01)
-
-
-def test_a_movement_that_comes_back_arrives_at_its_end(tmp_path, capsys):
-    """Among no obstacles, which have no clearance."""
     t, there = reach(0.05, (0.3, 0.0))
     back = np.concatenate([t, t + t[-1] + t[1]]), np.concatenate([there, there[::-1]])
     write_tables(tmp_path, {'a': back}, [(0.3, 0.0), (0.0, 0.0)])

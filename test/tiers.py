@@ -60,7 +60,6 @@ PROCESS = (
     'test_play_server.py::test_the_command_*',
     'test_play_server.py::test_without_*',
     'test_repository.py::test_every_source_*',
-    'test_documentation.py::test_a_line_*',
     'test_simulation.py::test_the_command_*',
     'test_examples.py::test_output_*',
     'test_examples.py::test_the_[ec]*',
