@@ -223,7 +223,7 @@ def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_record
 
 
 def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(tmp_path, monkeypatch):
-    recordings = find_recordings(write_fit_tables(tmp_path / 'data', count=2, hz=30.0))
+    recordings = find_recordings(write_fit_tables(tmp_path / 'data', count=2))
     names = list(recordings)
     hopeless = replace_values(SEARCH_CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': math.inf})
     replays = Replays(recordings, {})
@@ -235,7 +235,7 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
 
 def test_settings_are_compared_by_what_the_predictor_answers_with_them(tmp_path, monkeypatch):
     """It learns the pace, for which the spread of durations is the prior, and expects other goals by the scatter of ends."""
-    recording = find_recordings(write_fit_tables(tmp_path / 'data', count=1, hz=30.0))['r0']
+    recording = find_recordings(write_fit_tables(tmp_path / 'data', count=1))['r0']
     given = {'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.02, 'duration.spread': 0.3}
     config = replace_values(SEARCH_CONFIG, {**given, 'covariance.adaptation': 'none'})
     observed = observe(recording, config).observations

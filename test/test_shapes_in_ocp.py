@@ -68,8 +68,10 @@ def count_clear(problem, solution, shape):
     return least
 
 
-@pytest.mark.parametrize('is_certain', [True, False], ids=['certain start', 'uncertain start'])
-@pytest.mark.parametrize(('name', 'strategy'), [*zip(SHAPES, itertools.cycle(['optimal', 'lv']), strict=False)])
+@pytest.mark.parametrize(
+    ('name', 'strategy', 'is_certain'),
+    [*zip(SHAPES, itertools.cycle(['optimal', 'lv']), itertools.cycle([True, True, False, False]), strict=False)],
+)
 def test_noisy_movements_stay_clear_of_the_true_shape_as_often_as_promised(name, strategy, is_certain):
     start = np.diag(np.repeat([0.002, 0.005, 0.02], 2) ** 2)
     options = {} if is_certain else {'initial_covariance': start, 'eta': 0.8}

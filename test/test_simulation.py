@@ -61,13 +61,13 @@ def run(folder, capsys, *options, config=QUICK):
 
 def test_without_a_force_guidance_opposes_nothing(tmp_path, capsys):
     weak = QUICK.with_values({'guidance.f_max': 0.0})
-    alone, guided = run(tmp_path, capsys, '--operators', 'accurate', '--trials', '1', config=weak)
+    alone, guided = run(tmp_path, capsys, '--operators', 'accurate', '--trials', '1', '--workers', '1', config=weak)
     assert alone['opposing_share'] == guided['opposing_share'] == 0.0
     assert alone['completion_s'] == guided['completion_s'] and alone['path_m'] == guided['path_m']
 
 
 def test_the_hand_of_an_operator_is_as_large_as_the_parameters_say(tmp_path, capsys):
-    options = ['--operators', 'accurate', '--assistance', 'none', '--trials', '5']
+    options = ['--operators', 'accurate', '--assistance', 'none', '--trials', '5', '--workers', '1']
     configs = [QUICK.with_values({'scene.hand_radius': radius}) for radius in (0.0, 0.012)]
     (small,), (large,) = (run(tmp_path, capsys, *options, config=each) for each in configs)
     assert large['path_m'] > small['path_m'] + 0.005, 'a larger hand makes larger detours'

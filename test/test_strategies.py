@@ -236,20 +236,20 @@ def test_lambda_beyond_what_numbers_hold_is_said():
 
 def test_what_it_calls_solved_meets_eta_and_lambda_is_a_power_of_the_growth():
     met = 0
-    for seed in range(12):
+    for seed in range(6):
         problem, guess = dense(seed)
         solution = solved(problem, guess, 'algorithm1')
         assert solution.lam == pytest.approx(10.0 ** round(solution.tau / 5e-5), rel=1e-9)
         if solution.status is Status.SOLVED:
             assert solution.eta >= problem.eta
             met += 1
-    assert met >= 8, 'of the other four, two are out of reach of `optimal` too, and two are stepped over'
+    assert met >= 4, 'the others are out of reach of `optimal` too, or stepped over'
 
 
 @EVERY
 @pytest.mark.parametrize('case', reference_cases()[:1])
 def test_effort_does_not_fall_with_eta(case, strategy):
-    etas = np.linspace(0.5, 0.95, 12 if strategy == 'optimal' else 6)
+    etas = np.linspace(0.5, 0.95, 10 if strategy == 'optimal' else 4)
     solutions = [solved(case_problem(case, float(eta)), case_guess(case), strategy) for eta in etas]
     reached = [each.status is Status.SOLVED for each in solutions]
     assert reached == sorted(reached, reverse=True), 'an unreachable eta is below a reachable one'
