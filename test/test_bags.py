@@ -4,6 +4,7 @@
 
 import random
 import re
+import resource
 
 import pytest
 from bag_helpers import messages, write_bag, write_by_rosbags, write_mcap
@@ -68,6 +69,13 @@ def test_a_bag_is_written_as_a_whole_to_a_new_path_or_not_at_all(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         write_bag(tmp_path / 'half', interrupted())
+    limit, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, most))  # writes beyond it fail like those to a full disk
+    try:
+        with pytest.raises(RecordingError, match='cannot be written'):
+            write_bag(tmp_path / 'full', 10 * messages())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
     (tmp_path / 'file').write_text('not a directory')
     with pytest.raises(RecordingError, match=re.escape(str(tmp_path / 'file' / 'bag'))):
         write_bag(tmp_path / 'file' / 'bag')

@@ -273,13 +273,6 @@ def test_a_wide_table_is_divided_and_loses_nothing(capsys):
     assert printed.count('rule 2') == 4
 
 
-def test_names_in_the_first_column_are_whole_beside_long_texts_in_the_last(capsys):
-    name, text = 'estimator.acceleration_time_s', 'not determined: no other value tried is better by more than chance'
-    show_table(('parameter', 'given', 'fitted', '95 %', 'data'), [(name, '0.02', 'kept', '0.000138 to 0.000147', text)])
-    printed = capsys.readouterr().out
-    assert name in printed and all(word in printed for word in text.split())
-
-
 def test_progress_is_printed_at_times_where_there_is_no_terminal(monkeypatch, capsys):
     for quiet_s, lines in ((60.0, []), (0.0, ['replay: 1 of 2', 'replay: 2 of 2'])):
         monkeypatch.setattr(terminal, 'QUIET_S', quiet_s)

@@ -56,18 +56,16 @@ def test_every_number_arrives(tmp_path, capsys):
     assert np.allclose(rows(obstacles), [(0.5, -0.1, 0, 0.03, 0, 0), (0.425, 0.08, 0, 0.025, 0, 1)])
 
 
-def test_optional_columns(tmp_path):
+def test_heights_deviations_ids_and_boxes_are_optional_columns(tmp_path):
     obstacles = 'id,x_m,y_m,radius_m,radius_stddev_m,z_m\n7,0.5,-0.1,0.03,0.002,0.1\n-2,0,0,0,0,0\n'
     assert convert(tmp_path, 'recording,t_s,x_m,y_m,z_m\n1,0,0.1,0.2,0.3\n', obstacles, 'x_m,y_m,z_m\n0.1,0.2,0.4\n') == 0
     items = read(tmp_path, '1')
     assert (items['hand_pose'].pose.position.z, items['goals'].poses[0].position.z) == (0.3, 0.4)
     assert np.allclose(rows(items['obstacles']), [(0.5, -0.1, 0.1, 0.03, 0.002, 7), (0.0, 0.0, 0.0, 0.0, 0.0, -2)])
-
-
-def test_boxes_and_circles_share_a_table(tmp_path):
-    obstacles = 'x_m,y_m,radius_m,size_x_m,size_y_m,yaw_rad\n0.5,-0.1,0,0.2,0.1,0.3\n0.6,0.1,0.02,0,0,0\n'
-    assert convert(tmp_path, obstacles=obstacles) == 0
-    message = read(tmp_path, 'a')['obstacles']
+    boxes = 'x_m,y_m,radius_m,size_x_m,size_y_m,yaw_rad\n0.5,-0.1,0,0.2,0.1,0.3\n0.6,0.1,0.02,0,0,0\n'
+    (tmp_path / 'boxes').mkdir()
+    assert convert(tmp_path / 'boxes', obstacles=boxes) == 0
+    message = read(tmp_path / 'boxes', 'a')['obstacles']
     assert np.allclose(rows(message), [(0.5, -0.1, 0, 0, 0, 0, 0.2, 0.1, 0.3), (0.6, 0.1, 0, 0.02, 0, 1, 0, 0, 0)])
     assert decode_point_cloud(message, 'xy').obstacles.corners.tolist() == [4, 1]
 
@@ -136,18 +134,6 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, capsys, which, text, messag
     error = capsys.readouterr().err
     assert error.startswith('foc_ros convert: ') and message in error and error.count('\n') == 1
     assert not (tmp_path / 'bags').exists()
-
-
-def test_all_errors_of_a_table_are_found_at_once(tmp_path, capsys):
-    recordings = 'recording,t_s,x_m,y_m\na,0,x,y\na,1,0\na,2,0,0\na,1,0,0\n'
-    obstacles = 'x_m,y_m,radius_m,id\n0,0,-1,0\n0,a,1,1\n0,0,1,1\n0,0,1,1\n'
-    for tables, places in (
-        ({'recordings': recordings}, ['row 3', 'row 2, column x_m', 'row 2, column y_m', 'row 5, column t_s']),
-        ({'obstacles': obstacles}, ['row 2, column radius_m', 'row 3, column y_m', 'row 5, column id']),
-    ):
-        assert convert(tmp_path, **tables) == 2
-        lines = capsys.readouterr().err.splitlines()
-        assert [line.partition('.csv: ')[2].partition(':')[0] for line in lines] == places
 
 
 def write_folder(folder, separator=',', comma=False, seconds=1.0, metres=1.0):
