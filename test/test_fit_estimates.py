@@ -118,7 +118,7 @@ def _fit_reaches(durations, distances):
     return fit_duration(hands, PRECISE)
 
 
-def test_one_factor_is_fitted_where_distances_are_alike():
+def test_one_factor_is_fitted_where_distances_are_alike_and_intercept_and_slope_where_they_differ():
     given = PRECISE.duration
     found = _fit_reaches([2.0 * (given.fitts_a_s + given.fitts_b_s * _bits(0.3))] * 5, [0.3] * 5)
     a, b = found.estimates[A], found.estimates[B]
@@ -126,9 +126,6 @@ def test_one_factor_is_fitted_where_distances_are_alike():
     assert a.value / given.fitts_a_s == pytest.approx(2.0, rel=0.2)
     assert a.low <= a.value <= a.high
     assert any('too alike to tell intercept and slope apart' in words for words in found.warnings)
-
-
-def test_distances_that_differ_determine_intercept_and_slope():
     distances = [0.05, 0.1, 0.2, 0.4, 0.8]
     durations = 0.5 + 0.3 * _bits(distances)
     found = _fit_reaches(durations.tolist(), distances)

@@ -152,6 +152,7 @@ def test_two_arms_share_the_obstacles(ros, prefix):
 
 CONFIG = ROOT / 'config'
 TOPICS = {f'/{name}': kind for name, kind in TYPES.items()} | {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()}
+LAYOUT = json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
 SHOWN = {name: name for name in ('MarkerArray', 'PointCloud2', 'Path', 'PoseArray')} | {'Pose': 'PoseStamped'}
 
 
@@ -167,21 +168,9 @@ def test_rviz_shows_every_output_it_can_display():
     assert cloud['Channel Name'] == 'likelihood'
 
 
-def leaves(layout):
-    if isinstance(layout, str):
-        yield layout
-    else:
-        for side in ('first', 'second'):
-            yield from leaves(layout[side])
-
-
-def read_layout():
-    return json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
-
-
 def test_foxglove_shows_topics_of_the_node_in_its_panels_in_the_size_of_a_reach():
-    layout = read_layout()
-    assert set(leaves(layout['layout'])) == set(layout['configById'])
+    layout, placed = LAYOUT, json.dumps(LAYOUT['layout'])
+    assert set(re.findall(r'"(?:first|second)": "([^"]+)"', placed)) == set(layout['configById'])
     scene = layout['configById']['3D!foc']
     assert {'/foc/prediction', '/foc/path', '/foc/markers', '/hand_pose', '/goals'} <= set(scene['topics']) <= set(TOPICS)
     assert scene['topics']['/foc/prediction']['colorField'] == 'likelihood'
@@ -193,11 +182,8 @@ def test_foxglove_shows_topics_of_the_node_in_its_panels_in_the_size_of_a_reach(
     sizes = [topics['/foc/path']['lineWidth'], topics['/hand_pose']['axisScale'], frames['axisScale']]
     sizes += topics['/goals']['arrowScale']
     assert topics['/goals']['type'] == 'arrow' and min(sizes) > 0.0 and max(sizes) <= 0.05 and not frames['showLabel']
-    assert topics['/foc/prediction']['gradient'] == [f'#{mix(UNLIKELY)}40', f'#{mix(LIKELY)}ff'], 'the colours of the markers'
-
-
-def mix(colour):
-    return bytes(round(255 * part) for part in colour).hex()
+    unlikely, likely = (bytes(round(255 * part) for part in colour).hex() for colour in (UNLIKELY, LIKELY))
+    assert topics['/foc/prediction']['gradient'] == [f'#{unlikely}40', f'#{likely}ff'], 'the colours of the markers'
 
 
 def find_values(message, path):
@@ -220,10 +206,10 @@ def test_the_plots_of_foxglove_find_the_likelihoods_of_goals_and_paths():
     expected = {goal.name: [goal.likelihood] for goal in prediction.goals} | {'unknown': [prediction.unknown]}
     expected |= {f'path {rank}': [each.likelihood] for rank, each in enumerate(order_candidates(prediction))}
     assert len(prediction.goals) == 2 and len(expected) >= 7 and prediction.unknown > 0.0
-    table = read_layout()['configById']['DiagnosticStatusPanel!classes']
+    table = LAYOUT['configById']['DiagnosticStatusPanel!classes']
     shown = [each for each in made['likelihoods_by_name'].status if each.name == table['selectedName']]
     assert [(each.hardware_id, each.values[0].key) for each in shown] == [(table['selectedHardwareId'], prediction.most_likely)]
-    plots = [panel for name, panel in read_layout()['configById'].items() if name.startswith('Plot!')]
+    plots = [panel for name, panel in LAYOUT['configById'].items() if name.startswith('Plot!')]
     lines = [line for panel in plots for line in panel['paths']]
     assert {line['label'] for line in lines} == {*(f'goal{i}' for i in range(4)), *(f'path {i}' for i in range(4)), 'unknown'}
     for line in lines:
