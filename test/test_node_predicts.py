@@ -52,14 +52,14 @@ def test_an_overloaded_node_predicts_from_the_newest_pose_and_counts_the_others(
 
 
 def test_a_looping_bag_restarts_the_movement(ros):
-    bench, poses = begin(ros), hand_path(6, rate_hz=10.0)
+    bench, poses = begin(ros), hand_path(7, rate_hz=10.0)
     for turn in range(2):
         bench.move(poses)
         status = bench.health()
         assert status.level == (WARN if turn else OK), status.message
-    assert stamps(bench.wait_for('prediction', 12)) == stamps(poses) * 2
+    assert stamps(bench.wait_for('prediction', 14)) == stamps(poses) * 2
     assert (status.message, figures(status)['count hand_restarted_backward']) == ('hand_restarted_backward 1', '1')
-    bench.move(hand_path(7, rate_hz=10.0)[6:])
+    bench.move(hand_path(8, rate_hz=10.0)[7:])
     status = bench.health()
     assert status.level == OK, status.message
 
