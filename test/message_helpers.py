@@ -57,8 +57,12 @@ def pose(types: MessageTypes, position: Sequence[float], turned: Mapping[str, fl
     )
 
 
-def pose_stamped(types: MessageTypes, position: Sequence[float], stamp_ns: int = SECOND, frame_id: str = 'world') -> Any:
-    return types.make('geometry_msgs/msg/PoseStamped', header=make_header(types, stamp_ns, frame_id), pose=pose(types, position))
+def pose_stamped(
+    types: MessageTypes, position: Sequence[float], stamp_ns: int = SECOND, frame_id: str = 'world', **turned: float
+) -> Any:
+    """Return a pose; turned: its quaternion by axis."""
+    header, placed = make_header(types, stamp_ns, frame_id), pose(types, position, turned or {'w': 1.0})
+    return types.make('geometry_msgs/msg/PoseStamped', header=header, pose=placed)
 
 
 def pose_array(types: MessageTypes, positions: Iterable[Sequence[float]], frame_id: str = 'world') -> Any:

@@ -10,18 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bag_helpers import CONFIG, messages, ns, write_by_rosbags
-from message_helpers import (
-    BAGS,
-    SECOND,
-    STORE,
-    both_kinds,
-    collision_object,
-    detection,
-    detections,
-    pose,
-    pose_array,
-    pose_stamped,
-)
+from message_helpers import BAGS, SECOND, STORE, both_kinds, collision_object, detection, detections, pose_array, pose_stamped
 from rosbags.rosbag2 import StoragePlugin
 
 from foc_ros.analysis.replay import replay
@@ -178,9 +167,7 @@ def test_the_node_receives_them_or_names_the_package_that_is_missing_for_a_publi
 
 @both_kinds
 def test_a_hand_pose_becomes_a_sample_whatever_its_orientation(types):
-    message = pose_stamped(types, (0.1, 0.2, 0.3), 5 * SECOND + 7, 'base')
-    message.pose.orientation = types.make('geometry_msgs/msg/Quaternion', x=math.nan, y=7.0, z=0.0, w=0.0)
-    sample = decode_hand_sample(message, 'xz')
+    sample = decode_hand_sample(pose_stamped(types, (0.1, 0.2, 0.3), 5 * SECOND + 7, 'base', x=math.nan, y=7.0), 'xz')
     assert (sample.stamp_ns, sample.frame_id) == (5 * SECOND + 7, 'base')
     assert (*sample.position, sample.height) == (0.1, 0.3, 0.2)
     assert not sample.position.flags.writeable
@@ -189,13 +176,10 @@ def test_a_hand_pose_becomes_a_sample_whatever_its_orientation(types):
 @both_kinds
 @pytest.mark.parametrize('turn', [(0, 0, 0, 0), (0, 0, 0, 1e-3), (9, 9, 9, 9), (math.nan, 0, 0, 1), (math.inf, 0, 0, 0)])
 def test_the_position_0_without_an_orientation_means_no_data(types, turn):
-    message = pose_stamped(types, (0.0, 0.0, 0.0))
     for turned in ({'w': 1.0}, *({'y': 0.6 * size, 'w': 0.8 * size} for size in (1.0, -1.0, 0.95))):
-        message.pose = pose(types, (0.0, 0.0, 0.0), turned)
-        assert decode_hand_sample(message, 'xy').height == 0.0
-    message.pose = pose(types, (0.0, 0.0, 0.0), dict(zip('xyzw', turn, strict=True)))
+        assert decode_hand_sample(pose_stamped(types, (0.0, 0.0, 0.0), **turned), 'xy').height == 0.0
     with pytest.raises(LostHandError, match='the tracker has lost the hand'):
-        decode_hand_sample(message, 'xy')
+        decode_hand_sample(pose_stamped(types, (0.0, 0.0, 0.0), **dict(zip('xyzw', turn, strict=True))), 'xy')
 
 
 @both_kinds

@@ -8,17 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evaluation_samples import (
-    FIT_GOALS,
-    TWO_CLASSES,
-    H,
-    bowed_reach,
-    observation,
-    reach,
-    recorded,
-    recorded_hand,
-    write_fit_tables,
-)
+from evaluation_samples import FIT_GOALS, TWO_CLASSES, bowed_reach, observation, reach, recorded, recorded_hand, write_fit_tables
 
 from foc_ros.analysis.evaluation.observations import observe
 from foc_ros.analysis.evaluation.positions import compute_log_densities
@@ -310,10 +300,10 @@ CANDIDATES = replace(TWO_CLASSES, covariance=KNOWN, plans=np.stack([KNOWN, *(KNO
 def _make_recordings(endpoint, spread):
     """Return twelve recordings of eight movements of 1 s each, with scattered ends and durations."""
     draws = np.random.default_rng(3)
-    moved = [
-        np.outer(TO_GOAL, draws.normal(0.0, endpoint, 2)) - draws.normal(0.0, spread) * LATE + draws.normal(0.0, 1e-4, (H, 2))
-        for _ in range(96)
-    ]
+    moved = []
+    for _ in range(96):
+        end, late = np.outer(TO_GOAL, draws.normal(0.0, endpoint, 2)), draws.normal(0.0, spread) * LATE
+        moved.append(end - late + draws.normal(0.0, 1e-4, LATE.shape))
     observed = [observation(CANDIDATES, positions=each) for each in moved]
     return [recorded(*observed[8 * number : 8 * number + 8], name=str(number)) for number in range(12)]
 
