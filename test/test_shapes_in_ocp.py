@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shapes in the optimal control problem: noisy movements, shapes that are the same, a moving frame, and invariances.
 
-At the end, 70 random feasible reaches: whatever is called solved keeps its promise at each obstacle and each step.
+At the end, 40 random feasible reaches: whatever is called solved keeps its promise at each obstacle and each step.
 """
 
 import itertools
@@ -192,14 +192,14 @@ def test_a_mean_that_is_held_off_at_the_steps_alone_and_enters_between_them_is_n
     assert strategy == 'algorithm1' or right.solution.message.startswith('held off at the steps alone')
 
 
-REACHES = 70
+REACHES = 40
 STRATEGIES: dict[str, tuple[Callable[[VariedReach], dict[str, object]], int]] = {
-    'lv': (lambda made: {'strategy': 'lv'}, 22),
-    'hc': (lambda made: {'strategy': 'hc'}, 23),
+    'lv': (lambda made: {'strategy': 'lv'}, 12),
+    'hc': (lambda made: {'strategy': 'hc'}, 12),
     'optimal': (lambda made: {'strategy': 'optimal'}, REACHES),
-    'algorithm1, growth 10': (lambda made: {'strategy': 'algorithm1'}, 54),
-    'algorithm1, growth 1.5': (lambda made: {'strategy': 'algorithm1', 'algorithm1_growth': 1.5}, 54),
-    'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 54),
+    'algorithm1, growth 10': (lambda made: {'strategy': 'algorithm1'}, 29),
+    'algorithm1, growth 1.5': (lambda made: {'strategy': 'algorithm1', 'algorithm1_growth': 1.5}, 29),
+    'fixed': (lambda made: {'strategy': 'fixed', 'tau': made.tau, 'lam': made.lam}, 29),
 }
 """The settings of every strategy, and how many reaches it solves at least: fewer solved would be fewer checked.
 
@@ -239,7 +239,7 @@ def test_a_mean_that_only_just_stays_clear_is_found_out():
     """The check can fail: ways planned without the chance constraint are hit more often than eta allows."""
     made = feasible_reaches(REACHES)[::2]
     naive = [solved(each.problem, each.guess, 'fixed', tau=0.0, lam=0.0) for each in made]
-    assert sum(largest_share_clear(each.problem, way) < each.problem.eta for each, way in zip(made, naive, strict=True)) >= 13
+    assert sum(largest_share_clear(each.problem, way) < each.problem.eta for each, way in zip(made, naive, strict=True)) >= 7
 
 
 def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised():
@@ -258,5 +258,5 @@ def test_with_the_risk_of_a_path_whole_movements_stay_clear_as_often_as_promised
             assert shares['path'] >= made.problem.eta, f'seed {made.seed}'
             checked += 1
         missed += shares.get('step', 1.0) < made.problem.eta
-    assert checked >= 9
+    assert checked >= 5
     assert missed >= 1
