@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
 from node_helpers import CROWD, GOALS, OK, TYPES, WARN, Bench, begin, figures, hand_path, list_labels, stamps
-from process_helpers import Player, ended, parameters, running
+from process_helpers import ScenePlayer, ended, parameters, running
 from std_msgs.msg import Float64
 
 from foc_ros.ros import health
@@ -151,7 +151,7 @@ UNTIMED = 'budget_s:=0.0'
 @pytest.fixture
 def player(ros):
     """Yield the player of a node that knows the scene, and stop the node; its text on standard error is `errors`."""
-    made = Player(ros)
+    made = ScenePlayer(ros)
     with running(ros, *parameters(*LIGHT, *RELIABLE, UNTIMED)) as process:
         made.connect()
         made.publish_scene()

@@ -9,7 +9,7 @@ from pathlib import Path
 import ros_required  # noqa: F401
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from process_helpers import ROOT, Player, ended, predict_once, running
+from process_helpers import ROOT, ScenePlayer, ended, predict_once, running
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from ros_helpers import graph
@@ -131,7 +131,7 @@ def test_a_node_that_is_killed_and_started_again(ros):
     ros.executor.remove_node(first)
     first.destroy_node()
     with running(ros, '--ros-args', '-p', 'rate_hz:=10.0', '-p', 'foc.steps:=20') as process:
-        player = Player(ros)
+        player = ScenePlayer(ros)
         fine = b'\x00', 'predicting'
         heard = lambda: fine in [(each.level, each.message) for each in player.statuses]  # noqa: E731
         player.play_until(heard, 'a second of predictions without a fault')
