@@ -33,9 +33,7 @@ def write_reaches(folder, ends):
     write_tables(folder, {f'r{k}': (share, path) for k, path in enumerate(paths)}, [(0.3, 0.0)], [(0.15, 0.0, 0.015)])
 
 
-def test_learn_names_what_reaches_no_goal_and_writes_a_library_that_a_predictor_uses_in_its_frame_or_without(
-    tmp_path, capsys
-):
+def test_learn_names_what_reaches_no_goal_and_writes_what_a_predictor_uses_in_its_frame_or_without_one(tmp_path, capsys):
     write_reaches(tmp_path, [0.3, 0.1, 0.3])
     file, shares = tmp_path / 'ways.json', []
     assert main(['learn', str(tmp_path), '--output', str(file)]) == 2

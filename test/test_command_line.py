@@ -107,6 +107,7 @@ KINDS = 'hand_pose, obstacles, obstacle_markers, collision_objects, detections, 
 PEOPLE = '--recordings: expected recordings of people for the operator human_paths, got none'
 INPUTS = f'--remap: expected one of the inputs {KINDS}'
 NEW_FILE = 'expected a new file, or an earlier one of this kind'
+NEW_PICTURE = 'expected a new file, or one that foc_ros has made'
 NO_LIBRARY = 'ways: expected a list of at most 500 ways, got NoneType'
 NO_NODE = '/start: expected ros__parameters with parameters below it, got [0, 0]'
 NO_PARAMETERS = 'expected a section for the node /foc, such as /** or /foc, got str'
@@ -117,6 +118,7 @@ WRONG = [
     (['solve', 'scene.yaml', '--plot', 'a.gif'], ['--plot: expected a name that ends in .png, .pdf, .svg, got a.gif']),
     (['solve', 'scene.yaml', '--monte-carlo', '0'], ['--monte-carlo: expected a whole number in [1, 10000000], got 0']),
     (['solve', 'scene.yaml', '--monte-carlo', 'x'], ['--monte-carlo: expected a whole number in [1, 10000000], got x']),
+    (['solve', 'scene.yaml', '--plot', 'mine.png'], [f'--plot: {NEW_PICTURE}, got mine.png, which it has not made']),
     (['solve', 'scene.yaml', '--plot', 'no/a.png'], ['--plot: expected a file in a directory that exists, got no/a.png']),
     (['simulate', '--operators', 'noisi,x'], [f'{NAMES} (did you mean noisy?), got noisi', f'{NAMES}, got x']),
     (['simulate', '--assistance', 'magic'], ['--assistance: expected names of none, foc, got magic']),
@@ -155,7 +157,8 @@ print("foc_ros.core.ocp.solver" in sys.modules)
 
 def test_wrong_inputs_are_answered_before_the_solver_is_imported(tmp_path):
     (tmp_path / 'scene.yaml').write_text(SCENE)
-    (tmp_path / 'bag.mcap').write_bytes(b'x')
+    for name in ('bag.mcap', 'mine.png'):
+        (tmp_path / name).write_bytes(b'x')
     (tmp_path / 'tables').mkdir()
     for name, text in TABLES.items():
         (tmp_path / 'tables' / name).write_text(text)
@@ -271,6 +274,13 @@ def test_a_wide_table_is_divided_and_loses_nothing(capsys):
     assert max(map(len, printed.splitlines())) <= COLUMNS
     assert all(printed.count(text) == 1 for text in ('title', *columns[1:], *(cell for row in rows for cell in row[1:])))
     assert printed.count('rule 2') == 4
+
+
+def test_names_in_the_first_column_are_whole_beside_long_texts_in_the_last(capsys):
+    name, text = 'estimator.acceleration_time_s', 'not determined: no other value tried is better by more than chance'
+    show_table(('parameter', 'given', 'fitted', '95 %', 'data'), [(name, '0.02', 'kept', '0.000138 to 0.000147', text)])
+    printed = capsys.readouterr().out
+    assert name in printed and all(word in printed for word in text.split())
 
 
 def test_progress_is_printed_at_times_where_there_is_no_terminal(monkeypatch, capsys):

@@ -71,6 +71,14 @@ ROOT = Path(__file__).parents[1]
 LIMIT_S = 60.0
 
 
+def test_an_import_is_left_at_once(tmp_path):
+    (tmp_path / 'endless.py').write_text('import signal\nsignal.raise_signal(signal.SIGINT)\nwhile True: pass\n')
+    command = [sys.executable, '-c', 'from foc_ros.__main__ import handle_interrupts\nwith handle_interrupts(): import endless']
+    environment = os.environ | {'PYTHONPATH': f'{tmp_path}{os.pathsep}{ROOT}'}
+    ended = subprocess.run(command, env=environment, capture_output=True, timeout=LIMIT_S, check=False)
+    assert (ended.returncode, ended.stderr) == (130, b'')
+
+
 @pytest.mark.parametrize('turn', [0, 6])
 def test_a_command_is_interrupted_at_any_moment(turn):
     """The moments lie in the imports, in the solve and in the sampling after it."""

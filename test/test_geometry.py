@@ -144,6 +144,11 @@ def test_tables_refuse_by_the_name_of_the_field(case):
         collect_obstacles(replace(table, **{field: np.array(value) for field, value in changed.items()}))
 
 
+def test_tables_refuse_a_name_that_occurs_twice():
+    with pytest.raises(SceneError, match=r"^obstacles\.ids: expected a different name for each obstacle, got \('a', 'a'\)"):
+        collect_obstacles(make_obstacles([[0, 0], [1, 0]], 0.1, ids=('a', 'a')))
+
+
 @given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=12), st.floats(1e-3, 0.1))
 def test_the_limits_are_those_of_the_outline(points, radius):
     obstacles = collect_obstacles([Hull(points, radius), Circle((2.0, 2.0), radius=1.0)])

@@ -28,6 +28,7 @@ from reach_helpers import make_predictor
 from scipy.spatial.transform import Rotation
 
 import foc_ros
+from foc_ros.analysis.replay_output import Summary, facts
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import MessageError
 from foc_ros.core.height import predict_height, reach_along_axis
@@ -322,3 +323,6 @@ def test_json_has_the_height_where_it_is_predicted():
     assert_allclose(encoded['height_velocity'], 1.0)
     assert_allclose(encoded['height_stddev'], np.linspace(0.0, 0.03, MESSAGE_STEPS + 1))
     assert not {name for name in without if name.startswith('height')}
+    summary = Summary()
+    summary.counts.update(samples=3, predictions=2, solved=2, cleared_by_height=5)
+    assert facts(summary.answer({}, 1.0))['obstacles cleared by height'] == '5 over all predictions'

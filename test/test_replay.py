@@ -14,12 +14,16 @@ import pytest
 import yaml
 from bag_helpers import CONFIG, FRAME, TYPES, messages, ns, reach, write_bag, write_mcap, write_parameters
 from message_helpers import marker, marker_array, read_columns, transform
+from prediction_samples import predict_aside
 from rosbags.highlevel import AnyReader
 
 import foc_ros
-from foc_ros.analysis.replay import Replay
+from foc_ros.analysis.replay import GuidanceReplay, Replay, Step
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
+from foc_ros.core.guidance.guide import GuidanceStatus
+from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.types import HandSample
 from foc_ros.io.bags import BagReader
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 
@@ -272,6 +276,20 @@ def test_what_was_refused_is_named(tmp_path, capsys):
     line = capsys.readouterr().err.splitlines()[-1]
     assert f'{count} of {count} messages of obstacles refused' in line
     assert "expected the working frame 'world', got 'camera'; no transform to world: camera and world are not connected" in line
+
+
+def test_guidance_of_a_recording_takes_no_jump_for_work():
+    config = Config().with_values({'guidance.clearance': 0.0})
+    pipeline = Pipeline(config)
+    guidance, outputs = GuidanceReplay(pipeline), []
+    for tick in range(40):
+        sample = HandSample(round(10**9 + 10**7 * tick), np.array([0.0, 0.0 if tick < 20 else 0.4]))
+        pipeline.add_hand_sample(sample)
+        predicted = predict_aside(stamp_ns=sample.stamp_ns) if tick < 20 else None
+        outputs += guidance.add(Step(None, sample, predicted, pipeline.scene))
+    assert max(each.output.force[1] for each in outputs) > 2.0
+    assert min(each.output.tank for each in outputs) > 0.4
+    assert outputs[-1].output.status is GuidanceStatus.NO_PREDICTION
 
 
 def test_guidance_is_the_same_each_time(tmp_path, capsys):

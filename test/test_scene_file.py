@@ -146,6 +146,7 @@ def test_units_that_are_probably_not_meant_are_told(given, message):
         (obstacle(2, id=3), "obstacles: expected a different name for each obstacle, got '3' twice"),
         (obstacle(id='a;b'), r"obstacles\[0\].id: expected a whole number, or a name .*, got 'a;b'"),
         ({**SCENE, 'start': [0.1, 0.02]}, r'start: expected a point outside obstacle cup, of radius 0.03 m, got .*, 0.02 m from'),
+        ({**SCENE, 'goal': [0.2, 0.1], 'start': [0.1, 0.02]}, 'start: expected a point outside obstacle cup'),
         ({**SCENE, 'goal': {'position': [1, 1], 'object': 'mug'}}, r"goals\[0\].object: expected the id .*, got 'mug'"),
         ({**SCENE, 'goal': {'position': [1, 1], 'nam': 'a'}}, r"goal.nam: expected .*\(did you mean name\?\), got 'a'"),
         ({**without('goal'), 'goals': 2 * [{'position': [1, 1], 'name': 'a'}]}, "goals: .* a different name .*, got 'a' twice"),
