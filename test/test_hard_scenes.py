@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bag_helpers import TYPES
+from prediction_samples import outcome as make_outcome
 from reach_helpers import make_predictor
 
 import foc_ros
@@ -149,6 +150,15 @@ def test_goals_that_are_not_followed_are_unknown():
     found = ask(replace_values(SHARE_CONFIG, {'foc.steps': 5}), goals, make_obstacles())
     assert len(found.candidates) == 64
     assert found.unknown == pytest.approx(16.0 / 80.0, abs=0.02) and total(found) == pytest.approx(1.0)
+
+
+def test_the_cost_of_a_class_that_is_not_followed_is_the_largest_that_candidates_lead_to_expect():
+    right, left = make_outcome('goal0:+1', cost=1.0), make_outcome('goal1:-1', bend=-0.1, cost=50.0, safety_factor=1.0)
+    left = replace(left, candidate=replace(left.candidate, goal=1))
+    unfollowed = replace(left.candidate, label='goal0:-1', goal=0, length=1.1 * left.candidate.length)
+    for solved, known_cost in (([right, left], 50.0), ([right], 1.0)):
+        (found,) = candidates.estimate_unfollowed([unfollowed], solved, [1.0, 1.0])
+        assert known_cost < found.cost < 3.0 * known_cost and found.status is Status.ESTIMATED
 
 
 def test_the_shares_of_unknown_classes_and_of_another_goal_are_published_and_read_back():
