@@ -16,6 +16,7 @@ from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth
 from foc_ros.analysis.fitting.one_replay import widen_covariances
 from foc_ros.analysis.recordings import EPOCH_NS, find_recordings
 from foc_ros.core import tracks
+from foc_ros.core.classes.rows import find_rows
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.learning.movements import find_reached_goal
 from foc_ros.core.obstacle_table import make_obstacles
@@ -120,6 +121,13 @@ def test_in_order_a_recording_has_its_own_hand_and_obstacles_only(tmp_path, dura
     assert not failed and [len(each.path.positions) for each in observed] == [len(times_s)] * 2
     before, after = ({name.partition('/')[0] for name in each.observations[0].ids} for each in observed)
     assert before == {'Near', 'Far'} and after == {'Near'}
+
+
+def test_obstacles_that_overlap_along_the_direction_stand_in_one_row():
+    centre = np.array([[3.0, 0.0], [1.0, 1.0], [1.15, -1.0], [2.0, 0.0]])
+    ends = np.zeros(2), np.array([[4.0, 0.0]])
+    assert find_rows(make_obstacles(centre, 0.1), DIRECTION, *ends).tolist() == [2, 0, 0, 1]
+    assert find_rows(make_obstacles(), DIRECTION, *ends).shape == (0,)
 
 
 TRUE_GOALS = np.array([[1.0, 0.0], [0.0, 1.0]])

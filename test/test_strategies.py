@@ -138,6 +138,16 @@ def test_a_warm_start_is_corrected_to_the_goal_from_where_the_hand_really_is(str
     np.testing.assert_allclose(found.path, fresh.path, atol=1e-5)
 
 
+@pytest.mark.parametrize('slower', [0.8, 1.0, 2.0])
+def test_a_movement_at_another_pace_begins_as_the_earlier_one_from_where_the_hand_is(slower):
+    before = solved(one_obstacle(0.86), BOWED, 'optimal')
+    rest = reach(one_obstacle().obstacles, steps=40, duration=0.8 * slower)
+    state = before.mean[10] / slower ** np.repeat([0, 1, 2], 2)
+    start = warm_start(replace(before, multipliers=()), replace(rest, initial_mean=state))
+    np.testing.assert_allclose(start.path, before.path[10:], atol=1e-9)
+    np.testing.assert_allclose(start.control.reshape(2, 40).T, before.control[10:] / slower**3, rtol=1e-9, atol=1e-9)
+
+
 @EVERY
 @pytest.mark.parametrize('steps', [1, 2, 5])
 def test_however_few_the_steps_there_is_an_answer(strategy, steps):
