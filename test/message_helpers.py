@@ -140,12 +140,8 @@ def read_columns(cloud: Any) -> dict[str, np.ndarray]:
     }
 
 
-Primitive = tuple[int, Sequence[float], Sequence[float]]
-"""Kind, dimensions and position of a primitive of a collision object."""
-
-
 def collision_object(
-    *primitives: Primitive,
+    *primitives: tuple[int, Sequence[float], Sequence[float]],
     name: str = 'table',
     place: Sequence[float] = (0, 0, 0),
     turned: dict[str, float] | None = None,
@@ -154,7 +150,7 @@ def collision_object(
     frame_id: str = 'world',
     **changes: Any,
 ) -> Any:
-    """Return a CollisionObject; changes: fields with other values."""
+    """Return a CollisionObject of primitives (kind, dimensions, position); changes: fields with other values."""
     make = BAGS.make
     values = {
         'header': make_header(BAGS, stamp_ns, frame_id),

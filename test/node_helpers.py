@@ -151,16 +151,12 @@ class Bench(Player):
         return str(self.call(GetState, 'get_state').current_state.label)
 
     def set(self, **values: Any) -> Any:
+        """Set parameters, whose names have `__` in place of a dot, together."""
         from rcl_interfaces.srv import SetParametersAtomically
+        from rclpy.parameter import Parameter
 
-        return self.call(SetParametersAtomically, 'set_parameters_atomically', parameters=list_parameters(**values)).result
-
-
-def list_parameters(**values: Any) -> list[Any]:
-    """Return parameters as messages; the names have `__` in place of a dot."""
-    from rclpy.parameter import Parameter
-
-    return [Parameter(name.replace('__', '.'), value=value).to_parameter_msg() for name, value in values.items()]
+        given = [Parameter(name.replace('__', '.'), value=value).to_parameter_msg() for name, value in values.items()]
+        return self.call(SetParametersAtomically, 'set_parameters_atomically', parameters=given).result
 
 
 def begin(ros: Graph, poses: int = 0, **options: Any) -> Bench:

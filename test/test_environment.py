@@ -51,7 +51,8 @@ def test_of_processes_that_write_at_once_two_learn_into_one_library_and_one_of_t
     bags = [write_bag(tmp_path / str(number), messages(seconds=1.02, rate_hz=50.0 + 10 * number)) for number in range(2)]
     learning = [start('replay', str(bag), '--params', parameters, '--learn', str(library)) for bag in bags]
     writing = [start('replay', str(bags[0]), '--params', parameters, '--output', str(output)) for _ in range(2)]
-    told = [[line for line in process.communicate()[1].splitlines() if not is_progress(line)] for process in learning + writing]
+    lines = [process.communicate()[1].splitlines() for process in learning + writing]
+    told = [[line for line in each if not line.startswith('replay: ')] for each in lines]  # progress on a busy machine
     assert [process.returncode for process in learning] == [0] * 2
     assert len(load_library(str(library))) == 2
     assert [each.name for each in tmp_path.iterdir() if each.name.startswith('library')] == ['library.json']
@@ -60,11 +61,6 @@ def test_of_processes_that_write_at_once_two_learn_into_one_library_and_one_of_t
     assert sorted(told) == [[], [], [], [refused]]
     with BagReader(output) as reader:
         assert len(list(reader)) == len(messages(seconds=1.02))
-
-
-def is_progress(line):
-    """Return whether a line is one of those that a busy machine makes a command print."""
-    return line.startswith('replay: ')
 
 
 ROOT = Path(__file__).parents[1]
