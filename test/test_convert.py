@@ -136,6 +136,18 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, capsys, which, text, messag
     assert not (tmp_path / 'bags').exists()
 
 
+def test_all_errors_of_a_table_are_found_at_once(tmp_path, capsys):
+    recordings = 'recording,t_s,x_m,y_m\na,0,x,y\na,1,0\na,2,0,0\na,1,0,0\n'
+    obstacles = 'x_m,y_m,radius_m,id\n0,0,-1,0\n0,a,1,1\n0,0,1,1\n0,0,1,1\n'
+    for tables, places in (
+        ({'recordings': recordings}, ['row 3', 'row 2, column x_m', 'row 2, column y_m', 'row 5, column t_s']),
+        ({'obstacles': obstacles}, ['row 2, column radius_m', 'row 3, column y_m', 'row 5, column id']),
+    ):
+        assert convert(tmp_path, **tables) == 2
+        lines = capsys.readouterr().err.splitlines()
+        assert [line.partition('.csv: ')[2].partition(':')[0] for line in lines] == places
+
+
 def write_folder(folder, separator=',', comma=False, seconds=1.0, metres=1.0):
     """A reach of 0.3 m in 1 s in other units, with another separator and with decimal commas."""
     times = np.arange(0.0, 1.0, 0.02)
