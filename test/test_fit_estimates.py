@@ -130,7 +130,7 @@ def test_one_factor_is_fitted_where_distances_are_alike_and_intercept_and_slope_
 def test_the_time_in_which_accelerations_fade_is_found(fading_s):
     rng, dt = np.random.default_rng(5), 0.005
     hands = []
-    for number in range(6):
+    for number in range(4):
         state, path = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, 0.0]]), []
         for _ in range(2000):
             state = compute_transition(dt) @ state

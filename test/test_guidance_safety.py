@@ -209,7 +209,7 @@ def move(rng, kind, state, obstacles, speed):
     return state.position + step * direction / max(norm, 1.0 if kind == 'flees' else norm, 1e-9)
 
 
-def run_hostile(rng, ticks=18, *, has_jumps=False):
+def run_hostile(rng, ticks=24, *, has_jumps=False):
     """Run guidance on a hostile hand, with predictions that jump, vanish, arrive late and contradict each other.
 
     has_jumps: the hand jumps, and obstacles change, faster than any hand moves. Velocities are wrong in one run of three.

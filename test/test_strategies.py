@@ -291,11 +291,11 @@ def measure_jump(one, other):
     ids=['eta before a box', 'start before a gap'],
 )
 def test_effort_and_likelihood_have_no_jumps(find, low, high):
-    """Of 25 points, no two neighbours differ by more than 3 %, unless bisection shrinks the difference.
+    """Of 17 points, no two neighbours differ by more than 3 %, unless bisection shrinks the difference.
 
     Other sweeps take long, or have points at which a class does not settle, or in another minimum.
     """
-    values = np.linspace(low, high, 25).tolist()
+    values = np.linspace(low, high, 17).tolist()
     answers = [find(value) for value in values]
     for (left, right), (one, other) in zip(pairwise(values), pairwise(answers), strict=True):
         for _ in range(6):
