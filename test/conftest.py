@@ -53,27 +53,23 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     add_marks(items)
 
 
-def _fail_if_skipped(report: pytest.TestReport | pytest.CollectReport) -> None:
-    if not (REQUIRE_ROS and report.skipped) or hasattr(report, 'wasxfail'):
-        return
-    reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
-    if not reason.startswith(ALLOWED):
-        report.outcome = 'failed'
-        report.longrepr = f'FOC_ROS_REQUIRE_ROS=1, but: {reason}'
+def _fail_if_skipped(report: Any) -> Any:
+    if REQUIRE_ROS and report.skipped and not hasattr(report, 'wasxfail'):
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+        if not reason.startswith(ALLOWED):
+            report.outcome, report.longrepr = 'failed', f'FOC_ROS_REQUIRE_ROS=1, but: {reason}'
+    return report
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport():
-    report = yield
-    _fail_if_skipped(report)
-    return report
+    """Let a skipped test fail where ROS is required; so does the next hook for a whole file."""
+    return _fail_if_skipped((yield))
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report():
-    report = yield
-    _fail_if_skipped(report)
-    return report
+    return _fail_if_skipped((yield))
 
 
 @pytest.fixture

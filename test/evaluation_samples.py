@@ -113,7 +113,7 @@ def bowed_reach(goal: np.ndarray, bow: float, duration_s: float, hz: float, rng:
     return np.column_stack([times, path + rng.normal(0.0, noise, path.shape)])
 
 
-def write_fit_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float = 50.0, noise: float = 5e-4) -> Path:
+def write_fit_tables(folder: Path, count: int = 6, obstacle: bool = True, hz: float = 30.0, noise: float = 5e-4) -> Path:
     """Write recordings past one obstacle, left and right in turn; or to three goals in turn, without any."""
     rng, reaches = np.random.default_rng(7), {}
     for number in range(count):

@@ -57,8 +57,12 @@ def pose(types: MessageTypes, position: Sequence[float], turned: Mapping[str, fl
     )
 
 
-def pose_stamped(types: MessageTypes, position: Sequence[float], stamp_ns: int = SECOND, frame_id: str = 'world') -> Any:
-    return types.make('geometry_msgs/msg/PoseStamped', header=make_header(types, stamp_ns, frame_id), pose=pose(types, position))
+def pose_stamped(
+    types: MessageTypes, position: Sequence[float], stamp_ns: int = SECOND, frame_id: str = 'world', **turned: float
+) -> Any:
+    """Return a pose; turned: its quaternion by axis."""
+    header, placed = make_header(types, stamp_ns, frame_id), pose(types, position, turned or {'w': 1.0})
+    return types.make('geometry_msgs/msg/PoseStamped', header=header, pose=placed)
 
 
 def pose_array(types: MessageTypes, positions: Iterable[Sequence[float]], frame_id: str = 'world') -> Any:
@@ -136,12 +140,8 @@ def read_columns(cloud: Any) -> dict[str, np.ndarray]:
     }
 
 
-Primitive = tuple[int, Sequence[float], Sequence[float]]
-"""Kind, dimensions and position of a primitive of a collision object."""
-
-
 def collision_object(
-    *primitives: Primitive,
+    *primitives: tuple[int, Sequence[float], Sequence[float]],
     name: str = 'table',
     place: Sequence[float] = (0, 0, 0),
     turned: dict[str, float] | None = None,
@@ -150,7 +150,7 @@ def collision_object(
     frame_id: str = 'world',
     **changes: Any,
 ) -> Any:
-    """Return a CollisionObject; changes: fields with other values."""
+    """Return a CollisionObject of primitives (kind, dimensions, position); changes: fields with other values."""
     make = BAGS.make
     values = {
         'header': make_header(BAGS, stamp_ns, frame_id),

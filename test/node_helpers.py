@@ -32,11 +32,26 @@ def hand_path(count: int, rate_hz: float = 100.0, start_s: float = 10.0) -> list
     return [pose_stamped(TYPES, (0.15 * t**2, 0.0, 0.1), round((start_s + t) * SECOND)) for t in times]
 
 
-class Bench:
-    """`node`: the FocNode; `player`: publishes its inputs; `received`: its outputs by name, `diagnostics`: all that were heard.
+class Player:
+    """`player`: publishes the inputs by `publishers`; `received`: the outputs by name, `diagnostics`: all that were heard.
 
-    Unless `ticking`, the node's timers are stopped, since they would publish in between; `health` publishes the diagnostics.
+    topics: other names of inputs.
     """
+
+    def __init__(self, ros: Graph, outputs: Iterable[str], namespace: str = '', **topics: str) -> None:
+        self.ros = ros
+        self.player = ros.node(f'player{namespace.replace("/", "_")}', namespace=namespace)
+        self.publishers = {
+            name: self.player.create_publisher(find_message_class(kind), topics.get(name, name), 1000)
+            for name, kind in INPUTS.items()
+        }
+        self.received = {name: ros.collect(self.player, find_message_class(OUTPUTS[name][0]), f'foc/{name}') for name in outputs}
+        # subscriptions are announced in order: a node whose diagnostics are received knows those above
+        self.diagnostics = ros.collect(self.player, find_message_class('diagnostic_msgs/msg/DiagnosticArray'), '/diagnostics')
+
+
+class Bench(Player):
+    """A player and its node. Unless `ticking`, the timers of the node are stopped, since they would publish in between."""
 
     def __init__(
         self,
@@ -54,17 +69,11 @@ class Bench:
         namespace = parameters.pop('namespace', '')
         given = QUICK | RELIABLE | {name.replace('__', '.'): value for name, value in parameters.items()}
         overrides = [Parameter(name, value=value) for name, value in given.items()]
-        self.ros = ros
         self.node = ros.add(FocNode(context=ros.context, parameter_overrides=overrides, namespace=namespace))
         if not ticking:
             for timer in self.node.timers:
                 timer.cancel()
-        self.player = ros.node(f'player{namespace.replace("/", "_")}', namespace=namespace)
-        self.publishers = {
-            name: self.player.create_publisher(find_message_class(kind), name, 1000) for name, kind in INPUTS.items()
-        }
-        self.received = {name: ros.collect(self.player, find_message_class(OUTPUTS[name][0]), f'foc/{name}') for name in outputs}
-        self.diagnostics = ros.collect(self.player, find_message_class('diagnostic_msgs/msg/DiagnosticArray'), '/diagnostics')
+        super().__init__(ros, outputs, namespace)
         if connected:
             self.connect()
 
@@ -142,16 +151,12 @@ class Bench:
         return str(self.call(GetState, 'get_state').current_state.label)
 
     def set(self, **values: Any) -> Any:
+        """Set parameters, whose names have `__` in place of a dot, together."""
         from rcl_interfaces.srv import SetParametersAtomically
+        from rclpy.parameter import Parameter
 
-        return self.call(SetParametersAtomically, 'set_parameters_atomically', parameters=list_parameters(**values)).result
-
-
-def list_parameters(**values: Any) -> list[Any]:
-    """Return parameters as messages; the names have `__` in place of a dot."""
-    from rclpy.parameter import Parameter
-
-    return [Parameter(name.replace('__', '.'), value=value).to_parameter_msg() for name, value in values.items()]
+        given = [Parameter(name.replace('__', '.'), value=value).to_parameter_msg() for name, value in values.items()]
+        return self.call(SetParametersAtomically, 'set_parameters_atomically', parameters=given).result
 
 
 def begin(ros: Graph, poses: int = 0, **options: Any) -> Bench:

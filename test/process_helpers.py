@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from message_helpers import SECOND, cloud, obstacle_table, pose_array, pose_stamped
-from node_helpers import GOALS, ROWS, TYPES, figures
+from node_helpers import GOALS, ROWS, TYPES, Player, figures
 from ros_helpers import Graph
 
 ROOT = Path(__file__).parents[1]
@@ -50,25 +50,12 @@ def ended(process: subprocess.Popen[str], number: signal.Signals = signal.SIGTER
     return process.returncode, errors
 
 
-class Player:
-    """Publishes a scene and the hand, and keeps what it hears.
-
-    Attributes: predictions, diagnostics; sent: number of poses.
-    """
+class ScenePlayer(Player):
+    """Publishes a scene and the hand, and keeps the predictions; sent: number of poses."""
 
     def __init__(self, ros: Graph, hand: str = 'hand_pose') -> None:
-        from diagnostic_msgs.msg import DiagnosticArray
-        from geometry_msgs.msg import PoseArray, PoseStamped
-        from sensor_msgs.msg import PointCloud2
-
-        self.ros, self.sent = ros, 0
-        node = ros.node('player')
-        kinds = {'obstacles': PointCloud2, 'goals': PoseArray, 'hand_pose': PoseStamped}
-        topics = {'hand_pose': hand}
-        self.publishers = {name: node.create_publisher(kind, topics.get(name, name), 1000) for name, kind in kinds.items()}
-        self.predictions = ros.collect(node, PointCloud2, 'foc/prediction')
-        # subscriptions are announced in order: a node whose diagnostics are received knows the subscription above
-        self.diagnostics = ros.collect(node, DiagnosticArray, '/diagnostics')
+        super().__init__(ros, ['prediction'], hand_pose=hand)
+        self.sent, self.predictions = 0, self.received['prediction']
 
     @property
     def statuses(self) -> list[Any]:
@@ -122,7 +109,7 @@ class Player:
             self.ros.spin_for(max(began + 0.01 * (i + 1) - time.monotonic(), 0.001))
 
 
-def predict_once(ros: Graph, hand: str = 'hand_pose') -> Player:
-    player = Player(ros, hand)
+def predict_once(ros: Graph, hand: str = 'hand_pose') -> ScenePlayer:
+    player = ScenePlayer(ros, hand)
     player.play_until(lambda: bool(player.predictions), 'a prediction')
     return player

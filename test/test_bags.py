@@ -4,6 +4,7 @@
 
 import random
 import re
+import resource
 
 import pytest
 from bag_helpers import messages, write_bag, write_by_rosbags, write_mcap
@@ -61,28 +62,35 @@ def test_channels_that_are_not_needed_may_be_anything(tmp_path):
     assert_same(read(tmp_path / 'mixed.mcap'), messages())
 
 
-def test_an_existing_path_is_not_overwritten(tmp_path):
-    bag = write_bag(tmp_path / 'one')
-    before = mcap(bag).read_bytes()
-    with pytest.raises(RecordingError, match='exists already and is not overwritten'):
-        write_bag(bag)
-    assert mcap(bag).read_bytes() == before
-
-
-def test_an_unfinished_bag_is_removed(tmp_path):
+def test_a_bag_is_written_as_a_whole_to_a_new_path_or_not_at_all(tmp_path):
     def interrupted():
         yield from messages()
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         write_bag(tmp_path / 'half', interrupted())
-    assert not (tmp_path / 'half').exists()
-
-
-def test_a_path_that_cannot_be_written_is_named(tmp_path):
+    limit, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, most))  # writes beyond it fail like those to a full disk
+    try:
+        with pytest.raises(RecordingError, match='cannot be written'):
+            write_bag(tmp_path / 'full', 10 * messages())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
     (tmp_path / 'file').write_text('not a directory')
     with pytest.raises(RecordingError, match=re.escape(str(tmp_path / 'file' / 'bag'))):
         write_bag(tmp_path / 'file' / 'bag')
+    bag = write_bag(tmp_path / 'one')
+    before = mcap(bag).read_bytes()
+    with pytest.raises(RecordingError, match='exists already and is not overwritten'):
+        write_bag(bag)
+    assert mcap(bag).read_bytes() == before
+    assert sorted(each.name for each in tmp_path.iterdir()) == ['file', 'one']
+
+
+def write_part(path, share):
+    """Write the first part of a file, which has a single chunk."""
+    whole = mcap(write_bag(path.with_name('whole'))).read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
 
 
 @pytest.mark.parametrize(
@@ -93,6 +101,8 @@ def test_a_path_that_cannot_be_written_is_named(tmp_path):
         (lambda path: path.write_bytes(b''), 'the file is empty'),
         (lambda path: path.write_bytes(b'not a bag at all, whatever its name says'), 'cannot be read'),
         (lambda path: path.write_bytes(b'\x89MCAP0\r\n'), 'damaged or cut short'),
+        (lambda path: write_part(path, 0.02), 'damaged or cut short: no whole chunk'),
+        (lambda path: write_part(path, 0.6), 'damaged or cut short: no whole chunk'),
     ],
 )
 def test_a_path_that_is_no_bag_is_refused(tmp_path, make, reason):
@@ -116,24 +126,6 @@ def test_a_file_without_its_footer_is_read_up_to_its_last_whole_chunk(tmp_path, 
         list(BagRecording('killed', path).items())
 
 
-@pytest.mark.parametrize(('share', 'as_folder'), [(0.02, False), (0.6, True)])
-def test_a_file_without_a_whole_chunk_is_refused(tmp_path, share, as_folder):
-    bag = write_bag(tmp_path / 'cut')
-    whole = mcap(bag).read_bytes()
-    mcap(bag).write_bytes(whole[: int(share * len(whole))])
-    with pytest.raises(RecordingError, match='damaged or cut short: no whole chunk'):
-        read(bag if as_folder else mcap(bag))
-
-
-@pytest.fixture(scope='module')
-def bag(tmp_path_factory):
-    return write_bag(tmp_path_factory.mktemp('whole') / 'bag')
-
-
-def content(path):
-    return [(item.topic, item.log_ns, bytes(item.raw)) for item in read(path)]
-
-
 def mutants(data, count):
     """Yield copies with a changed bit, a changed byte, a block of zeros, or two bytes exchanged, at seeded places."""
     source = random.Random(7)
@@ -150,9 +142,12 @@ def mutants(data, count):
         yield bytes(changed)
 
 
-def test_no_mutant_of_a_written_file_is_read_with_another_content(bag, tmp_path):
-    whole, data, refused, total = content(bag), (bag / 'bag.mcap').read_bytes(), 0, 0
-    file = tmp_path / 'bad.mcap'
+def test_no_mutant_of_a_written_file_is_read_with_another_content(tmp_path):
+    def content(path):
+        return [(item.topic, item.log_ns, bytes(item.raw)) for item in read(path)]
+
+    bag, file, refused, total = write_bag(tmp_path / 'bag'), tmp_path / 'bad.mcap', 0, 0
+    whole, data = content(bag), mcap(bag).read_bytes()
     for mutant in mutants(data, 200):
         file.write_bytes(mutant)
         try:

@@ -33,10 +33,11 @@ def write_reaches(folder, ends):
     write_tables(folder, {f'r{k}': (share, path) for k, path in enumerate(paths)}, [(0.3, 0.0)], [(0.15, 0.0, 0.015)])
 
 
-def test_learn_writes_a_library_that_a_predictor_uses_in_its_frame_or_without_one(tmp_path):
-    write_reaches(tmp_path, [0.3, 0.3])
+def test_learn_names_what_reaches_no_goal_and_writes_what_a_predictor_uses_in_its_frame_or_without_one(tmp_path, capsys):
+    write_reaches(tmp_path, [0.3, 0.1, 0.3])
     file, shares = tmp_path / 'ways.json', []
-    assert main(['learn', str(tmp_path), '--output', str(file)]) == 0
+    assert main(['learn', str(tmp_path), '--output', str(file)]) == 2
+    assert 'r1: expected a movement' in capsys.readouterr().err
     recordings = load_library(str(file))
     assert len(recordings) == 2
     for each in recordings:
@@ -60,13 +61,6 @@ def test_learn_writes_a_library_that_a_predictor_uses_in_its_frame_or_without_on
         shares.append({each.label: each.likelihood for each in prediction}['goal0:+0'])
     assert shares[1] == shares[2] > shares[0] + 0.02, 'the recordings pass on the left'
     assert shares[3] == shares[0], 'in another frame they say nothing'
-
-
-def test_a_recording_that_does_not_reach_its_goal_is_named(tmp_path, capsys):
-    write_reaches(tmp_path, [0.3, 0.1])
-    assert main(['learn', str(tmp_path), '--output', str(tmp_path / 'ways.json')]) == 2
-    assert 'r1: expected a movement' in capsys.readouterr().err
-    assert len(load_library(str(tmp_path / 'ways.json'))) == 1
 
 
 def test_copies_of_a_bag_count_once(tmp_path, capsys):

@@ -56,18 +56,16 @@ def test_every_number_arrives(tmp_path, capsys):
     assert np.allclose(rows(obstacles), [(0.5, -0.1, 0, 0.03, 0, 0), (0.425, 0.08, 0, 0.025, 0, 1)])
 
 
-def test_optional_columns(tmp_path):
+def test_heights_deviations_ids_and_boxes_are_optional_columns(tmp_path):
     obstacles = 'id,x_m,y_m,radius_m,radius_stddev_m,z_m\n7,0.5,-0.1,0.03,0.002,0.1\n-2,0,0,0,0,0\n'
     assert convert(tmp_path, 'recording,t_s,x_m,y_m,z_m\n1,0,0.1,0.2,0.3\n', obstacles, 'x_m,y_m,z_m\n0.1,0.2,0.4\n') == 0
     items = read(tmp_path, '1')
     assert (items['hand_pose'].pose.position.z, items['goals'].poses[0].position.z) == (0.3, 0.4)
     assert np.allclose(rows(items['obstacles']), [(0.5, -0.1, 0.1, 0.03, 0.002, 7), (0.0, 0.0, 0.0, 0.0, 0.0, -2)])
-
-
-def test_boxes_and_circles_share_a_table(tmp_path):
-    obstacles = 'x_m,y_m,radius_m,size_x_m,size_y_m,yaw_rad\n0.5,-0.1,0,0.2,0.1,0.3\n0.6,0.1,0.02,0,0,0\n'
-    assert convert(tmp_path, obstacles=obstacles) == 0
-    message = read(tmp_path, 'a')['obstacles']
+    boxes = 'x_m,y_m,radius_m,size_x_m,size_y_m,yaw_rad\n0.5,-0.1,0,0.2,0.1,0.3\n0.6,0.1,0.02,0,0,0\n'
+    (tmp_path / 'boxes').mkdir()
+    assert convert(tmp_path / 'boxes', obstacles=boxes) == 0
+    message = read(tmp_path / 'boxes', 'a')['obstacles']
     assert np.allclose(rows(message), [(0.5, -0.1, 0, 0, 0, 0, 0.2, 0.1, 0.3), (0.6, 0.1, 0, 0.02, 0, 1, 0, 0, 0)])
     assert decode_point_cloud(message, 'xy').obstacles.corners.tolist() == [4, 1]
 
@@ -190,27 +188,28 @@ def test_units_that_cannot_be_right_are_named(tmp_path, capsys, units, words):
         assert all('expected a number in [' in each for each in bounds)
 
 
-@pytest.mark.parametrize(('factor', 'unit', 'far_m'), [(1e3, 'mm', 320), (1e2, 'cm', 31.7)])
-def test_scenes_that_cannot_be_in_metres_are_named(tmp_path, capsys, factor, unit, far_m):
+NEAR, FAR = 'x_m,y_m\n0.3,0\n', 'the {} of recording a seem to be in {}: the nearest is {} m from the movement of the hand'
+LARGE = 'the sizes of the obstacles of recording a seem to be in mm: the smallest is 30 m'
+
+
+@pytest.mark.parametrize(
+    ('goals', 'obstacles', 'told'),
+    [
+        ('x_m,y_m\n320,0\n500,100\n', '320,0,10', [FAR.format(kind, 'mm', 320) for kind in ('goals', 'obstacles')]),
+        ('x_m,y_m\n32,0\n50,10\n', '32,0,1', [FAR.format(kind, 'cm', 31.7) for kind in ('goals', 'obstacles')]),
+        (NEAR, '0.2,0,30', [LARGE]),
+        (NEAR, '0.2,0,30\n0.1,0.1,0.02', []),
+        (NEAR, '0.2,0,0.9', []),
+    ],
+)
+def test_scenes_that_cannot_be_in_metres_are_named(tmp_path, capsys, goals, obstacles, told):
     folder = write_folder(tmp_path / 'tables')
-    goals, obstacles = folder / 'goals.csv', folder / 'obstacles.csv'
-    goals.write_text(f'x_m,y_m\n{0.32 * factor},0\n{0.5 * factor},{0.1 * factor}\n')
-    obstacles.write_text(f'x_m,y_m,radius_m\n{0.32 * factor},0,{0.01 * factor}\n')
-    words = f'of recording a seem to be in {unit}: the nearest is {far_m} m from the movement of the hand'
-    single = [str(folder / 'recordings.csv'), '--obstacles', str(obstacles), '--goals', str(goals)]
-    for arguments in ([str(folder)], single):
+    (folder / 'goals.csv').write_text(goals)
+    (folder / 'obstacles.csv').write_text(f'x_m,y_m,radius_m\n{obstacles}\n')
+    single = [str(folder / f'{name}.csv') for name in ('recordings', 'obstacles', 'goals')]
+    for arguments in ([str(folder)], [single[0], '--obstacles', single[1], '--goals', single[2]]):
         assert main(['convert', *arguments, '--output', str(tmp_path / f'bags{len(arguments)}')]) == 0
-        told = [f'foc_ros convert: {arguments[0]}: the {kind} {words}' for kind in ('goals', 'obstacles')]
-        assert capsys.readouterr().err.splitlines() == told
-
-
-@pytest.mark.parametrize(('rows', 'told'), [('0.2,0,30', True), ('0.2,0,30\n0.1,0.1,0.02', False), ('0.2,0,0.9', False)])
-def test_radii_that_cannot_be_in_metres_are_named(tmp_path, capsys, rows, told):
-    folder = write_folder(tmp_path / 'tables')
-    (folder / 'obstacles.csv').write_text(f'x_m,y_m,radius_m\n{rows}\n')
-    assert main(['convert', str(folder), '--output', str(tmp_path / 'bags')]) == 0
-    words = f'{folder}: the sizes of the obstacles of recording a seem to be in mm: the smallest is 30 m'
-    assert capsys.readouterr().err == (f'foc_ros convert: {words}\n' if told else '')
+        assert capsys.readouterr().err.splitlines() == [f'foc_ros convert: {arguments[0]}: {words}' for words in told]
 
 
 def test_times_that_repeat_are_named(tmp_path, capsys):

@@ -10,28 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bag_helpers import CONFIG, messages, ns, write_by_rosbags
-from message_helpers import (
-    BAGS,
-    SECOND,
-    STORE,
-    both_kinds,
-    collision_object,
-    detection,
-    detections,
-    pose,
-    pose_array,
-    pose_stamped,
-)
+from message_helpers import BAGS, SECOND, STORE, both_kinds, collision_object, detection, detections, pose_array, pose_stamped
 from rosbags.rosbag2 import StoragePlugin
 
 from foc_ros.analysis.replay import replay
-from foc_ros.core.config import replace_values
 from foc_ros.core.errors import LostHandError, MessageError, RecordingError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.polygons import make_box_polygon
-from foc_ros.core.pipeline import Pipeline
 from foc_ros.io.topics import OPTIONAL, TYPES, assign_topics
-from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.decode_objects import ObjectTable, decode_detections
 from foc_ros.ros.messages.decode_poses import MAX_GOALS, decode_goal, decode_goals, decode_hand_sample
 from foc_ros.ros.messages.plane import Transform, compute_rotation
@@ -54,7 +40,7 @@ def check_polygon(obstacles, row, centre, size, yaw):
     np.testing.assert_allclose(measure_offsets(centre + polygon, obstacles)[1][:, row], 0.0, atol=2e-9)
 
 
-def test_primitives_stand_where_the_poses_of_object_and_primitive_say():
+def test_primitives_stand_where_the_poses_of_object_and_primitive_say_and_what_is_no_shape_is_counted():
     parts = (BOX, (0.4, 0.2, 0.1), (0.5, 0, 0)), (SPHERE, (0.05,), (0, 0.3, 0)), (CYLINDER, (0.4, 0.02), (0, 0, 0))
     obstacles = after(collision_object(*parts, place=(1, 2, 3), turned=QUARTER)).obstacles(0, 0.01)
     assert obstacles.ids == ('table/0', 'table/1', 'table/2')
@@ -62,12 +48,12 @@ def test_primitives_stand_where_the_poses_of_object_and_primitive_say():
     check_polygon(obstacles, 1, (0.7, 2.0), (0, 0), 0)
     check_polygon(obstacles, 2, (1.0, 2.0), (0, 0), 0)
     assert obstacles.radius.tolist() == [0.0, 0.05, 0.02] and obstacles.radius_stddev.tolist() == [0.01] * 3
-
-
-def test_a_lying_cylinder_is_a_capsule():
-    obstacles = after(collision_object((CYLINDER, (0.4, 0.02), (0, 0, 0))), plane='xz').obstacles(0, 0.0)
-    check_polygon(obstacles, 0, (0.0, 0.0), (0.0, 0.4), 0.0)
-    assert obstacles.radius.tolist() == [0.02]
+    lying = after(collision_object((CYLINDER, (0.4, 0.02), (0, 0, 0))), plane='xz').obstacles(0, 0.0)
+    check_polygon(lying, 0, (0.0, 0.0), (0.0, 0.4), 0.0)
+    assert lying.radius.tolist() == [0.02], 'a capsule'
+    mesh = BAGS.make('shape_msgs/msg/Mesh')
+    table = after(collision_object((CONE, (0.1, 0.1), (0, 0, 0)), (SPHERE, (0.1,), (0, 0, 0)), meshes=[mesh]))
+    assert dict(table.dropped) == {'not_a_shape': 2} and table.obstacles(0, 0.0).ids == ('table/0',)
 
 
 def test_objects_are_added_appended_moved_and_removed():
@@ -79,12 +65,6 @@ def test_objects_are_added_appended_moved_and_removed():
     np.testing.assert_allclose(moved.centre[-1], [1, 2])
     assert after(*held, collision_object(operation=1)).obstacles(0, 0.0).ids == ('cup/0',)
     assert not len(after(*held, collision_object(name='', operation=1, frame_id='')).obstacles(0, 0.0))
-
-
-def test_what_is_no_shape_is_counted():
-    mesh = BAGS.make('shape_msgs/msg/Mesh')
-    table = after(collision_object((CONE, (0.1, 0.1), (0, 0, 0)), (SPHERE, (0.1,), (0, 0, 0)), meshes=[mesh]))
-    assert dict(table.dropped) == {'not_a_shape': 2} and table.obstacles(0, 0.0).ids == ('table/0',)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +88,7 @@ def test_a_wrong_object_is_refused(message, words):
         after(collision_object((SPHERE, (1,), (0, 0, 0))), message)
 
 
-def test_detections_are_boxes_by_id():
+def test_detections_are_boxes_by_id_and_those_that_are_not_finite_or_repeated_are_dropped():
     boxes = detection((1, 2, 3), (0.4, 0.2, 0.1), 'cup;1'), detection((4, 5, 6), (0.4, 0.2, 0.1), turned=QUARTER)
     found = decode_detections(detections(*boxes), 'xy')
     assert (found.stamp_ns, found.frame_id, found.dropped) == (SECOND, 'world', {})
@@ -117,17 +97,6 @@ def test_detections_are_boxes_by_id():
     check_polygon(obstacles, 0, (1.0, 2.0), (0.4, 0.2), 0.0)
     check_polygon(obstacles, 1, (4.0, 5.0), (0.4, 0.2), math.pi / 2)
     assert not len(decode_detections(detections(), 'xy').obstacles(0, 0.0))
-
-
-def test_detections_have_the_deviation_of_the_present_parameters():
-    intake = Intake(Pipeline(CONFIG))
-    intake.take('detections', detections(detection((1, 2, 3), (0.4, 0.2, 0.1))))
-    intake.pipeline.reconfigure(replace_values(CONFIG, {'scene.marker_radius_stddev': 0.01}))
-    intake.take('hand_pose', pose_stamped(BAGS, (0, 0, 0.1), SECOND))
-    assert intake.pipeline.scene.obstacles(SECOND).radius_stddev.tolist() == [0.01]
-
-
-def test_detections_that_are_not_finite_or_repeated_are_dropped():
     each = [detection((x, 0, 0), (1, 1, 1), 'a') for x in (1.0, 2.0)]
     found = decode_detections(detections(*each, detection((math.nan, 0, 0), (1, 1, 1))), 'xy')
     assert found.dropped == {'duplicate_id': 1, 'not_finite': 1} and found.obstacles(0, 0.0).centre.tolist() == [[2.0, 0.0]]
@@ -198,9 +167,7 @@ def test_the_node_receives_them_or_names_the_package_that_is_missing_for_a_publi
 
 @both_kinds
 def test_a_hand_pose_becomes_a_sample_whatever_its_orientation(types):
-    message = pose_stamped(types, (0.1, 0.2, 0.3), 5 * SECOND + 7, 'base')
-    message.pose.orientation = types.make('geometry_msgs/msg/Quaternion', x=math.nan, y=7.0, z=0.0, w=0.0)
-    sample = decode_hand_sample(message, 'xz')
+    sample = decode_hand_sample(pose_stamped(types, (0.1, 0.2, 0.3), 5 * SECOND + 7, 'base', x=math.nan, y=7.0), 'xz')
     assert (sample.stamp_ns, sample.frame_id) == (5 * SECOND + 7, 'base')
     assert (*sample.position, sample.height) == (0.1, 0.3, 0.2)
     assert not sample.position.flags.writeable
@@ -209,13 +176,10 @@ def test_a_hand_pose_becomes_a_sample_whatever_its_orientation(types):
 @both_kinds
 @pytest.mark.parametrize('turn', [(0, 0, 0, 0), (0, 0, 0, 1e-3), (9, 9, 9, 9), (math.nan, 0, 0, 1), (math.inf, 0, 0, 0)])
 def test_the_position_0_without_an_orientation_means_no_data(types, turn):
-    message = pose_stamped(types, (0.0, 0.0, 0.0))
     for turned in ({'w': 1.0}, *({'y': 0.6 * size, 'w': 0.8 * size} for size in (1.0, -1.0, 0.95))):
-        message.pose = pose(types, (0.0, 0.0, 0.0), turned)
-        assert decode_hand_sample(message, 'xy').height == 0.0
-    message.pose = pose(types, (0.0, 0.0, 0.0), dict(zip('xyzw', turn, strict=True)))
+        assert decode_hand_sample(pose_stamped(types, (0.0, 0.0, 0.0), **turned), 'xy').height == 0.0
     with pytest.raises(LostHandError, match='the tracker has lost the hand'):
-        decode_hand_sample(message, 'xy')
+        decode_hand_sample(pose_stamped(types, (0.0, 0.0, 0.0), **dict(zip('xyzw', turn, strict=True))), 'xy')
 
 
 @both_kinds

@@ -263,8 +263,12 @@ def test_add_replaces_and_delete_removes():
     assert ids(after(first, marker_array(BAGS, marker(BAGS, id=9, action=2)))) == ('a/1', 'a/2')
     ordered = marker_array(BAGS, marker(BAGS, (1, 0, 0), id=1), marker(BAGS, id=1, action=2), marker(BAGS, (5, 0, 0), id=1))
     np.testing.assert_array_equal(after(ordered).obstacles(0, 0.0).centre, [[5, 0]])
+    other = after(first, marker_array(BAGS, marker(BAGS, id=1, type=0)))
+    assert ids(other) == ('a/2',) and other.dropped == {'not_a_shape': 1}, 'so does another type'
     scene.with_markers(marker_array(BAGS, marker(BAGS, action=3, ns='')), SECOND, 'xy')
     assert ids(scene) == ('a/1', 'a/2'), 'an update does not change the old table'
+    found = ids(after(marker_array(BAGS, *[marker(BAGS, ns=ns) for ns in ('a;b', 'a%3Bb', 'a,b')])))
+    assert len(set(found)) == 3 and not any(';' in name for name in found), 'ids contain no separator and remain distinct'
 
 
 @pytest.mark.parametrize(('ns', 'left'), [('', ('b/2',)), ('a', ('c/3', 'b/2')), ('zz', ('a/1', 'c/3', 'b/2'))])
@@ -297,15 +301,6 @@ def test_a_marker_that_is_not_finite_does_not_replace_the_old_one(types, value, 
     assert ids(scene) == ('a/2',) and scene.dropped == {'not_finite': 1}, 'a sphere needs no orientation'
 
 
-def test_another_type_replaces_an_obstacle_and_is_counted():
-    scene = after(
-        marker_array(BAGS, marker(BAGS, id=1), marker(BAGS, id=2)),
-        marker_array(BAGS, marker(BAGS, id=1, type=0)),
-    )
-    assert ids(scene) == ('a/2',)
-    assert scene.dropped == {'not_a_shape': 1}
-
-
 @both_kinds
 @pytest.mark.parametrize(
     ('changes', 'words'),
@@ -326,10 +321,3 @@ def test_a_message_with_a_wrong_marker_is_refused(types, changes, words):
     with pytest.raises(MessageError, match=re.escape(words)):
         scene.with_markers(marker_array(types, marker(types, id=1), marker(types, id=2, **changes)), SECOND, 'xy')
     assert ids(scene) == ('a/7',)
-
-
-def test_ids_contain_no_separator_and_remain_distinct():
-    names = ['a;b', 'a%3Bb', 'a,b']
-    found = ids(after(marker_array(BAGS, *[marker(BAGS, ns=ns) for ns in names])))
-    assert len(set(found)) == 3
-    assert not any(';' in name for name in found)

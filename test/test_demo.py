@@ -7,11 +7,12 @@ import os
 import signal
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import ros_required  # noqa: F401
 import pytest
+from node_helpers import stamps
 from play_helpers import has_ended, until
 from rosbags.highlevel import AnyReader
 
@@ -22,25 +23,16 @@ pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 ROOT = Path(__file__).resolve().parents[1]
 LAST_S = 2.0
 OUTPUTS = ('/foc/prediction', '/foc/likelihoods', '/foc/path', '/foc/markers')
-STARTED = 'demo with the node in process '
 
 
-def counted(bag):
-    """Return how many messages of each topic can be read and decoded."""
+def read(bag):
+    """Return the messages of each topic."""
+    found: dict[str, list[Any]] = {}
     with AnyReader([bag]) as reader:
-        found: Counter[str] = Counter()
         for connection, _, raw in reader.messages():
-            reader.deserialize(raw, connection.msgtype)
-            found[connection.topic] += 1
-        assert found.total() == reader.message_count
+            found.setdefault(connection.topic, []).append(reader.deserialize(raw, connection.msgtype))
+        assert sum(map(len, found.values())) == reader.message_count
     return found
-
-
-def read_stamps(bag, topic):
-    with AnyReader([bag]) as reader:
-        chosen = [each for each in reader.connections if each.topic == topic]
-        stamps = [reader.deserialize(raw, each.msgtype).header.stamp for each, _, raw in reader.messages(chosen)]
-    return [stamp.sec * 10**9 + stamp.nanosec for stamp in stamps]
 
 
 def test_end_to_end(tmp_path, capsys):
@@ -59,12 +51,13 @@ def test_end_to_end(tmp_path, capsys):
     )
     places = [printed.find(words) for words in told]
     assert places == sorted(places) and places[0] == 0
-    found = counted(tmp_path / 'out' / 'bag')
+    bag = read(tmp_path / 'out' / 'bag')
+    found = {topic: len(each) for topic, each in bag.items()}
     assert (found['/hand_pose'], found['/obstacles'], found['/goals']) == (201, 11, 3)
     assert found['/foc/prediction'] > 0
     assert {found[topic] for topic in OUTPUTS if topic != '/foc/markers'} == {found['/foc/prediction']}
     assert 0 < found['/foc/markers'] <= found['/foc/prediction']
-    sent, made = (read_stamps(tmp_path / 'out' / 'bag', topic) for topic in ('/hand_pose', '/foc/prediction'))
+    sent, made = (stamps(bag[topic]) for topic in ('/hand_pose', '/foc/prediction'))
     assert set(made) <= set(sent) and made == sorted(set(made)), 'the live predictions are those of the recording'
     numbers = json.loads((tmp_path / 'out' / 'report' / 'predictions.json').read_text(encoding='utf-8'))
     assert len(numbers['predictions']) == found['/foc/prediction']
@@ -75,50 +68,33 @@ def test_end_to_end(tmp_path, capsys):
     assert (tmp_path / 'out' / 'report' / 'overview.png').read_bytes().startswith(b'\x89PNG')
 
 
-def start(output):
-    """Start a demo as a process and return it with the process id of its node once the recording plays."""
-    program = f"""
-import sys
-from pathlib import Path
-from foc_ros.cli import demo
-from foc_ros.ros import isolated_node
-entered = isolated_node.NodeProcess.__enter__
-def enter(self):
-    node = entered(self)
-    print({STARTED!r} + str(node.pid), flush=True)
-    return node
-isolated_node.NodeProcess.__enter__ = enter
-sys.exit(demo.perform(Path({str(output)!r})))
-"""
-    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
-    demo = subprocess.Popen([sys.executable, '-u', '-c', program], cwd=ROOT, **pipes)
-    assert demo.stdout is not None
-    pid = 0
+def wait_until_it_plays(demo):
+    """Return the process id of the node of a demo once the recording plays."""
     for line in demo.stdout:
-        if line.startswith(STARTED):
-            pid = int(line.removeprefix(STARTED))
         if ' of 20.' in line:
-            return demo, pid
+            children = [each for file in Path(f'/proc/{demo.pid}/task').glob('*/children') for each in file.read_text().split()]
+            (node,) = [int(each) for each in children if b'\0node\0' in Path(f'/proc/{each}/cmdline').read_bytes()]
+            return node
     demo.kill()
     raise AssertionError(f'the demo never played: {demo.communicate()}')
 
 
-def test_an_interrupt_ends_it_cleanly(tmp_path):
-    demo, node = start(tmp_path / 'out')
-    demo.send_signal(signal.SIGINT)
-    printed, errors = demo.communicate(timeout=60)
-    assert (demo.returncode, errors) == (130, '')
+def test_an_interrupt_ends_it_cleanly_and_a_node_that_dies_is_told(tmp_path):
+    command = [sys.executable, '-u', '-m', 'foc_ros', 'demo', '--output']
+    pipes = {'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True}
+    outputs = tmp_path / 'interrupted', tmp_path / 'killed'
+    interrupted, killed = demos = [subprocess.Popen([*command, str(each)], cwd=ROOT, **pipes) for each in outputs]
+    nodes = [wait_until_it_plays(each) for each in demos]
+    interrupted.send_signal(signal.SIGINT)
+    os.kill(nodes[1], signal.SIGKILL)
+    printed, errors = interrupted.communicate(timeout=60)
+    assert (interrupted.returncode, errors) == (130, '')
     assert printed.splitlines()[-1].startswith('interrupted')
-    until(lambda: has_ended(node), 'the end of the node', 10.0)
-    assert counted(tmp_path / 'out' / 'bag')['/hand_pose'] > 0
-    assert not (tmp_path / 'out' / 'report').exists()
-
-
-def test_a_node_that_dies_is_told(tmp_path):
-    demo, node = start(tmp_path / 'out')
-    os.kill(node, signal.SIGKILL)
-    _, errors = demo.communicate(timeout=60)
-    assert demo.returncode == 1
+    until(lambda: has_ended(nodes[0]), 'the end of the node', 10.0)
+    assert read(outputs[0] / 'bag')['/hand_pose']
+    assert not (outputs[0] / 'report').exists()
+    _, errors = killed.communicate(timeout=60)
+    assert killed.returncode == 1
     (line,) = errors.splitlines()
     assert line.startswith('foc_ros demo: the node ended with exit code -9: ')
 

@@ -233,7 +233,7 @@ def test_a_hand_at_rest_follows_recordings_from_their_onset():
 
 
 @given(st.floats(0.012, 0.05), st.floats(-0.01, 0.01), st.floats(0.0, 0.9))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_a_pooled_path_stays_in_its_class_and_out_of_obstacles(height, beside, share):
     recording = record(bow(height))
     state = recording.states[int(share * (len(recording.states) - 1))]

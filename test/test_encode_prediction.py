@@ -55,14 +55,6 @@ def test_the_cloud_contains_every_solved_candidate(types, plane):
             np.testing.assert_allclose(table['xyz'[i] + 'xyz'[j]][rows], space[:, i, j], rtol=1e-6)
 
 
-def test_goal_and_number_of_the_class_do_not_depend_on_the_rank():
-    one, other = outcome('goal1:+l1', 0.2, 0.1), outcome('goal0:-l1', 0.8, -0.1)
-    one = replace(one, candidate=replace(one.candidate, goal=1), way=7)
-    table = read_columns(made('prediction', prediction(replace(other, way=3), one)))
-    assert table['way'].tolist() == [3] * (STEPS + 1) + [7] * (STEPS + 1)
-    assert table['goal'].tolist() == [0] * (STEPS + 1) + [1] * (STEPS + 1)
-
-
 @both_kinds
 def test_the_likelihoods_are_a_table_with_labels(types):
     message = made('likelihoods', three_ways(), types)
@@ -101,7 +93,12 @@ def test_the_path_is_the_most_likely_one_with_stamps_in_the_future(types):
     assert {pose.pose.orientation.w for pose in message.poses} == {1.0}
 
 
-def test_the_candidate_called_most_likely_is_first_even_if_another_is_likelier():
+def test_the_candidate_called_most_likely_is_first_even_if_another_is_likelier_and_keeps_goal_and_number():
+    one, other = outcome('goal1:+l1', 0.2, 0.1), outcome('goal0:-l1', 0.8, -0.1)
+    one = replace(one, candidate=replace(one.candidate, goal=1), way=7)
+    table = read_columns(made('prediction', prediction(replace(other, way=3), one)))
+    assert table['way'].tolist() == [3] * (STEPS + 1) + [7] * (STEPS + 1)
+    assert table['goal'].tolist() == [0] * (STEPS + 1) + [1] * (STEPS + 1)
     ways = prediction(outcome('a', 0.52, 0.1), outcome('b', 0.48, -0.1), most_likely='b')
     assert made('likelihoods', ways).layout.dim[0].label == 'b;a'
     table = read_columns(made('prediction', ways))

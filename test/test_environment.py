@@ -44,29 +44,23 @@ def test_a_node_without_a_place_for_its_log_says_so():
     assert process.returncode == 2
 
 
-def test_processes_that_learn_into_one_library_at_once_lose_nothing(tmp_path):
-    library = tmp_path / 'library.json'
+def test_of_processes_that_write_at_once_two_learn_into_one_library_and_one_of_two_writes_their_output(tmp_path):
+    library, output = tmp_path / 'library.json', tmp_path / 'out'
     parameters = write_parameters(tmp_path, replace_values(CONFIG, {'rate_hz': 2.0}))
-    started = []
-    for number in range(2):  # two movements, which differ in their speed
-        bag = write_bag(tmp_path / str(number), messages(seconds=1.02, rate_hz=50.0 + 10 * number))
-        started.append(start('replay', str(bag), '--params', parameters, '--learn', str(library)))
-    errors = ''.join(process.communicate()[1] for process in started)
-    assert all(line.startswith('replay: ') for line in errors.splitlines()), errors  # progress on a busy machine
-    assert [process.returncode for process in started] == [0] * 2
+    # two movements, which differ in their speed
+    bags = [write_bag(tmp_path / str(number), messages(seconds=1.02, rate_hz=50.0 + 10 * number)) for number in range(2)]
+    learning = [start('replay', str(bag), '--params', parameters, '--learn', str(library)) for bag in bags]
+    writing = [start('replay', str(bags[0]), '--params', parameters, '--output', str(output)) for _ in range(2)]
+    lines = [process.communicate()[1].splitlines() for process in learning + writing]
+    told = [[line for line in each if not line.startswith('replay: ')] for each in lines]  # progress on a busy machine
+    assert [process.returncode for process in learning] == [0] * 2
     assert len(load_library(str(library))) == 2
     assert [each.name for each in tmp_path.iterdir() if each.name.startswith('library')] == ['library.json']
-
-
-def test_of_two_processes_with_one_output_one_writes_it(tmp_path):
-    bag = write_bag(tmp_path / 'bag', messages(seconds=0.1))
-    both = [start('replay', str(bag), '--output', str(tmp_path / 'out')) for _ in range(2)]
-    told = [process.communicate()[1].splitlines(keepends=True) for process in both]
-    errors = sorted(''.join(line for line in lines if not line.startswith('replay: ')) for lines in told)
-    assert sorted(process.returncode for process in both) == [0, 2]
-    assert errors == ['', f'foc_ros replay: {tmp_path / "out"}: exists already and is not overwritten; choose another name\n']
-    with BagReader(tmp_path / 'out') as reader:
-        assert len(list(reader)) == len(messages(seconds=0.1))
+    assert sorted(process.returncode for process in writing) == [0, 2]
+    refused = f'foc_ros replay: {output}: exists already and is not overwritten; choose another name'
+    assert sorted(told) == [[], [], [], [refused]]
+    with BagReader(output) as reader:
+        assert len(list(reader)) == len(messages(seconds=1.02))
 
 
 ROOT = Path(__file__).parents[1]

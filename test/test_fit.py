@@ -94,7 +94,14 @@ def test_two_recordings_do_not_determine_the_likelihood(tmp_path, capsys):
 FIXED = {'foc.strategy': 'fixed', 'foc.tau': 1e-4}
 
 
-def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_lambda(tmp_path, capsys):
+def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_lambda(tmp_path, capsys, monkeypatch):
+    real, kept = fitting.fit_parameters, []
+
+    def keep(*given, **named):
+        kept.append(real(*given, **named))
+        return kept[-1]
+
+    monkeypatch.setattr(fitting, 'fit_parameters', keep)
     write_bag(tmp_path / 'bags' / 'good')
     (tmp_path / 'bags' / 'bad').mkdir()
     (tmp_path / 'bags' / 'bad' / 'bad.mcap').write_bytes(b'nothing')
@@ -106,13 +113,11 @@ def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_la
     assert {'duration.fitts_a_s', 'duration.arrival'} <= set(answer['undetermined']), 'they may be the best by chance'
     assert config.foc.tau == 1e-4
     assert any(words.startswith('foc.tau, foc.lam: kept as they are') for words in answer['warnings'])
-
-
-def test_the_result_is_printed_as_tables(tmp_path, capsys):
-    bag, given, output = write_bag(tmp_path / 'bag'), tmp_path / 'given.yaml', tmp_path / 'out.yaml'
-    given.write_text(dump_parameter_file(replace_values(Config(), {**QUICK, **FIXED})))
-    options = ['--params', str(given), '--workers', '1', '--allow', 'positions', '--report', str(tmp_path)]
-    assert main(['fit', str(bag), '--output', str(output), *options]) == 0
+    # the same fit as tables and as a page
+    monkeypatch.setattr(fitting, 'fit_parameters', lambda *_, **__: kept[0])
+    output = tmp_path / 'out.yaml'
+    options = ['--params', str(tmp_path / 'given.yaml'), '--workers', '1', '--allow', 'positions', '--report', str(tmp_path)]
+    assert main(['fit', str(tmp_path / 'bags'), '--output', str(output), *options]) == 2
     words = capsys.readouterr().out
     assert 'log-likelihood of the class taken' in words and 'note: ' in words
     assert 'with the fitted parameters: ' in words

@@ -8,17 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evaluation_samples import (
-    FIT_GOALS,
-    TWO_CLASSES,
-    H,
-    bowed_reach,
-    observation,
-    reach,
-    recorded,
-    recorded_hand,
-    write_fit_tables,
-)
+from evaluation_samples import FIT_GOALS, TWO_CLASSES, bowed_reach, observation, reach, recorded, recorded_hand, write_fit_tables
 
 from foc_ros.analysis.evaluation.observations import observe
 from foc_ros.analysis.evaluation.positions import compute_log_densities
@@ -118,7 +108,7 @@ def _fit_reaches(durations, distances):
     return fit_duration(hands, PRECISE)
 
 
-def test_one_factor_is_fitted_where_distances_are_alike():
+def test_one_factor_is_fitted_where_distances_are_alike_and_intercept_and_slope_where_they_differ():
     given = PRECISE.duration
     found = _fit_reaches([2.0 * (given.fitts_a_s + given.fitts_b_s * _bits(0.3))] * 5, [0.3] * 5)
     a, b = found.estimates[A], found.estimates[B]
@@ -126,9 +116,6 @@ def test_one_factor_is_fitted_where_distances_are_alike():
     assert a.value / given.fitts_a_s == pytest.approx(2.0, rel=0.2)
     assert a.low <= a.value <= a.high
     assert any('too alike to tell intercept and slope apart' in words for words in found.warnings)
-
-
-def test_distances_that_differ_determine_intercept_and_slope():
     distances = [0.05, 0.1, 0.2, 0.4, 0.8]
     durations = 0.5 + 0.3 * _bits(distances)
     found = _fit_reaches(durations.tolist(), distances)
@@ -143,7 +130,7 @@ def test_distances_that_differ_determine_intercept_and_slope():
 def test_the_time_in_which_accelerations_fade_is_found(fading_s):
     rng, dt = np.random.default_rng(5), 0.005
     hands = []
-    for number in range(6):
+    for number in range(4):
         state, path = np.array([[0.0, 0.0], [0.2, 0.0], [0.0, 0.0]]), []
         for _ in range(2000):
             state = compute_transition(dt) @ state
@@ -222,7 +209,7 @@ def test_half_of_the_settings_leave_each_round_and_the_finalists_have_all_record
 
 
 def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twice(tmp_path, monkeypatch):
-    recordings = find_recordings(write_fit_tables(tmp_path / 'data', count=2, hz=30.0))
+    recordings = find_recordings(write_fit_tables(tmp_path / 'data', count=2))
     names = list(recordings)
     hopeless = replace_values(SEARCH_CONFIG, {'foc.noise_x': 2.0, 'foc.noise_y': 2.0, 'likelihood.shortfall': math.inf})
     replays = Replays(recordings, {})
@@ -234,7 +221,7 @@ def test_a_setting_that_predicts_nothing_loses_and_no_recording_is_replayed_twic
 
 def test_settings_are_compared_by_what_the_predictor_answers_with_them(tmp_path, monkeypatch):
     """It learns the pace, for which the spread of durations is the prior, and expects other goals by the scatter of ends."""
-    recording = find_recordings(write_fit_tables(tmp_path / 'data', count=1, hz=30.0))['r0']
+    recording = find_recordings(write_fit_tables(tmp_path / 'data', count=1))['r0']
     given = {'foc.process_noise': 0.5, 'foc.endpoint_stddev': 0.02, 'duration.spread': 0.3}
     config = replace_values(SEARCH_CONFIG, {**given, 'covariance.adaptation': 'none'})
     observed = observe(recording, config).observations
@@ -312,10 +299,10 @@ CANDIDATES = replace(TWO_CLASSES, covariance=KNOWN, plans=np.stack([KNOWN, *(KNO
 def _make_recordings(endpoint, spread):
     """Return twelve recordings of eight movements of 1 s each, with scattered ends and durations."""
     draws = np.random.default_rng(3)
-    moved = [
-        np.outer(TO_GOAL, draws.normal(0.0, endpoint, 2)) - draws.normal(0.0, spread) * LATE + draws.normal(0.0, 1e-4, (H, 2))
-        for _ in range(96)
-    ]
+    moved = []
+    for _ in range(96):
+        end, late = np.outer(TO_GOAL, draws.normal(0.0, endpoint, 2)), draws.normal(0.0, spread) * LATE
+        moved.append(end - late + draws.normal(0.0, 1e-4, LATE.shape))
     observed = [observation(CANDIDATES, positions=each) for each in moved]
     return [recorded(*observed[8 * number : 8 * number + 8], name=str(number)) for number in range(12)]
 

@@ -151,7 +151,7 @@ def inputs(types):
     )
 
 
-FEW = 16
+FEW = 8
 LONGEST_S = 10.0
 """Time of the processor for one command: other programs may keep it waiting for longer."""
 GIVEN = messages(seconds=0.3)

@@ -11,13 +11,7 @@ from hypothesis import strategies as st
 
 from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles, tabulate_edges
-from foc_ros.core.obstacles.geometry import (
-    SMALLEST_DISTANCE,
-    find_limits,
-    find_offset,
-    measure_offsets,
-    trace_obstacle,
-)
+from foc_ros.core.obstacles.geometry import SMALLEST_DISTANCE, find_limits, find_offset, measure_offsets, trace_obstacle
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, collect_obstacles, make_box_polygon, make_hull_polygon
 
 SEEDS = st.integers(0, 10_000)

@@ -10,11 +10,9 @@ from reach_helpers import make_predictor
 
 import foc_ros
 from foc_ros.core.config import Config
-from foc_ros.core.errors import ParameterError
-from foc_ros.core.goals import compute_straight_effort, find_common_time
+from foc_ros.core.goals import compute_straight_effort
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
-from foc_ros.core.obstacles.geometry import find_holders
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import predict
 from foc_ros.core.tracks import NO_TRACKS
@@ -58,13 +56,6 @@ def test_an_obstacle_that_moves_on_before_the_hand_is_there_is_not_the_goal(spee
             assert (np.hypot(*(found.mean[:, :2] - centre).T).min() > 0.03) == is_in_the_way
 
 
-def test_an_obstacle_is_the_goal_that_the_grown_obstacle_holds():
-    beside = np.array([[0.235, 0.0]])
-    assert find_holders(beside, CUPS).tolist() == [[False, False]]
-    assert find_holders(beside, CUPS.grow(0.01)).tolist() == [[True, False]]
-    assert not [each for each in predict_in(CUPS, beside, **{'scene.hand_radius': 0.01}).candidates if each.candidate.sides]
-
-
 def compute_goal_costs(prediction, common_s):
     """Return the costs by which goals are compared for a hand at rest, from the least costs of the movements to them."""
     straight = compute_straight_effort(np.zeros((3, 2)), prediction.goal_positions, np.full(len(prediction.goals), common_s))
@@ -96,12 +87,6 @@ def test_paths_to_a_goal_behind_obstacles_are_solved_beside_a_free_goal():
     alone, _ = solve_paths_to_last([(0.0, 0.3)])
     beside, likelihood = solve_paths_to_last([(0.3, 0.0), (0.0, 0.3)])
     assert len(alone) == 2 and beside == alone and likelihood > 0.15
-
-
-def test_the_predictor_takes_the_object_of_a_goal():
-    for given, label in ((None, 'goal0:+cup'), ('cup', 'goal0:')):
-        goal, cup = foc_ros.Goal((0.25, 0.001), object=given), foc_ros.Circle((0.2, 0.0), 0.03, name='cup')
-        assert label in [each.label for each in make_predictor(Config(budget_s=0.0), goal, cup).update(0.0, (0.0, 0.0))]
 
 
 def test_a_goal_whose_object_is_missing_is_noted_by_predictors_and_refused_elsewhere():
@@ -164,15 +149,10 @@ def reach(target, goals, share=0.6, **values):
     return found
 
 
-def test_before_the_hand_moves_the_share_is_the_parameter():
-    assert reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL])[0].other == pytest.approx(PRIOR)
-    assert all(each.other == 0.0 for each in reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL], **{'likelihood.other_goal': 0.0}))
-    with pytest.raises(ParameterError, match=r'likelihood\.other_goal: expected a number in \[0, 0\.99\]'):
-        Config().with_values({'likelihood.other_goal': 1.0})
-
-
-def test_the_share_grows_if_the_hand_goes_between_the_goals_and_falls_if_it_goes_to_one():
+def test_the_share_of_another_goal_grows_if_the_hand_goes_between_the_goals_and_falls_if_it_goes_to_one():
     missed, met = reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL]), reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL, MIDDLE])
+    assert missed[0].other == pytest.approx(PRIOR), 'the parameter'
+    assert all(each.other == 0.0 for each in reach(MIDDLE, [LEFT_GOAL, RIGHT_GOAL], **{'likelihood.other_goal': 0.0}))
     assert missed[-1].other > 2.0 * PRIOR and met[-1].other < PRIOR / 4.0
     assert max(each.other for each in met) < 1.5 * PRIOR
 
@@ -197,13 +177,6 @@ def test_a_fast_hand_that_slows_down_goes_to_the_near_goal():
     for share in (0.5, 0.6, 0.7):
         to_near, to_far = (shares_of_goals(reach(target, [near, far], share)[-1]) for target in (near, far))
         assert to_near[0] > 0.9 and to_far[1] > to_near[1]
-
-
-def test_the_common_time_is_the_shortest_one_and_at_most_what_the_speed_of_the_hand_leaves():
-    hand = HandState(0, np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0]), 1e-6 * np.eye(6), onset_ns=0, onset_position=np.zeros(2))
-    goals, times_s = np.array([[0.2, 0.0], [0.4, 0.1]]), [0.8, 1.1]
-    assert find_common_time(hand, goals, times_s) == pytest.approx(0.8)
-    assert find_common_time(hand, goals / 4.0, times_s) == 0.5
 
 
 HOME, NEAR, FAR = (0.0, 0.0), (0.2, 0.1), (0.25, -0.15)

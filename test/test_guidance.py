@@ -103,21 +103,17 @@ def test_a_force_yields_to_classes_and_goals_that_are_not_followed(share):
     assert output.force == pytest.approx([0.0, 1.0 - 2.0 * 0.8 / (1.0 + DOUBT)], abs=1e-6)
 
 
-def test_the_mode_trajectory_keeps_the_force_along_the_path():
-    newest = prediction(straight())
+def test_in_mode_path_the_force_neither_drives_nor_brakes_a_moving_hand_and_in_mode_trajectory_it_does():
+    newest, velocity = prediction(straight()), np.array([0.3, 0.2])
+    force = guide_hand(newest, (0.1, 0.01), velocity).force
+    assert np.hypot(*force) > 1.0
+    assert abs(force @ velocity) < 0.05 * np.hypot(*force) * np.hypot(*velocity)
     path, trajectory = (
         guide_hand(newest, (-0.01, 0.01), (0.001, 0.0), replace(SETTINGS, mode=mode, lookahead_s=0.1)).force
         for mode in ('path', 'trajectory')
     )
     assert path == pytest.approx([0.0, -SURE], abs=1e-6)
     assert trajectory[0] > 0.9 * SURE
-
-
-def test_in_mode_path_the_force_neither_drives_nor_brakes_a_moving_hand():
-    velocity = np.array([0.3, 0.2])
-    output = guide_hand(prediction(straight()), (0.1, 0.01), velocity)
-    assert np.hypot(*output.force) > 1.0
-    assert abs(output.force @ velocity) < 0.05 * np.hypot(*output.force) * np.hypot(*velocity)
 
 
 def test_a_hand_at_a_fork_is_left_alone():

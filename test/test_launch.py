@@ -13,7 +13,7 @@ import xml.etree.ElementTree as ET
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
-from types import ModuleType
+from unittest.mock import MagicMock
 
 import pytest
 import yaml
@@ -46,72 +46,52 @@ STARTER = (
 """What `ros2 launch` does."""
 
 
-class Recorded:
-    """In place of a class of launch: keeps what it was made with."""
-
-    def __init__(self, *given, **named):
-        self.given, self.named = given, named
-
-
-class Substitute(ModuleType):
-    """In place of a module of launch: every class of it is recorded."""
-
-    def __getattr__(self, name):
-        if name.startswith('__'):
-            raise AttributeError(name)
-        return type(name, (Recorded,), {})
-
-
 MODULES = [f'launch{part}' for part in ('', '.actions', '.launch_description_sources', '.substitutions')]
 MODULES += [f'launch_ros{part}' for part in ('', '.actions', '.parameter_descriptions')]
 
 
 @pytest.fixture
-def described(monkeypatch):
-    """Return a function that runs a launch file with substitutes for launch, and returns its names and its description."""
-    for name in MODULES:
-        monkeypatch.setitem(sys.modules, name, Substitute(name))
+def describe(monkeypatch):
+    """Return a function that runs a launch file, and returns its names; the calls of substitutes for launch are recorded."""
 
     def run(name):
+        for module in MODULES:
+            monkeypatch.setitem(sys.modules, module, MagicMock())
         names = runpy.run_path(str(ROOT / 'launch' / f'{name}.launch.py'))
-        return names, names['generate_launch_description']().given[0]
+        names['generate_launch_description']()
+        return names, sys.modules['launch.actions']
 
     return run
 
 
-def arguments(actions):
-    return {each.given[0]: each.named['default_value'] for each in actions if type(each).__name__ == 'DeclareLaunchArgument'}
+def list_arguments(actions):
+    return {each.args[0]: each.kwargs['default_value'] for each in actions.DeclareLaunchArgument.call_args_list}
 
 
-def test_every_input_and_only_known_parameters_are_arguments(described):
-    names, actions = described('foc')
-    declared = arguments(actions)
+def test_every_input_and_only_known_parameters_are_arguments(describe):
+    names, actions = describe('foc')
+    declared = list_arguments(actions)
     assert set(TYPES) <= set(declared)
     assert set(names['PARAMETERS']) <= {'autostart', *(each.name for each in list_parameters())}
-    context = type('Context', (), {'launch_configurations': declared | {'plane': 'xz', 'autostart': 'false'}})
-    (node,) = names['create_node'](context)
-    assert (node.named['package'], node.named['executable']) == ('foc_ros', 'foc_node')
-    (overrides,) = node.named['parameters']
-    found = {name: (each.given[0], each.named['value_type']) for name, each in overrides.items()}
-    assert found == {'plane': ('xz', str), 'autostart': ('false', bool)}
+    names['create_node'](MagicMock(launch_configurations=declared | {'plane': 'xz', 'autostart': 'false'}))
+    node = sys.modules['launch_ros.actions'].Node.call_args.kwargs
+    assert (node['package'], node['executable'], [*node['parameters'][-1]]) == ('foc_ros', 'foc_node', ['plane', 'autostart'])
+    values = sys.modules['launch_ros.parameter_descriptions'].ParameterValue.call_args_list
+    assert [(each.args[0], each.kwargs['value_type']) for each in values] == [('xz', str), ('false', bool)]
 
 
 @pytest.mark.parametrize('name', ['two_arms', 'foc_rviz'])
-def test_included_files_are_given_arguments_that_they_have(described, name):
-    known = arguments(described('foc')[1])
-    _, actions = described(name)
-    included = [each for each in actions if type(each).__name__ == 'IncludeLaunchDescription']
-    assert included
-    for each in included:
-        assert Path(each.given[0].given[0]) == ROOT / 'launch' / 'foc.launch.py'
-        assert {argument for argument, _ in each.named.get('launch_arguments', [])} <= set(known)
-
-
-def test_rviz_is_remapped_to_every_topic_of_its_configuration(described):
-    _, actions = described('foc_rviz')
-    remapped = {source for source, _ in actions[-1].named['remappings']}
-    lines = (ROOT / 'config' / 'foc.rviz').read_text('utf-8').splitlines()
-    assert {line.partition('Value: ')[2] for line in lines if 'Value: /' in line} == remapped
+def test_included_files_are_given_arguments_that_they_have_and_rviz_every_topic_of_its_configuration(describe, name):
+    known = list_arguments(describe('foc')[1])
+    _, actions = describe(name)
+    sources = sys.modules['launch.launch_description_sources'].PythonLaunchDescriptionSource.call_args_list
+    assert {Path(each.args[0]) for each in sources} == {ROOT / 'launch' / 'foc.launch.py'}
+    for each in actions.IncludeLaunchDescription.call_args_list:
+        assert {argument for argument, _ in each.kwargs.get('launch_arguments', [])} <= set(known)
+    if name == 'foc_rviz':
+        remapped = {source for source, _ in sys.modules['launch_ros.actions'].Node.call_args.kwargs['remappings']}
+        lines = (ROOT / 'config' / 'foc.rviz').read_text('utf-8').splitlines()
+        assert {line.partition('Value: ')[2] for line in lines if 'Value: /' in line} == remapped
 
 
 @pytest.fixture
@@ -172,6 +152,7 @@ def test_two_arms_share_the_obstacles(ros, prefix):
 
 CONFIG = ROOT / 'config'
 TOPICS = {f'/{name}': kind for name, kind in TYPES.items()} | {f'/foc/{name}': kind for name, (kind, _) in OUTPUTS.items()}
+LAYOUT = json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
 SHOWN = {name: name for name in ('MarkerArray', 'PointCloud2', 'Path', 'PoseArray')} | {'Pose': 'PoseStamped'}
 
 
@@ -187,21 +168,9 @@ def test_rviz_shows_every_output_it_can_display():
     assert cloud['Channel Name'] == 'likelihood'
 
 
-def leaves(layout):
-    if isinstance(layout, str):
-        yield layout
-    else:
-        for side in ('first', 'second'):
-            yield from leaves(layout[side])
-
-
-def read_layout():
-    return json.loads((CONFIG / 'foxglove.json').read_text('utf-8'))
-
-
 def test_foxglove_shows_topics_of_the_node_in_its_panels_in_the_size_of_a_reach():
-    layout = read_layout()
-    assert set(leaves(layout['layout'])) == set(layout['configById'])
+    layout, placed = LAYOUT, json.dumps(LAYOUT['layout'])
+    assert set(re.findall(r'"(?:first|second)": "([^"]+)"', placed)) == set(layout['configById'])
     scene = layout['configById']['3D!foc']
     assert {'/foc/prediction', '/foc/path', '/foc/markers', '/hand_pose', '/goals'} <= set(scene['topics']) <= set(TOPICS)
     assert scene['topics']['/foc/prediction']['colorField'] == 'likelihood'
@@ -213,11 +182,8 @@ def test_foxglove_shows_topics_of_the_node_in_its_panels_in_the_size_of_a_reach(
     sizes = [topics['/foc/path']['lineWidth'], topics['/hand_pose']['axisScale'], frames['axisScale']]
     sizes += topics['/goals']['arrowScale']
     assert topics['/goals']['type'] == 'arrow' and min(sizes) > 0.0 and max(sizes) <= 0.05 and not frames['showLabel']
-    assert topics['/foc/prediction']['gradient'] == [f'#{mix(UNLIKELY)}40', f'#{mix(LIKELY)}ff'], 'the colours of the markers'
-
-
-def mix(colour):
-    return bytes(round(255 * part) for part in colour).hex()
+    unlikely, likely = (bytes(round(255 * part) for part in colour).hex() for colour in (UNLIKELY, LIKELY))
+    assert topics['/foc/prediction']['gradient'] == [f'#{unlikely}40', f'#{likely}ff'], 'the colours of the markers'
 
 
 def find_values(message, path):
@@ -240,10 +206,10 @@ def test_the_plots_of_foxglove_find_the_likelihoods_of_goals_and_paths():
     expected = {goal.name: [goal.likelihood] for goal in prediction.goals} | {'unknown': [prediction.unknown]}
     expected |= {f'path {rank}': [each.likelihood] for rank, each in enumerate(order_candidates(prediction))}
     assert len(prediction.goals) == 2 and len(expected) >= 7 and prediction.unknown > 0.0
-    table = read_layout()['configById']['DiagnosticStatusPanel!classes']
+    table = LAYOUT['configById']['DiagnosticStatusPanel!classes']
     shown = [each for each in made['likelihoods_by_name'].status if each.name == table['selectedName']]
     assert [(each.hardware_id, each.values[0].key) for each in shown] == [(table['selectedHardwareId'], prediction.most_likely)]
-    plots = [panel for name, panel in read_layout()['configById'].items() if name.startswith('Plot!')]
+    plots = [panel for name, panel in LAYOUT['configById'].items() if name.startswith('Plot!')]
     lines = [line for panel in plots for line in panel['paths']]
     assert {line['label'] for line in lines} == {*(f'goal{i}' for i in range(4)), *(f'path {i}' for i in range(4)), 'unknown'}
     for line in lines:

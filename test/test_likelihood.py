@@ -86,21 +86,15 @@ def test_the_next_row_is_the_first_open_one_ahead():
     assert beyond.next_gap[0] != beyond.next_gap[4] and not beyond.woven.any()
 
 
-def test_gaps_keep_their_weight_and_share_it_evenly():
+def test_gaps_keep_their_weight_and_share_it_evenly_goals_share_that_of_their_way_and_weaving_costs_a_factor():
     decisions = Decisions(np.array([0, 1, 1, 2, 3]), np.arange(5), np.zeros(5, dtype=np.intp))
     near, p = compute_likelihoods(FIVE_COSTS, CONFIG), compute_likelihoods(FIVE_COSTS, CONFIG, decisions=decisions)
     np.testing.assert_allclose(np.bincount(decisions.next_gap, p), np.bincount(decisions.next_gap, near))
     assert p[1] == pytest.approx(p[2])
-
-
-def test_goals_of_one_way_are_compared_in_full_and_share_its_weight_however_many_they_are():
-    decisions = Decisions(np.zeros(5, dtype=np.intp), np.array([0, 0, 1, 1, 2]), np.zeros(5, dtype=np.intp))
-    p = compute_likelihoods(FIVE_COSTS, CONFIG, decisions=decisions)
-    assert p[0] / p[1] == pytest.approx((FIVE_COSTS[1] / FIVE_COSTS[0]) ** CONFIG.beta)
-    np.testing.assert_allclose(np.bincount(decisions.way, p), np.full(3, 1.0 / 3.0))
-
-
-def test_weaving_costs_a_factor():
+    goals = Decisions(np.zeros(5, dtype=np.intp), np.array([0, 0, 1, 1, 2]), np.zeros(5, dtype=np.intp))
+    p = compute_likelihoods(FIVE_COSTS, CONFIG, decisions=goals)
+    assert p[0] / p[1] == pytest.approx((FIVE_COSTS[1] / FIVE_COSTS[0]) ** CONFIG.beta), 'goals of one way are compared in full'
+    np.testing.assert_allclose(np.bincount(goals.way, p), np.full(3, 1.0 / 3.0))
     straight = Decisions(np.arange(5), np.arange(5), np.zeros(5, dtype=np.intp))
     both = straight, straight._replace(woven=np.eye(5)[3])
     p, woven = (compute_likelihoods(FIVE_COSTS, CONFIG, decisions=each) for each in both)

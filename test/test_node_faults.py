@@ -228,11 +228,9 @@ def test_an_internal_error_is_counted_and_reported_and_the_node_goes_on(ros, mon
 
 
 def test_quality_of_service_is_overridden_topic_by_topic(ros):
-    overrides = {'obstacles.subscription.depth': 3, 'foc/path.publisher.depth': 2}
-    overrides |= {'obstacle_markers.subscription.reliability': 'best_effort'}
+    overrides = {'obstacle_markers.subscription.reliability': 'best_effort', 'foc/path.publisher.depth': 2}
     bench = Bench(ros, outputs=[], **{f'qos_overrides./{name}': value for name, value in overrides.items()})
-    defaults = {'goals.subscription.depth': 10, 'foc/markers.publisher.depth': 10}
-    for name, value in (overrides | defaults).items():
+    for name, value in (overrides | {'goals.subscription.depth': 10, 'foc/markers.publisher.depth': 10}).items():
         assert bench.node.get_parameter(f'qos_overrides./{name}').value == value
     for topic, expected in (('obstacle_markers', 'BEST_EFFORT'), ('goals', 'RELIABLE')):
         (info,) = bench.player.get_subscriptions_info_by_topic(topic)

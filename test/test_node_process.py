@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node as a process, as `ros2` tools use it: it starts or prints the reason why not, answers, and stops without an error."""
 
-import os
 import signal
 import sys
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import ros_required  # noqa: F401
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from process_helpers import ROOT, Player, ended, predict_once, running
+from process_helpers import ROOT, ScenePlayer, ended, predict_once, running
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from ros_helpers import graph
@@ -54,30 +53,6 @@ def test_a_working_node_stops_without_an_error(ros, command, number):
         code, errors = ended(process, number)
     assert code == 0, errors
     assert 'Traceback' not in errors
-
-
-def test_a_node_works_with_an_rclpy_that_has_only_its_plain_executor(ros, tmp_path):
-    (tmp_path / 'sitecustomize.py').write_text("import sys\nsys.modules['rclpy.experimental.events_executor'] = None\n")
-    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', str(ROOT))])
-    with running(ros, PYTHONPATH=path) as process:
-        predict_once(ros)
-        assert ended(process)[0] == 0
-
-
-def test_a_node_says_what_it_does_and_leaves_no_files_and_no_trace_in_the_graph(ros, tmp_path):
-    watcher, remapped = ros.node('watcher'), ('--ros-args', '-r', 'hand_pose:=MTMR/measured_cp')
-    path = os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')])
-    with running(ros, *remapped, cwd=tmp_path, ROS_LOG_DIR=str(tmp_path / 'log'), PYTHONPATH=path) as process:
-        predict_once(ros, 'MTMR/measured_cp')
-        code, errors = ended(process)
-    assert code == 0
-    lines = [line.partition('[foc]: ')[2] for line in errors.splitlines() if line.startswith('[INFO]')]
-    assert lines[-2:] == [
-        'ready, waiting for /MTMR/measured_cp; /obstacles or /obstacle_markers; /goals or /goal_pose',
-        'predicting in frame world, plane xy',
-    ]
-    ros.spin_until(lambda: 'foc' not in watcher.get_node_names(), 'the end of the node in the graph', 30.0)
-    assert [each.name for each in tmp_path.iterdir()] == ['log']
 
 
 def test_a_starting_node_stops_without_an_error_at_any_moment(ros):
@@ -156,7 +131,7 @@ def test_a_node_that_is_killed_and_started_again(ros):
     ros.executor.remove_node(first)
     first.destroy_node()
     with running(ros, '--ros-args', '-p', 'rate_hz:=10.0', '-p', 'foc.steps:=20') as process:
-        player = Player(ros)
+        player = ScenePlayer(ros)
         fine = b'\x00', 'predicting'
         heard = lambda: fine in [(each.level, each.message) for each in player.statuses]  # noqa: E731
         player.play_until(heard, 'a second of predictions without a fault')

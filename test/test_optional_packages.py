@@ -122,15 +122,25 @@ sys.exit(main(arguments))
     assert json.loads(result.stdout)['summary']['predictions'] >= 10
 
 
-def test_the_node_predicts_without_them(ros, tmp_path, monkeypatch):
-    """Started as by `ros2 run` and `ros2 launch`, by a file in `lib/foc_ros`."""
+def test_the_node_needs_nothing_else_says_what_it_does_and_leaves_no_files_and_no_trace_in_the_graph(ros, tmp_path):
+    """Started as by `ros2 run` and `ros2 launch`, by a file in `lib/foc_ros`, with an rclpy that has only its plain executor."""
     from process_helpers import ended, predict_once, running
 
-    (tmp_path / 'sitecustomize.py').write_text(BLOCK.format(names=OPTIONAL))
-    monkeypatch.setenv('PYTHONPATH', os.pathsep.join([str(tmp_path), str(ROOT)]), prepend=os.pathsep)
-    command = [sys.executable, str(ROOT / 'scripts' / 'ros2_run' / 'foc_node')]
-    with running(ros, command=command) as process:
-        player = predict_once(ros)
+    (tmp_path / 'site').mkdir()
+    plain = "\nsys.modules['rclpy.experimental.events_executor'] = None\n"
+    (tmp_path / 'site' / 'sitecustomize.py').write_text(BLOCK.format(names=OPTIONAL) + plain)
+    path = os.pathsep.join([str(tmp_path / 'site'), str(ROOT), os.environ.get('PYTHONPATH', '')])
+    command = [sys.executable, str(ROOT / 'scripts' / 'ros2_run' / 'foc_node'), '--ros-args', '-r', 'hand_pose:=MTMR/measured_cp']
+    watcher, variables = ros.node('watcher'), {'ROS_LOG_DIR': str(tmp_path / 'log'), 'PYTHONPATH': path}
+    with running(ros, command=command, cwd=tmp_path, **variables) as process:
+        player = predict_once(ros, 'MTMR/measured_cp')
         code, errors = ended(process, signal.SIGINT)
     assert code == 0, errors
     assert player.predictions[0].width > 0
+    lines = [line.partition('[foc]: ')[2] for line in errors.splitlines() if line.startswith('[INFO]')]
+    assert lines[-2:] == [
+        'ready, waiting for /MTMR/measured_cp; /obstacles or /obstacle_markers; /goals or /goal_pose',
+        'predicting in frame world, plane xy',
+    ]
+    ros.spin_until(lambda: 'foc' not in watcher.get_node_names(), 'the end of the node in the graph', 30.0)
+    assert sorted(each.name for each in tmp_path.iterdir()) == ['log', 'site']

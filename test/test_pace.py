@@ -78,13 +78,6 @@ def test_an_operator_who_passes_the_goals_is_recognised():
     assert pipeline.adapted_config.duration.arrival == 'passing'
 
 
-def test_without_a_movement_nothing_changes():
-    pipeline = Pipeline(CONFIG)
-    follow(pipeline, np.zeros((200, 2)))
-    assert pipeline.learnt.pace.movements == 0 and pipeline.learnt.pace.find_best(CONFIG.duration) == ('rest', 1.0)
-    assert pipeline.adapted_config is CONFIG
-
-
 STDDEV = 0.02
 FIXED = {'duration.adaptation': 'none'}
 DISPERSION_CONFIG = replace_values(Config(), {'rate_hz': 10.0, 'foc.steps': 15, 'estimator.position_stddev': 1e-4} | FIXED)
@@ -129,7 +122,11 @@ def reach_around(pipeline):
     return follow(pipeline, AROUND, goals=GOAL, obstacles=make_obstacles([[0.15, 0.0]], 0.03, 0.001), is_predicting=True)
 
 
-def test_learning_can_be_switched_off():
+def test_without_a_movement_or_switched_off_nothing_is_learnt():
+    still = Pipeline(CONFIG)
+    follow(still, np.zeros((200, 2)))
+    assert still.learnt.pace.movements == 0 and still.learnt.pace.find_best(CONFIG.duration) == ('rest', 1.0)
+    assert still.adapted_config is CONFIG
     off = Pipeline(replace_values(CONFIG, {'duration.adaptation': 'none', 'covariance.adaptation': 'none'}))
     follow(off, reach(4.0), reach(4.0))
     reach_around(off)

@@ -137,7 +137,7 @@ CONDA = {'matplotlib-base': 'matplotlib'}
 """Packages whose names on conda-forge differ."""
 
 
-def test_pixi_names_the_package_and_installs_what_package_xml_and_setup_py_name(package_xml):
+def test_pixi_names_the_package_installs_what_package_xml_and_setup_py_name_and_has_commands_as_tasks(package_xml):
     """Python packages of conda-forge are requirements with the same bounds; all others are installed with foc_ros itself."""
     workspace, keys = PIXI['workspace'], {node.text for node in package_xml.findall('exec_depend')}
     assert all(workspace[key] == package_xml.findtext(key) for key in ('name', 'version', 'license', 'description'))
@@ -158,22 +158,17 @@ def test_pixi_names_the_package_and_installs_what_package_xml_and_setup_py_name(
         elif not name.startswith('ros-'):
             assert CONDA.get(name, name) in names
             assert bound == bounds[CONDA.get(name, name)], name
-
-
-def test_the_tasks_of_pixi_are_commands():
-    for task in PIXI['tasks'].values():
-        program, command = task.split()
-        assert program == 'foc_ros' and command in list_commands()
+    commands = [task.split() for task in PIXI['tasks'].values()]
+    assert all(program == 'foc_ros' and command in list_commands() for program, command in commands)
     launch = PIXI['feature']['rviz']['tasks']['show'].split()
     assert launch[:3] == ['ros2', 'launch', 'foc_ros'] and (ROOT / 'launch' / launch[3]).exists()
-
-
-needs_make = pytest.mark.skipif(shutil.which('make') is None, reason='make is not installed')
 
 
 @pytest.fixture
 def clone(tmp_path):
     """Return a folder with the files that `make setup` reads."""
+    if shutil.which('make') is None:
+        pytest.skip('make is not installed')
     folder = tmp_path / 'clone'
     folder.mkdir()
     for name in ('Makefile', 'setup.py', 'setup.cfg', 'pyproject.toml'):
@@ -189,17 +184,9 @@ def make(clone, *arguments, path=None):
     return subprocess.run(command, cwd=clone, env=environment, capture_output=True, text=True, timeout=100, check=False)
 
 
-def write_program(file, text):
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(f'#!/bin/sh\n{text}\n')
-    file.chmod(0o755)
-    return file
-
-
 SHIM = 'is a shim of pyenv, and no active version has it; activate one that has: pyenv shell 3.99.1'
 
 
-@needs_make
 @pytest.mark.parametrize(
     ('name', 'program', 'words'),
     [
@@ -214,20 +201,20 @@ SHIM = 'is a shim of pyenv, and no active version has it; activate one that has:
     ids=['not there', 'inactive shim of pyenv', 'old'],
 )
 def test_a_python_that_cannot_be_used_is_named_before_anything_is_made(clone, tmp_path, name, program, words):
-    write_program(tmp_path / 'shims' / 'pyenv', 'echo 3.99.1')
-    if program is not None:
-        write_program(tmp_path / 'shims' / name, program)
+    programs = {'pyenv': 'echo 3.99.1'} | ({} if program is None else {name: program})
+    (tmp_path / 'shims').mkdir()
+    for each, text in programs.items():
+        (tmp_path / 'shims' / each).write_text(f'#!/bin/sh\n{text}\n')
+        (tmp_path / 'shims' / each).chmod(0o755)
     result = make(clone, 'setup', f'PYTHON={name}', path=tmp_path / 'shims')
     assert result.returncode != 0 and f'make: {words}' in result.stderr
     assert not (clone / '.venv').exists()
 
 
-@needs_make
 def test_setup_says_what_it_does_and_linters_and_peers_are_installed_by_their_targets_only(clone):
     recipes = {target: make(clone, '--dry-run', target).stdout for target in ('setup', 'lint', 'doc', 'bench')}
-    told = re.findall(r'echo [\'"](setup: \w+)', recipes['setup'])
-    assert told == ['setup: creating', 'setup: installing', 'setup: ready']
-    assert 'setup: ready; next: make demo' in recipes['setup']
+    told = re.findall(r'echo [\'"]setup: (\w+)', recipes['setup'])
+    assert told == ['creating', 'installing', 'ready'] and 'ready; next: make demo' in recipes['setup']
     setup = 'ros,report,play,test'
     extras = {target: re.findall(r"'\.\[([\w,]+)\]'", recipe) for target, recipe in recipes.items()}
     assert extras == {'setup': [setup], 'lint': [setup, 'lint'], 'doc': [setup, 'doc'], 'bench': [setup, 'bench']}

@@ -69,32 +69,29 @@ def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(request, is_cl
     assert found == {name: failure if name in ('r3', 'r5') else square for name, square in SQUARES}
 
 
-def start_workers(tmp_path):
+def start_workers(folder):
     """Return a command that waits for two workers, and the processes of these."""
+    folder.mkdir()
     script = f"""if __name__ == '__main__':
         import worker_tasks
         from foc_ros.analysis.parallel import open_workers, run
         from foc_ros.__main__ import handle_interrupts
         with handle_interrupts(), open_workers(2):
-            list(run(worker_tasks.wait_here, [(name, {str(tmp_path)!r}) for name in 'ab']))"""
+            list(run(worker_tasks.wait_here, [(name, {str(folder)!r}) for name in 'ab']))"""
     pipes = {'stderr': subprocess.PIPE, 'text': True, 'start_new_session': True}
     process = subprocess.Popen([sys.executable, '-c', script], cwd=Path(__file__).parent, **pipes)
-    until(lambda: len(list(tmp_path.iterdir())) == 2, 'two workers')
-    return process, [int(each.name) for each in tmp_path.iterdir()]
+    until(lambda: len(list(folder.iterdir())) == 2, 'two workers')
+    return process, [int(each.name) for each in folder.iterdir()]
 
 
-def test_workers_end_with_a_parent_that_is_killed(tmp_path):
-    process, workers = start_workers(tmp_path)
-    process.kill()
-    process.communicate()
-    until(lambda: all(map(has_ended, workers)), 'the end of the workers')
-
-
-def test_an_interrupt_of_the_terminal_ends_command_and_workers(tmp_path):
-    process, workers = start_workers(tmp_path)
-    os.killpg(process.pid, signal.SIGINT)
-    _, errors = process.communicate(timeout=LIMIT_S)
-    until(lambda: all(map(has_ended, workers)), 'the end of the workers')
+def test_workers_end_with_a_parent_that_is_killed_or_interrupted_at_its_terminal(tmp_path):
+    folders = tmp_path / 'killed', tmp_path / 'interrupted'
+    (killed, orphans), (interrupted, workers) = map(start_workers, folders)
+    killed.kill()
+    killed.communicate()
+    os.killpg(interrupted.pid, signal.SIGINT)
+    _, errors = interrupted.communicate(timeout=LIMIT_S)
+    until(lambda: all(map(has_ended, orphans + workers)), 'the end of the workers')
     assert errors.rstrip().endswith('KeyboardInterrupt'), 'the traceback of the command, which its program does not print'
     assert 'Warning' not in errors and errors.count('Traceback') == 1
 

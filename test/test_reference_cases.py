@@ -171,7 +171,7 @@ def test_classes_are_as_good_as_those_of_an_independent_solver():
 def test_every_solved_candidate_is_in_the_class_of_its_label():
     config, hand = Config().with_values({'duration.fixed_s': 0.9, 'budget_s': 0.0}), HandState(0, np.zeros(6), np.zeros((6, 6)))
     found = []
-    for seed in range(3):
+    for seed in range(2):
         generator = np.random.default_rng(seed)
         obstacles = random_shapes(generator, int(generator.integers(2, 6)))
         scene = ReachingScene(hand, np.array([GOAL]), obstacles, None, None, config)
@@ -180,6 +180,6 @@ def test_every_solved_candidate_is_in_the_class_of_its_label():
             if one.has_likelihood:
                 sides = find_path_sides(one.solution.path, obstacles)
                 assert all(sides.get(name, side) == side for name, side in one.candidate.sides), f'scene {seed}, {one.label}'
-    assert len(found) > 6
+    assert len(found) > 4
     assert found.count(Status.LEFT_CLASS) <= 0.02 * len(found), found
     assert found.count(Status.SOLVED) + found.count(Status.COMPROMISED) >= 0.94 * len(found), found

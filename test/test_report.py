@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
 
 from foc_ros.analysis.replay import Step
-from foc_ros.cli.main import main
 from foc_ros.core.errors import InputError
 from foc_ros.core.scene import Scene
 from foc_ros.core.solution import Status
@@ -85,7 +84,7 @@ def test_the_report_is_a_page_without_other_files(tmp_path):
 
 def test_page_and_numbers_agree_with_the_predictions(tmp_path):
     made = samples(2)
-    expected = predictions(made)
+    expected = [widen(each) for each in predictions(made)]
     write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
     numbers, data = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8')), page_data_of(tmp_path)
     assert numbers['hand_samples'] == len(made)
@@ -101,6 +100,26 @@ def test_page_and_numbers_agree_with_the_predictions(tmp_path):
             assert shares[data['labels'][candidate['label']]] == track['share'][row - track['first']]
         assert written['candidates'][0]['end'] == pytest.approx(known.solved_candidates[0].solution.path[-1], abs=1e-6)
         assert written['unsolved'] == {'goal1:+1+post': 'eta_unreachable'}
+        check_paths(frame, known, data['labels'])
+    assert data['unknown'] == [0.25] * len(expected)
+
+
+def check_paths(frame, known, labels):
+    """Check that a frame has the paths and ellipses of a prediction, and the reason why one could not be solved."""
+    for candidate, outcome in zip(frame['candidates'], known.solved_candidates, strict=True):
+        drawn = np.cumsum([candidate['x'], candidate['y']], axis=1).T * LENGTH
+        curve = find_drawn_curve(outcome)
+        np.testing.assert_allclose(drawn, curve[select_evenly(len(curve), len(drawn))], atol=0.51e-4)
+        shown = {'motor': outcome.motor_covariance, 'total': outcome.covariance}
+        assert bool(candidate['total']) is (candidate is frame['candidates'][0])
+        for name, covariance in [each for each in shown.items() if candidate[each[0]]]:
+            spread = np.array(candidate[name])[-1, 2:4] * LENGTH
+            wanted = np.sqrt(np.linalg.eigvalsh(covariance[-1, :2, :2]))[::-1]
+            np.testing.assert_allclose(spread, wanted, atol=0.51e-4)
+    (lost,) = frame['unsolved']
+    assert labels[lost['reason']].endswith(f'remedy: {Status.ETA_UNREACHABLE.remedy}')
+    drawn = np.cumsum([lost['x'], lost['y']], axis=1).T * LENGTH
+    np.testing.assert_allclose(drawn[[0, -1]], known.candidates[-1].solution.path[[0, -1]], atol=0.51e-4)
 
 
 def test_of_a_recording_that_begins_anew_the_last_run_is_shown(tmp_path):
@@ -112,29 +131,6 @@ def test_of_a_recording_that_begins_anew_the_last_run_is_shown(tmp_path):
     numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
     assert numbers['hand_samples'] == len(made) and numbers['summary']['runs'] == '2, of which the last one is shown'
     assert [each['t_s'] for each in numbers['predictions']] == pytest.approx(np.arange(15) / 10.0)
-
-
-def test_paths_on_the_page_are_those_predicted(tmp_path):
-    made = samples()
-    expected = [widen(each) for each in predictions(made)]
-    write_report(tmp_path, 'x', build_hand_trajectory(made), [build_snapshot(each) for each in expected], {})
-    data = page_data_of(tmp_path)
-    for frame, known in zip(data['frames'], expected, strict=True):
-        for candidate, outcome in zip(frame['candidates'], known.solved_candidates, strict=True):
-            drawn = np.cumsum([candidate['x'], candidate['y']], axis=1).T * LENGTH
-            curve = find_drawn_curve(outcome)
-            np.testing.assert_allclose(drawn, curve[select_evenly(len(curve), len(drawn))], atol=0.51e-4)
-            shown = {'motor': outcome.motor_covariance, 'total': outcome.covariance}
-            assert bool(candidate['total']) is (candidate is frame['candidates'][0])
-            for name, covariance in [each for each in shown.items() if candidate[each[0]]]:
-                spread = np.array(candidate[name])[-1, 2:4] * LENGTH
-                wanted = np.sqrt(np.linalg.eigvalsh(covariance[-1, :2, :2]))[::-1]
-                np.testing.assert_allclose(spread, wanted, atol=0.51e-4)
-        (lost,) = frame['unsolved']
-        assert data['labels'][lost['reason']].endswith(f'remedy: {Status.ETA_UNREACHABLE.remedy}')
-        drawn = np.cumsum([lost['x'], lost['y']], axis=1).T * LENGTH
-        np.testing.assert_allclose(drawn[[0, -1]], known.candidates[-1].solution.path[[0, -1]], atol=0.51e-4)
-    assert data['unknown'] == [0.25] * len(expected)
 
 
 def test_a_long_recording_is_thinned_out_and_its_page_stays_below_a_megabyte_and_a_half(tmp_path):
@@ -210,34 +206,21 @@ def test_unusual_recordings_have_a_report_that_says_what_is_missing(tmp_path):
     assert 'NaN' not in text and json.loads(text)['predictions'][0]['candidates'][0]['eta'] is None
 
 
-SCENE = '{"start": [0, 0], "goal": [0.3, 0], "duration_s": 1, "steps": 10, "noise": [0.05, 0.05], "eta": 0.9, "obstacles": []}'
-
-
-def test_pictures_and_reports_are_replaced_by_the_next_ones(tmp_path):
+def test_what_foc_ros_has_made_is_replaced_and_no_other_file_is(tmp_path):
     for suffix in ('png', 'pdf', 'svg'):
         write_picture(tmp_path / f'scene.{suffix}', prediction(START_NS, np.zeros(2)))
         check_replaceable('--plot', tmp_path / f'scene.{suffix}')
     report(tmp_path)
-    report(tmp_path)
-    write_page(tmp_path, 'index.html', 'x', (), (), None)
-
-
-def test_a_picture_that_something_else_has_made_is_left_alone(tmp_path, capsys):
-    (tmp_path / 'scene.json').write_text(SCENE, 'utf-8')
-    picture = tmp_path / 'holiday.png'
-    Figure().savefig(picture)
-    before = picture.read_bytes()
-    assert main(['solve', str(tmp_path / 'scene.json'), '--plot', str(picture)]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count('\n')) == ('', 1)
-    assert '--plot: expected a new file, or one that foc_ros has made' in err
-    assert picture.read_bytes() == before
-
-
-@pytest.mark.parametrize('name', ['index.html', 'predictions.json'])
-def test_a_report_overwrites_no_other_file(tmp_path, name):
-    (tmp_path / name).write_text('mine', 'utf-8')
-    with pytest.raises(InputError, match='--report: expected a new file, or one that foc_ros has made'):
-        check_page('--report', tmp_path, *REPORT_FILES)
-    (tmp_path / name).rename(tmp_path / 'other.html')
     check_page('--report', tmp_path, *REPORT_FILES)
+    write_page(tmp_path, 'index.html', 'x', (), (), None)
+    Figure().savefig(tmp_path / 'holiday.png')
+    with pytest.raises(InputError, match='--plot: expected a new file, or one that foc_ros has made'):
+        check_replaceable('--plot', tmp_path / 'holiday.png')
+    for name in ('index.html', 'predictions.json'):
+        folder = tmp_path / name.partition('.')[0]
+        folder.mkdir()
+        (folder / 'other.html').write_text('mine', 'utf-8')
+        check_page('--report', folder, *REPORT_FILES)
+        (folder / name).write_text('mine', 'utf-8')
+        with pytest.raises(InputError, match='--report: expected a new file, or one that foc_ros has made'):
+            check_page('--report', folder, *REPORT_FILES)

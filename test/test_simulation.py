@@ -61,13 +61,13 @@ def run(folder, capsys, *options, config=QUICK):
 
 def test_without_a_force_guidance_opposes_nothing(tmp_path, capsys):
     weak = QUICK.with_values({'guidance.f_max': 0.0})
-    alone, guided = run(tmp_path, capsys, '--operators', 'accurate', '--trials', '1', config=weak)
+    alone, guided = run(tmp_path, capsys, '--operators', 'accurate', '--trials', '1', '--workers', '1', config=weak)
     assert alone['opposing_share'] == guided['opposing_share'] == 0.0
     assert alone['completion_s'] == guided['completion_s'] and alone['path_m'] == guided['path_m']
 
 
 def test_the_hand_of_an_operator_is_as_large_as_the_parameters_say(tmp_path, capsys):
-    options = ['--operators', 'accurate', '--assistance', 'none', '--trials', '5']
+    options = ['--operators', 'accurate', '--assistance', 'none', '--trials', '5', '--workers', '1']
     configs = [QUICK.with_values({'scene.hand_radius': radius}) for radius in (0.0, 0.012)]
     (small,), (large,) = (run(tmp_path, capsys, *options, config=each) for each in configs)
     assert large['path_m'] > small['path_m'] + 0.005, 'a larger hand makes larger detours'
@@ -109,16 +109,13 @@ def test_the_command_prints_equal_cells_whatever_the_workers_and_writes_a_report
     assert page.count('<figure>') == 1 and 'foc' in page
 
 
-def test_recorded_paths_are_intended_paths(tmp_path, capsys):
-    write_tables(tmp_path, {'a': reach(0.05, (0.3, 0.0))}, [(0.3, 0.0), (0.3, 0.2)], [(0.15, 0.0, 0.02)])
+def test_recorded_paths_are_intended_paths_and_one_that_comes_back_arrives_at_its_end(tmp_path, capsys):
+    """The second one among no obstacles, which have no clearance."""
+    past = write_tables(tmp_path / 'past', {'a': reach(0.05, (0.3, 0.0))}, [(0.3, 0.0), (0.3, 0.2)], [(0.15, 0.0, 0.02)])
     options = ['--operators', 'human_paths', '--assistance', 'none', '--trials', '1', '--workers', '1']
-    (cell,) = run(tmp_path, capsys, *options, '--recordings', str(tmp_path))
+    (cell,) = run(tmp_path, capsys, *options, '--recordings', str(past))
     assert cell['collision_rate'] == 0.0
     assert cell['min_clearance_m'] == pytest.approx(0.03, abs=0.01)
-
-
-def test_a_movement_that_comes_back_arrives_at_its_end(tmp_path, capsys):
-    """Among no obstacles, which have no clearance."""
     t, there = reach(0.05, (0.3, 0.0))
     back = np.concatenate([t, t + t[-1] + t[1]]), np.concatenate([there, there[::-1]])
     write_tables(tmp_path, {'a': back}, [(0.3, 0.0), (0.0, 0.0)])

@@ -49,6 +49,9 @@ def test_json_has_the_promised_names(tmp_path, capsys):
         assert 0.9 - 0.05 < each['mc_path'] <= each['mc_step'] <= 1
     assert [each['sides'] for each in found] == [{'0': 'right'}, {'0': 'left'}]
     assert sum(each['likelihood'] for each in found) == pytest.approx(1) and found[0]['likelihood'] > found[1]['likelihood']
+    kinds = [{'bound': bound, 'risk': risk} for bound, risk in (('gaussian', 'step'), ('cantelli', 'step'), ('gaussian', 'path'))]
+    efforts = [candidates(tmp_path, capsys, {**SCENE, **each})[0]['effort'] for each in kinds]
+    assert efforts[0] < efforts[1] and efforts[0] < efforts[2], 'bound and risk say what eta means'
 
 
 @pytest.mark.parametrize(('duration_s', 'steps'), [(1.0, 30), (0.4, 50)])
@@ -134,12 +137,6 @@ def test_json_describes_the_whole_solution(tmp_path, capsys):
         assert each['eta_reachable'] is None and each['violation'] == 0 and each['violation_at'] is None
         assert each['rows'] and all(row['multiplier'] > 0 and row['tau'] == each['tau'] for row in each['rows'])
         assert min(abs(each['eta_at']['step'] - row['step']) for row in each['rows']) < 0.5
-
-
-def test_bound_and_risk_of_a_scene_say_what_eta_means(tmp_path, capsys):
-    kinds = [{'bound': bound, 'risk': risk} for bound, risk in (('gaussian', 'step'), ('cantelli', 'step'), ('gaussian', 'path'))]
-    efforts = [candidates(tmp_path, capsys, {**SCENE, **each})[0]['effort'] for each in kinds]
-    assert efforts[0] < efforts[1] and efforts[0] < efforts[2]
 
 
 def test_json_of_an_unsolved_candidate_holds_what_was_reached(tmp_path, capsys):

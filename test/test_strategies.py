@@ -9,28 +9,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from reach_helpers import (
-    bowed,
-    case_guess,
-    case_problem,
-    one_obstacle,
-    random_reach,
-    random_scene,
-    reach,
-    reference_cases,
-    solved,
-)
+from reach_helpers import bowed, one_obstacle, random_reach, random_scene, reach, solved
+from scipy.interpolate import CubicHermiteSpline
 
 import foc_ros
 from foc_ros.core.config import Config, FocConfig
-from foc_ros.core.errors import SceneError
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.risk import eta_of_k
 from foc_ros.core.obstacles.shapes import collect_obstacles
-from foc_ros.core.ocp.problem import rest_to_goal
 from foc_ros.core.ocp.solve import solve_problem
 from foc_ros.core.ocp.start import cold_start, warm_start
-from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.predict import predict
 from foc_ros.core.safety_preference import HARD, SafetyPreference
 from foc_ros.core.solution import Status
@@ -75,22 +63,37 @@ def test_the_message_of_an_unreachable_eta_names_the_largest_that_is_reached(str
     assert (easier.violation, easier.violation_at) == (0.0, None)
 
 
+WALL = make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03])
+
+
 @pytest.mark.parametrize('strategy', ['lv', 'hc', 'optimal', 'fixed', 'algorithm1'])
 def test_no_way_through_is_infeasible_with_a_path_to_look_at(strategy):
-    wall = make_obstacles([[0.15, 0.02], [0.15, -0.02]], [0.03, 0.03])
     held = make_obstacles([[0.3, 0.01]], [0.03])
-    for obstacles, amplitude in ((wall, 0.0), (held, 0.05)):
+    for obstacles, amplitude in ((held, 0.05), (WALL, 0.0)):
         solution = solved(reach(obstacles), bowed((0, 0), (0.3, 0), 50, amplitude), strategy)
         # these look at the steps alone, between which a mean may leap
-        leaping = {'fixed': 'between them', 'algorithm1': 'still violated'} if obstacles is wall else {}
+        leaping = {'fixed': 'between them', 'algorithm1': 'still violated'} if obstacles is WALL else {}
         assert solution.status is (Status.ITERATION_LIMIT if strategy in leaping else Status.INFEASIBLE)
         assert solution.eta == 0.0
         assert np.isfinite(solution.mean).all()
         assert leaping.get(strategy, 'no path') in solution.message
-    if strategy in ('lv', 'hc', 'optimal'):  # rows at the steps alone would let the mean leap through a gap less than nothing
+    if strategy in ('lv', 'hc', 'optimal'):
+        check_violation(solution)
+        # rows at the steps alone would let the mean leap through a gap less than nothing
         shut = make_obstacles([[0.122, 0.03], [0.122, -0.03]], [0.0305, 0.0305])
         leap = solved(reach(shut, noise=(0.0, 0.0), steps=10), bowed((0, 0), (0.3, 0), 10, 0.0), strategy)
         assert leap.status is Status.INFEASIBLE
+
+
+def check_violation(solution):
+    """Check how much a path between the two circles of the wall lacks and where: its centres are 4 cm apart, 3 to each asked."""
+    path = CubicHermiteSpline(np.arange(51), solution.path, solution.mean[:, 2:4] * solution.dt)
+    distance = np.hypot(*(path(np.arange(0, 50, 1e-3))[:, None] - WALL.centre).T)
+    asked = math.sqrt(0.03**2 + solution.tau)
+    assert solution.violation == pytest.approx((asked - distance).max(), abs=2e-3) and solution.violation > 0.005
+    identity, step = solution.violation_at
+    assert asked - np.hypot(*(path(step) - WALL.centre[WALL.ids.index(identity)])) == pytest.approx(solution.violation, abs=1e-9)
+    assert float(re.search(r'by up to (\S+) m', solution.message)[1]) == pytest.approx(solution.violation, rel=1e-2)
 
 
 @pytest.mark.parametrize('strategy', ['lv', 'optimal'])
@@ -153,21 +156,6 @@ def test_however_few_the_steps_there_is_an_answer(strategy, steps):
     assert solution.mean.shape == (steps + 1, 6)
     assert np.isfinite(solution.mean).all()
     assert np.isfinite(solution.covariance).all()
-
-
-@pytest.mark.parametrize(
-    ('field', 'values'),
-    [
-        ('start', {'initial_mean': np.full(6, np.nan)}),
-        ('goal', {'goal_position': np.array([np.inf, 0.0])}),
-        ('noise', {'noise': np.array([0.1, np.nan])}),
-        ('start covariance', {'initial_covariance': np.full((6, 6), np.inf)}),
-    ],
-)
-def test_a_problem_that_is_not_finite_is_refused_by_name(field, values):
-    given = {'initial_mean': np.zeros(6), 'goal_position': np.array([0.3, 0.0]), 'noise': np.array([0.1, 0.1])}
-    with pytest.raises(SceneError, match=f'{field}: expected finite numbers'):
-        rest_to_goal(build_triple_integrator_horizon(0.02, 50), obstacles=make_obstacles(), eta=0.9, **(given | values))
 
 
 SEEDS = (1, 4, 9)  # in others a gap is so narrow that the wanted k is out of reach
@@ -248,21 +236,20 @@ def test_lambda_beyond_what_numbers_hold_is_said():
 
 def test_what_it_calls_solved_meets_eta_and_lambda_is_a_power_of_the_growth():
     met = 0
-    for seed in range(12):
+    for seed in range(6):
         problem, guess = dense(seed)
         solution = solved(problem, guess, 'algorithm1')
         assert solution.lam == pytest.approx(10.0 ** round(solution.tau / 5e-5), rel=1e-9)
         if solution.status is Status.SOLVED:
             assert solution.eta >= problem.eta
             met += 1
-    assert met >= 8, 'of the other four, two are out of reach of `optimal` too, and two are stepped over'
+    assert met >= 4, 'the others are out of reach of `optimal` too, or stepped over'
 
 
 @EVERY
-@pytest.mark.parametrize('case', reference_cases()[:1])
-def test_effort_does_not_fall_with_eta(case, strategy):
-    etas = np.linspace(0.5, 0.95, 12 if strategy == 'optimal' else 6)
-    solutions = [solved(case_problem(case, float(eta)), case_guess(case), strategy) for eta in etas]
+def test_effort_does_not_fall_with_eta(strategy):
+    etas = np.linspace(0.5, 0.95, 10 if strategy == 'optimal' else 4)
+    solutions = [solved(one_obstacle(float(eta)), BOWED, strategy) for eta in etas]
     reached = [each.status is Status.SOLVED for each in solutions]
     assert reached == sorted(reached, reverse=True), 'an unreachable eta is below a reachable one'
     assert sum(reached) >= 0.75 * len(etas)
@@ -304,11 +291,11 @@ def measure_jump(one, other):
     ids=['eta before a box', 'start before a gap'],
 )
 def test_effort_and_likelihood_have_no_jumps(find, low, high):
-    """Of 25 points, no two neighbours differ by more than 3 %, unless bisection shrinks the difference.
+    """Of 17 points, no two neighbours differ by more than 3 %, unless bisection shrinks the difference.
 
     Other sweeps take long, or have points at which a class does not settle, or in another minimum.
     """
-    values = np.linspace(low, high, 25).tolist()
+    values = np.linspace(low, high, 17).tolist()
     answers = [find(value) for value in values]
     for (left, right), (one, other) in zip(pairwise(values), pairwise(answers), strict=True):
         for _ in range(6):

@@ -243,22 +243,13 @@ def test_every_class_has_a_likelihood_whenever_the_time_ends(name):
             unsettled = each.status in (Status.DEADLINE, Status.ESTIMATED)
             assert unsettled or each.solution.safety_factor >= 3.0 - 1e-4, 'solved at once'
             assert each.likelihood > 0.0 and np.isfinite(each.cost)
-            assert each.status is Status.SOLVED or 'estimated' in each.solution.message
+            assert each.solution.message.count('estimated') == (each.status is not Status.SOLVED)
+            assert shares[each.label] > 0.3 * expected[each.label] or expected[each.label] < 0.05, 'no class becomes unlikely'
         assert late.notes.get('unfinished', 0) == sum(each.status is Status.DEADLINE for each in late.candidates)
         if not late.notes.get('unfinished'):
             assert shares == pytest.approx(expected, abs=1e-9)
             break
     assert 1 < steps < 39
-
-
-@pytest.mark.parametrize('name', SCENES)
-def test_with_time_for_one_step_no_class_of_a_guess_becomes_unlikely(name):
-    expected = find_shares(predicted(0, NO_TRACKS, obstacles=SCENES[name])[0])
-    prediction = predicted(0, NO_TRACKS, Counted(0), SCENES[name])[0]
-    found = find_shares(prediction)
-    assert found.keys() == expected.keys()
-    assert all(each.solution.message.count('estimated') == 1 for each in prediction.candidates)
-    assert all(found[label] > 0.3 * share for label, share in expected.items() if share > 0.05), (found, expected)
 
 
 def test_what_is_not_settled_goes_on_in_the_next_prediction():
@@ -317,9 +308,6 @@ def test_a_strategy_stops_at_its_deadline_with_the_best_so_far(strategy):
         assert np.isfinite(late.mean).all()
         assert late.expected_effort <= late.effort
         assert late.qp_solves < free.qp_solves
-    ample = solve_problem(problem, start, settings, Deadline(1e3))
-    assert ample.status is free.status is Status.SOLVED
-    np.testing.assert_array_equal(ample.mean, free.mean)
 
 
 TICKS = {'optimal': 1000, 'lv': 120, 'hc': 120}
