@@ -25,7 +25,7 @@ from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import FocError, InputError
 from foc_ros.core.prediction import Prediction
-from foc_ros.core.solution import LEFT, RIGHT
+from foc_ros.core.solution import LEFT, RIGHT, Status
 from foc_ros.core.types import NANOSECONDS
 from foc_ros.io.bags import Item
 from foc_ros.reporting.live_text import show_live
@@ -115,6 +115,8 @@ def test_on_a_terminal_a_table_is_shown():
 
 def test_names_that_differ_at_their_end_alone_are_told_apart_on_a_terminal():
     made = make(0)
+    compromised = replace(made.candidates[0].solution, status=Status.COMPROMISED)
+    made = replace(made, candidates=(replace(made.candidates[0], solution=compromised), *made.candidates[1:]))
     names = ('right of 1, right of 2, left of 3, right of 4', 'right of 1, right of 2, left of 3, left of 4')
     sides = [tuple((name[-1], LEFT if 'left' in name else RIGHT) for name in words.split(', ')) for words in names]
     changed = [
@@ -124,6 +126,7 @@ def test_names_that_differ_at_their_end_alone_are_told_apart_on_a_terminal():
     recorder.snapshots[-1] = replace(build_snapshot(made), candidates=tuple(changed))
     text = shown(recorder, True, np.array([0.2]))
     assert all(f'goal0: {words}' in text for words in names)
+    assert '0.90*' in text and '* not known to keep the wanted eta' in text
 
 
 @pytest.mark.parametrize('terminal', [False, True])

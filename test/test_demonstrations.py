@@ -213,6 +213,7 @@ def test_a_path_approaches_the_recordings_with_their_number():
         distances.append(np.hypot(*(taken.mean[:, :2] - recorded).T).mean())
         stddevs.append(np.sqrt(taken.covariance[1:, 0, 0]).mean())
         assert np.linalg.eigvalsh(taken.covariance).min() > -1e-9
+        assert np.hypot(*(taken.mean[-1, :2] - GOAL[0])) < 1e-6, 'where the recordings are slower than the plan, too'
     assert (np.diff(distances) < 0.0).all() and distances[-1] < 0.1 * distances[0]
     assert (np.diff(stddevs) < 0.0).all()
 

@@ -69,7 +69,7 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
 def _make_table(snapshot: Prediction, title: str) -> Table:
     table = Table(title=title, title_justify='left', caption_justify='left', box=SIMPLE_HEAD, padding=(0, 0))
     table.caption = '* not known to keep the wanted eta: compromised, or estimated'
-    for name, width in (('candidate', 53), ('', 4), ('likely', 6), ('cost', 6), ('eta', 5)):
+    for name, width in (('candidate', 54), ('', 3), ('likely', 6), ('cost', 6), ('eta', 5)):
         table.add_column(name, width=width, no_wrap=True, justify='right' if width < 10 else 'left')
     shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
     for letter, each, ratio in zip(ascii_uppercase[:ROWS], shown, compute_cost_ratios(shown), strict=False):

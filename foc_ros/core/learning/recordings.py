@@ -251,7 +251,7 @@ def compare_with_class(
 def follow_recordings(library: Library, evidence: Evidence, until_s: Array, hand: HandState, times: Array) -> tuple[Array, Array]:
     """Return where recordings lead the hand at times (m,) [s] from now, (e, m, 2) [m], and their weights (e, m).
 
-    They have a weight up to until_s (e,) [s], and before the last time. Paths are linear between states, and stay at the last one.
+    They have a weight up to until_s (e,) [s] and before the last time. Paths are linear between states, and stay at the last one.
     """
     row, ends = evidence.row[:, None], library.ends[evidence.row]
     at = np.minimum(evidence.state[:, None] + times / STEP_S, ends[:, None])
