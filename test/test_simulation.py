@@ -106,7 +106,7 @@ def test_the_command_prints_equal_cells_whatever_the_workers_and_writes_a_report
         assert cell['completion_s_interval'][0] <= cell['completion_s'] <= cell['completion_s_interval'][1]
     assert (cells[0]['effort_difference'], cells[0]['wrong_way_s']) == (0.0, None)
     page = (tmp_path / 'simulation.html').read_text('utf-8')
-    assert page.count('<figure>') == 1 and 'foc' in page
+    assert page.count('<figure>') == 4 and 'foc' in page
 
 
 def test_recorded_paths_are_intended_paths_and_one_that_comes_back_arrives_at_its_end(tmp_path, capsys):
