@@ -104,8 +104,8 @@ class Predictor:
                     continue
                 sent_s, role, message = given
                 self._take(role, message)
-                # not from a pose that has waited for the last prediction: the page sends the next one within a frame, and the
-                # prediction from that one is seen hardly later, and sooner after its pose
+                # A pose that has waited for the last prediction is skipped: the page sends the next one within a frame. The
+                # prediction from that pose is seen hardly later, and shows a younger hand.
                 if self._queue.empty() and sent_s >= self._ended_s:
                     self._predict()
             except Exception as error:

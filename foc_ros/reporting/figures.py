@@ -108,8 +108,9 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
     width_in = figure.get_figwidth() * place.width
     columns, sign_columns = (40, 1) if width_in < 3.5 else (COLUMNS, 2)
-    named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+    handles, labels = axes.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))
+    for handle, label in zip(handles, labels, strict=True):
         if named[label] is not handle:
             handle.set_label('_nolegend_')  # a legend that the user adds has each sign once, too
     candidates = sorted((label for label in named if named[label].get_gid()), key=lambda label: (named[label].get_gid(), label))

@@ -203,7 +203,7 @@ function nameRecordButton() {
 function showJob() {
   if (!job) return;
   const seconds = Math.floor((performance.now() - job.begunMs) / 1000);
-  const text = `${job.name}: ${job.text}, for ${seconds} s${job.name === 'report' ? '' : ' so far, it takes some minutes'}; you can go on playing`;
+  const text = `${job.name}: ${job.text}, for ${seconds} s;${job.name === 'report' ? '' : ' this takes some minutes, and'} you can go on playing`;
   if (byId('job').textContent !== text) byId('job').textContent = text;
   const [, done, whole] = job.text.match(/(\d+) of (\d+)/) || [];
   if (whole) [byId('progress').max, byId('progress').value] = [Number(whole), Number(done)];
