@@ -65,16 +65,21 @@ def solve_candidates(
 
 
 def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier: Sequence[Solution | None]) -> list[Start]:
-    """Return the earlier solution of each candidate as its start, or its guess where that passes an obstacle on another side."""
+    """Return the earlier solution of each candidate as its start, or its guess where that passes an obstacle on another side.
+
+    Where the earlier solution was not settled, the start has both.
+    """
     starts = [
         cold_start(each.guess) if solution is None else warm_start(solution, problem)
         for each, problem, solution in zip(candidates, problems, earlier, strict=True)
     ]
     sides = find_all_sides([each.path for each in starts], problems)
-    return [
-        start if each.contains(found) else cold_start(each.guess)
-        for each, start, found in zip(candidates, starts, sides, strict=True)
-    ]
+    chosen = []
+    for each, start, solution, found in zip(candidates, starts, earlier, sides, strict=True):
+        is_unsettled = solution is not None and solution.status.is_estimate
+        begun = replace(start, guess=each.guess) if is_unsettled else start
+        chosen.append(begun if each.contains(found) else cold_start(each.guess))
+    return chosen
 
 
 def find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list[dict[str, int]]:
@@ -165,7 +170,8 @@ def _has_path(candidate: PredictedCandidate, obstacles: Obstacles) -> bool:
     solution = candidate.solution
     if candidate.status is not Status.INFEASIBLE:
         return True
-    return measure_clearance(candidate.candidate.guess, obstacles, solution.dt) >= 0.0
+    # at the steps: the lines between them cut corners
+    return measure_clearance(candidate.candidate.guess, obstacles, solution.dt, parts=1) >= 0.0
 
 
 def _estimate(candidate: PredictedCandidate, known: PredictedCandidate) -> PredictedCandidate:

@@ -27,9 +27,12 @@ GRAZE_M = 1e-3
 """Depth up to which a path within an obstacle counts as one along its boundary [m]."""
 
 
-def measure_clearance(path: Array, obstacles: Obstacles, dt: float) -> float:
-    """Return the smallest distance [m] of a path (N + 1, 2) [m] from obstacles, negative inside; dt: the time step [s]."""
-    return float(_measure_distances(path, obstacles, dt).min(initial=np.inf))
+def measure_clearance(path: Array, obstacles: Obstacles, dt: float, parts: int = FINER) -> float:
+    """Return the smallest distance [m] of a path (N + 1, 2) [m] from obstacles, negative inside.
+
+    dt: the time step [s]; parts: number of parts of a step at whose ends the distance is measured.
+    """
+    return float(_measure_distances(path, obstacles, dt, parts).min(initial=np.inf))
 
 
 def is_free(path: Array, obstacles: Obstacles, dt: float) -> bool:
@@ -55,12 +58,12 @@ def _is_blocked(distances: Array) -> NDArray[np.bool_]:
     return np.asarray(is_between.any(axis=-1))
 
 
-def _measure_distances(path: Array, obstacles: Obstacles, dt: float) -> Array:
+def _measure_distances(path: Array, obstacles: Obstacles, dt: float, parts: int = FINER) -> Array:
     """Return the distances (m, n) [m] of points along a path from obstacles that move on meanwhile, negative inside."""
     steps = len(path) - 1
-    at = np.linspace(0.0, steps, FINER * steps + 1)
+    at = np.linspace(0.0, steps, parts * steps + 1)
     points = np.column_stack([np.interp(at, np.arange(steps + 1), axis) for axis in path.T])
-    centres = centre_trajectories(obstacles.centre, dt / FINER * obstacles.velocity, FINER * steps)
+    centres = centre_trajectories(obstacles.centre, dt / parts * obstacles.velocity, parts * steps)
     distances: Array = measure_offsets(points, obstacles, centres)[1] - obstacles.radius
     return distances
 

@@ -18,7 +18,7 @@ from .margin import Contacts, Margins
 from .minima import find_minima
 from .problem import Problem
 from .solver import LARGEST_RATE, MOST_ITERATIONS, Solver
-from .start import Start, follow
+from .start import Start, cold_start, follow
 
 TOUCHING, TOUCHING_NEAR = 1e-3, 0.05
 """Distance that the mean lacks, relative to the scene, up to which a class has a path, and within which it is looked for."""
@@ -26,6 +26,11 @@ BETWEEN = 0.3
 """Part of the least radius by which a mean that is held off at the steps alone may enter an obstacle between them."""
 LEAP = 2.0
 """Angle by which the direction of an obstacle turns between two points of the grid if the mean leaps over it [rad]."""
+TIGHTNESS, HELD_OFF = (1e-4, 1e-2, 1.0, 1e2, 1e4), 0.5
+"""How tightly a guess is followed: as the first of these with which the path stays in its class, and farther from the polygons
+than this part of the radii. Tightly followed, a guess takes an effort, and so has a variance, that makes margins meaningless."""
+UNSETTLED_EFFORT = 3.0
+"""Effort relative to that of following a guess beyond which an unsettled solution is no start: from there, the way is longer."""
 
 
 @dataclass
@@ -112,7 +117,9 @@ def solve_at(
     rate = np.array(rates) if is_chance else np.ones(len(problems))
     solver = Solver(margins, wanted, rate, lam, goes_on=deadline.goes_on and is_chance)
     if before is None:
-        control, contacts, multipliers, k, angles = _stack_starts(solver, problems, starts)
+        control, starts, angles = _begin(margins, problems, starts)
+        contacts, multipliers = _stack_forces(starts)
+        k = np.array([each.safety_factor for each in starts])
     else:
         last = before.now
         control, k, angles = last.control.copy(), last.k.copy(), last.angles
@@ -123,30 +130,42 @@ def solve_at(
     return Point(solver, now, now.at.factor)
 
 
-def _stack_starts(
-    solver: Solver, problems: Sequence[Problem], starts: Sequence[Start]
-) -> tuple[Array, Contacts, Array, Array, Array]:
-    """Return controls (b, 2N), contacts, their multipliers (q,), safety factors (b,), and swept angles (b, m) of the classes."""
-    margins = solver.margins
-    rows = np.arange(len(problems))
-    paths = np.stack([each.path for each in starts])
-    angles = margins.sweep_steps(paths)
-    controls = []
+def _begin(margins: Margins, problems: Sequence[Problem], starts: Sequence[Start]) -> tuple[Array, list[Start], Array]:
+    """Return the controls (b, 2N) at which the search begins, with their starts, and the swept angles (b, m) of the classes."""
+    angles, controls, begun = margins.sweep_steps(np.stack([each.path for each in starts])), list[Array](), list[Start]()
     for row, (problem, start) in enumerate(zip(problems, starts, strict=True)):
-        if start.control is not None:
-            controls.append(start.control * problem.horizon.gain)
-            continue
-        for tightness in (1.0, 1e2, 1e4):
-            # a path that is followed too tightly has an effort, and so a variance, that makes its margins meaningless
-            weight = problem.horizon.position_response.smoothing / tightness
-            control = follow(problem, 1.0 + np.arange(margins.steps), start.path[1:], weight)
-            one = rows[[row]]
-            swept = margins.sweep(one, margins.find_path(margins.move(one, control[None])))
-            if (np.abs(swept - angles[row]) < np.pi).all():
-                break
-        controls.append(control)
+        earlier = None if start.control is None else start.control * problem.horizon.gain
+        guess = start.path if earlier is None else start.guess
+        followed = None if guess is None else _follow_guess(margins, problem, guess, row, angles[row])
+        if earlier is not None and (followed is None or earlier @ earlier <= UNSETTLED_EFFORT * (followed @ followed)):
+            controls.append(earlier)
+            begun.append(start)
+        elif guess is not None and followed is not None:
+            controls.append(followed)
+            begun.append(cold_start(guess))
+    return np.stack(controls), begun, angles
+
+
+def _follow_guess(margins: Margins, problem: Problem, guess: Array, row: int, angles: Array) -> Array:
+    """Return the control (2N,) that follows a guess (N + 1, 2) no more tightly than it takes to stay in its class.
+
+    angles (m,): those that it sweeps. A path that enters a polygon may be nearest to an edge on the wrong side of it.
+    """
+    control, one = np.zeros(0), np.array([row])
+    least = HELD_OFF * np.sqrt(margins.reach_square[row])[:, None]
+    for tightness in TIGHTNESS:
+        weight = problem.horizon.position_response.smoothing / tightness
+        control = follow(problem, 1.0 + np.arange(margins.steps), guess[1:], weight)
+        motion = margins.move(one, control[None])
+        swept, grid = margins.sweep(one, margins.find_path(motion)), margins.measure_grid(one, motion, np.zeros(1))
+        if (np.abs(swept - angles) < np.pi).all() and (grid.distance[0] > least).all():
+            break
+    return control
+
+
+def _stack_forces(starts: Sequence[Start]) -> tuple[Contacts, Array]:
+    """Return the contacts of starts, and their multipliers (q,)."""
     forces = [each.forces for each in starts]
-    problem_rows = np.repeat(rows, [len(each.time) for each in forces])
-    contacts = Contacts(problem_rows, *(np.concatenate([each[i] for each in forces]) for i in (0, 1)))
-    multipliers = np.concatenate([each.multiplier for each in forces])
-    return np.stack(controls), contacts, multipliers, np.array([each.safety_factor for each in starts]), angles
+    rows = np.repeat(np.arange(len(starts)), [len(each.time) for each in forces])
+    contacts = Contacts(rows, *(np.concatenate([each[i] for each in forces]) for i in (0, 1)))
+    return contacts, np.concatenate([each.multiplier for each in forces])

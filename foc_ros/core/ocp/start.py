@@ -25,7 +25,7 @@ multiplied by T, and that of the acceleration by T^2."""
 TRIED, PARTS = 0.5, 4
 """The hand is looked for on this first part of an earlier movement, at so many points of each step."""
 JITTER = 1e-13
-"""Softness of the goal: its rows, of unit length, may depend on each other."""
+"""Softness of the goal and of places, relative to the squares of their rows, which may depend on each other."""
 
 
 class Forces(NamedTuple):
@@ -44,7 +44,8 @@ class Start:
     """Where a strategy begins.
 
     path (N + 1, 2): positions at steps 0..N, which tell the homotopy class [m]. A start from an earlier solution also has its
-    stacked control (2N,), its contacts, its safety factor and its lambda; control and lam are None for a guess.
+    stacked control (2N,), its contacts, its safety factor and its lambda; control and lam are None for a guess. guess (N + 1, 2):
+    where the search may begin instead of an earlier solution that was not settled.
     """
 
     path: Array
@@ -52,6 +53,7 @@ class Start:
     forces: Forces = field(default=NO_FORCES)
     safety_factor: float = 0.0
     lam: float | None = None
+    guess: Array | None = None
 
 
 def cold_start(guess: Array) -> Start:
@@ -140,6 +142,7 @@ def follow(problem: Problem, times: Array, places: Array, weight: float, control
     free = interpolate_position(problem.free, horizon.dt, times * horizon.dt)
     rows = np.concatenate((goal, horizon.position_response.at(times).reshape(-1, len(control))))
     missing = np.concatenate((targets, (places - free).ravel())) - rows @ control
-    may_miss = np.concatenate((np.full(len(goal), JITTER), np.full(2 * len(times), weight)))
-    followed: Array = control + rows.T @ np.linalg.solve(rows @ rows.T + np.diag(may_miss), missing)
+    square = rows @ rows.T
+    may_miss = JITTER * square.diagonal() + np.repeat((0.0, weight), (len(goal), 2 * len(times)))
+    followed: Array = control + rows.T @ np.linalg.solve(square + np.diag(may_miss), missing)
     return followed
