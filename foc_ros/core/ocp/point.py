@@ -132,18 +132,22 @@ def solve_at(
 
 def _begin(margins: Margins, problems: Sequence[Problem], starts: Sequence[Start]) -> tuple[Array, list[Start], Array]:
     """Return the controls (b, 2N) at which the search begins, with their starts, and the swept angles (b, m) of the classes."""
-    angles, controls, begun = margins.sweep_steps(np.stack([each.path for each in starts])), list[Array](), list[Start]()
-    for row, (problem, start) in enumerate(zip(problems, starts, strict=True)):
-        earlier = None if start.control is None else start.control * problem.horizon.gain
-        guess = start.path if earlier is None else start.guess
-        followed = None if guess is None else _follow_guess(margins, problem, guess, row, angles[row])
-        if earlier is not None and (followed is None or earlier @ earlier <= UNSETTLED_EFFORT * (followed @ followed)):
-            controls.append(earlier)
-            begun.append(start)
-        elif guess is not None and followed is not None:
-            controls.append(followed)
-            begun.append(cold_start(guess))
-    return np.stack(controls), begun, angles
+    angles = margins.sweep_steps(np.stack([each.path for each in starts]))
+    chosen = [_choose(margins, *each, row, angles[row]) for row, each in enumerate(zip(problems, starts, strict=True))]
+    controls, begun = zip(*chosen, strict=True)
+    return np.stack(controls), list(begun), angles
+
+
+def _choose(margins: Margins, problem: Problem, start: Start, row: int, angles: Array) -> tuple[Array, Start]:
+    """Return the control (2N,) at which the search for one problem begins, with its start."""
+    if start.control is None:
+        return _follow_guess(margins, problem, start.path, row, angles), start
+    control: Array = start.control * problem.horizon.gain
+    if start.guess is not None:
+        followed = _follow_guess(margins, problem, start.guess, row, angles)
+        if control @ control > UNSETTLED_EFFORT * (followed @ followed):
+            return followed, cold_start(start.guess)
+    return control, start
 
 
 def _follow_guess(margins: Margins, problem: Problem, guess: Array, row: int, angles: Array) -> Array:
