@@ -16,13 +16,16 @@ from reach_helpers import make_predictor
 import foc_ros
 from foc_ros.core import candidates
 from foc_ros.core.config import Config, replace_values
+from foc_ros.core.deadline import Deadline
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.obstacles.clearance import measure_clearance
+from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import predict
 from foc_ros.core.solution import Status
 from foc_ros.core.tracks import FULL_CHANGE_S, NO_TRACKS
-from foc_ros.core.types import HandState
+from foc_ros.core.types import HandSample, HandState
 from foc_ros.io.json_output import encode_prediction
+from foc_ros.play.scene import FIRST_SCENE
 from foc_ros.reporting.views import read_snapshot
 from foc_ros.ros.messages.encode_markers import encode_markers
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
@@ -190,6 +193,32 @@ def test_a_class_that_the_search_misses_keeps_its_answer_for_a_moment():
     lost = {each.label for each in whole.candidates} - {whole.most_likely}
     for tick, found in enumerate(ages, 1):
         assert found == ({label: pytest.approx(0.02 * tick) for label in lost} if tick <= 10 else {})
+
+
+@pytest.mark.parametrize('length', [0.8, 0.9, 1.2])
+@pytest.mark.parametrize('shape', ['box', 'capsule'])
+def test_both_ways_round_a_long_wall_are_found(shape, length):
+    wall = foc_ros.Capsule((0.15, -length / 2), (0.15, length / 2), 0.01)
+    found = foc_ros.solve_classes((0, 0), (0.3, 0), foc_ros.Box((0.15, 0), (0.02, length)) if shape == 'box' else wall)
+    assert [each.status for each in found] == [Status.SOLVED] * 2
+    assert all(np.abs(each.mean[:, 1]).max() < 0.75 * length for each in found)
+
+
+@pytest.mark.parametrize(('bow', 'goal', 'period'), [(-0.04, 0, 8), (-0.04, 2, 12), (0.0, 1, 4), (0.04, 0, 8), (0.06, 0, 12)])
+def test_with_time_for_one_qp_at_a_time_likely_paths_stay_near(bow, goal, period):
+    """A hand moves in a bow [m] to a goal, through obstacles too, with a prediction every so many hundredths of a second."""
+    pipeline, goals, farthest = Pipeline(Config(), is_timed=False), np.array(FIRST_SCENE.points), []
+    pipeline.set_goals(goals, '')
+    pipeline.set_obstacles('test', FIRST_SCENE.tabulate(), None, '')
+    for tick, s in enumerate(np.minimum(np.arange(150) / 80, 1.0).tolist()):
+        share = 10 * s**3 - 15 * s**4 + 6 * s**5
+        position = share * goals[goal] + [0.0, bow * np.sin(np.pi * share)]
+        pipeline.add_hand_sample(HandSample(1_000_000_000 + 10_000_000 * tick, position))
+        if tick % period == 0:
+            prediction = pipeline.predict(Deadline(0.0))
+            likely = [each for each in prediction.candidates if each.likelihood > 0.05]
+            farthest += [float(np.abs(each.mean[:, :2] - [0.15, 0.0]).max()) for each in likely]
+    assert len(farthest) > 10 and max(farthest) < 0.5
 
 
 @pytest.mark.parametrize('aside', [-0.03, 0.0, 0.06])

@@ -31,6 +31,7 @@ from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.pipeline import Pipeline
+from foc_ros.core.solution import Status
 from foc_ros.play.address import open_sockets
 from foc_ros.play.messages import LONGEST_MESSAGE, PageClock, parse_message
 from foc_ros.play.predictor import Predictor, State
@@ -322,11 +323,15 @@ def test_the_state_is_well_only_while_predictions_succeed():
         made = prediction(START_NS, np.zeros(2))
         lost = replace(made, candidates=made.candidates[-1:])
         held = replace(made, candidates=tuple(replace(each, age_s=0.1) for each in made.candidates[:3]))
+        cut = replace(made.candidates[0], solution=replace(made.candidates[0].solution, status=Status.DEADLINE))
+        late = replace(made, candidates=(cut, *made.candidates[1:]))
         for recent, level, words in (
             ([made], 'well', 'predicting'),
             ([made, lost], 'failing', 'no path to any goal can be found'),
             ([held] * 11 + [made] * 9, 'failing', 'this computer is too busy'),
             ([held] * 10 + [made] * 10, 'well', 'predicting'),
+            ([late] * 11 + [made] * 9, 'waiting', 'predicting, but this computer is busy'),
+            ([late] * 10 + [made] * 10, 'well', 'predicting'),
         ):
             predictor._recent.clear()
             predictor._recent.extend(recent)

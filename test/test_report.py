@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip('matplotlib', reason='matplotlib is not installed')
 
 from matplotlib.figure import Figure
-from report_samples import OBSTACLES, START_NS, prediction, predictions, samples, widen
+from report_samples import GOALS, OBSTACLES, START_NS, prediction, predictions, samples, widen
 
 from foc_ros.analysis.replay import Step
 from foc_ros.core.errors import InputError
@@ -21,7 +21,7 @@ from foc_ros.core.solution import Status
 from foc_ros.core.types import HandSample
 from foc_ros.io.bags import Item
 from foc_ros.io.outputs import REPORT_FILES, check_page, check_replaceable
-from foc_ros.reporting.encode import LENGTH, MOST_TIMES, select_evenly
+from foc_ros.reporting.encode import LENGTH, MOST_TIMES, compute_recording_bounds, select_evenly
 from foc_ros.reporting.figures import write_picture
 from foc_ros.reporting.page import write_page
 from foc_ros.reporting.report import ReportCollector, describe_late, write_report
@@ -58,6 +58,24 @@ def test_the_page_opens_at_a_moment_whose_paths_are_finished():
     assert choose_moment(made, START_NS - 10**8, START_NS + 4 * 10**8) in (0, 2)
     made[1] = replace(made[1], candidates=(first, second, *rest))
     assert choose_moment(made, START_NS - 10**8, START_NS + 4 * 10**8) == 1
+
+
+def test_the_first_movement_shown_is_no_way_back():
+    made = [prediction(START_NS, np.zeros(2), 0.8)]
+    out = [HandSample(START_NS, np.zeros(2)), HandSample(START_NS + 10**9, GOALS[0])]
+    back = build_hand_trajectory([replace(each, position=end.position) for each, end in zip(out, out[::-1], strict=True)])
+    assert build_hand_trajectory(out).approaches_goal(START_NS, START_NS + 10**9, made)
+    assert not back.approaches_goal(START_NS, START_NS + 10**9, made)
+    assert not build_hand_trajectory(out).approaches_goal(START_NS, START_NS + 10**9, []), 'nothing was predicted'
+
+
+def test_an_unlikely_path_does_not_widen_the_picture():
+    hand, made = build_hand_trajectory([HandSample(START_NS, np.zeros(2))]), prediction(START_NS, np.zeros(2), 0.8)
+    first = made.candidates[0]
+    wild = replace(first.solution, mean=10.0 * first.solution.mean)
+    added = [replace(first, solution=wild, likelihood=share) for share in (0.0, 0.005, 0.5)]
+    bounds = [compute_recording_bounds(hand, [replace(made, candidates=(*made.candidates, each))]) for each in added]
+    assert bounds[0] == bounds[1] and bounds[2][1] > 2.0 * bounds[0][1]
 
 
 def report(directory, reaches=1, title='A title'):

@@ -61,7 +61,7 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path):
     assert '&lt;b&gt;few&lt;/b&gt; recordings' in page and 'x.mcap: no hand' in page
     assert page.count('<img') == 1
     assert '<p class="warning">Few recordings (2)' in page and 'held out: scored on' in page
-    assert page.index('3 parameters were fitted to 2 recordings.') < page.index('<table')
+    assert page.index('Fitted to 2 recordings, 3 parameters changed.') < page.index('<table')
     assert warn_of_few(FEW, 'recordings') == []
     write_report(tmp_path, 'x', ANSWER | {'parameters': {}})
     assert '<img' not in (tmp_path / 'fit.html').read_text(encoding='utf-8'), 'without parameters there are tables only'

@@ -194,7 +194,7 @@ def convert(csv: Existing, /, *, output: Path, obstacles: Existing | None = None
     return 0
 
 
-@app.command(group=options.OTHER)
+@app.command(group=options.OTHER, show=False)
 def warm_up() -> int:
     """Do nothing any more: the command will be removed."""
     print('there is nothing to do: foc_ros compiles nothing any more')

@@ -286,7 +286,7 @@ class Config:
             if 'bound' in item.metadata or isinstance(given, cast('type', item.default_factory)):
                 continue
             if not isinstance(given, Mapping):
-                expected = f'a {item.type}, or a mapping of its parameters to their values'
+                expected = 'a mapping of its parameters to their values'
                 raise ParameterError(item.name, expected, repr(given))
             defaults = replace_values(Config(), {f'{item.name}.{name}': value for name, value in given.items()})
             vars(self)[item.name] = getattr(defaults, item.name)

@@ -43,7 +43,8 @@ class PredictedCandidate:
     """One candidate with its solution and likelihood.
 
     candidate: the homotopy class; solution: its forward optimal control; sides: side on which the mean path passes each obstacle,
-    by id. cost: effort to go times the length of a step [m^2/s^5], comparable between goals; likelihood in [0, 1]: 0 unless
+    by id. cost: effort to go times the length of a step [m^2/s^5], with several goals times a factor of each that makes goals
+    comparable (`goals`); likelihood in [0, 1]: 0 unless
     solved, compromised or estimated. age_s: 0, or how long ago the solution was found [s], of which this is the rest, if it was
     not solved now. way: a number that stays the same for as long as the class is followed, whatever its label and its rank are.
     height: the movement along the normal of the plane, None where it is not predicted: the hand then stays at its height.

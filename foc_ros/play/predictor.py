@@ -21,6 +21,7 @@ from foc_ros.core.predict import warm_up
 from foc_ros.core.prediction import Prediction
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND
+from foc_ros.reporting.views import is_late
 from foc_ros.ros.guidance import GuidanceLoop
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.encode_guidance import SampleHeader
@@ -93,6 +94,9 @@ class Predictor:
         found = [each.candidates_with_likelihood for each in recent]
         if sum(bool(paths) and all(path.age_s for path in paths) for paths in found) > 0.5 * REMEMBERED:  # no path is new
             return State('failing', 'this computer is too busy for new paths: those from before are shown; end other programs')
+        if sum(map(is_late, recent)) > 0.5 * REMEMBERED:
+            words = 'dotted paths are not finished, and their likelihoods are estimates'
+            return State('waiting', f'predicting, but this computer is busy: {words}')
         return State('well', 'predicting')
 
     def _run(self) -> None:

@@ -70,6 +70,7 @@ class Session:
             'hello',
             bounds=scene.BOUNDS,
             start=scene.START,
+            hand=self._hands[-1][1].position if self._hands else scene.START,
             target_radius=scene.TARGET_RADIUS,
             radius_stddev=scene.RADIUS_STDDEV,
             first_scene=scene.FIRST_SCENE.model_dump(),

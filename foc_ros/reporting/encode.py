@@ -22,7 +22,16 @@ from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, find_drawn_curves
 
 from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Span, compute_bounds, compute_ellipse_axes
-from .views import LIKELY, CandidateTracks, HandTrajectory, choose_moment, count_likely_paths, describe_ghosts, list_unsolved
+from .views import (
+    LIKELY,
+    NOTED,
+    CandidateTracks,
+    HandTrajectory,
+    choose_moment,
+    count_likely_paths,
+    describe_ghosts,
+    list_unsolved,
+)
 
 LENGTH, SPEED, TIME = 1e-4, 1e-3, 1e-3
 """Units [m], [m/s], [s]."""
@@ -68,6 +77,7 @@ class _ReportData:
         stops, frames = [snapshots[row] for row in rows], [self._encode_frame(row) for row in rows]
         openings = [choose_moment(stops, *span) for span in spans]
         counts = [0.0 if row is None else count_likely_paths(stops[row]) for row in openings]
+        counts = [count if hand.approaches_goal(*span, snapshots) else 0.0 for count, span in zip(counts, spans, strict=True)]
         samples = select_evenly(len(hand.stamps_ns), MOST_HAND_SAMPLES)
         return {
             'unit': {'speed': SPEED, 'time': TIME},
@@ -127,8 +137,8 @@ def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
     """Return the candidates with a likelihood, the most likely first.
 
     ghost, ghost_at: as of `describe_ghosts`; t and v: at some of the steps; motor: ellipses of the motor noise, none of a
-    candidate that is less than LIKELY; total: of the uncertainty of the most likely candidate, none if that is the same. An
-    ellipse has x, y, greater and smaller standard deviation, and the angle of the greater one [degrees].
+    candidate that is estimated or less than LIKELY; total: of the uncertainty of the most likely candidate, none if that is the
+    same. An ellipse has x, y, greater and smaller standard deviation, and the angle of the greater one [degrees].
     """
     shown, goals = snapshot.candidates_with_likelihood, len(snapshot.goal_positions)
     if not shown:
@@ -153,7 +163,7 @@ def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
             'eta': round_number(each.eta),
             'compromised': not each.is_solved,
             **{name: values[row] for name, values in columns.items()},
-            'motor': ellipses[row] if row == 0 or each.likelihood >= LIKELY else [],
+            'motor': ellipses[row] if (row == 0 or each.likelihood >= LIKELY) and not each.is_estimated else [],
             'total': _encode_ellipses(mean[0, marks, :2], each.covariance[marks, :2, :2]) if row == 0 and is_widened else [],
         }
         for row, (each, ratio, (ghost, ghost_at)) in enumerate(described)
@@ -172,11 +182,11 @@ def encode_unsolved(snapshot: Prediction, candidate: PredictedCandidate) -> dict
 
 
 def compute_recording_bounds(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> tuple[float, float, float, float]:
-    """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying paths."""
+    """Return limits of x and y [m] around the hand, all obstacles and goals, and all but outlying and unlikely paths."""
     points = [hand.positions]
     for each in snapshots:
         points += [each.goal_positions, *find_limits(each.obstacles, each.obstacles.radius_stddev)]
-    paths = [find_drawn_curve(candidate) for each in snapshots for candidate in each]
+    paths = [find_drawn_curve(candidate) for each in snapshots for candidate in each if candidate.likelihood >= NOTED]
     points += [np.percentile(np.concatenate(paths), (0.5, 99.5), axis=0)] if paths else []
     return compute_bounds(make_obstacles(), np.zeros((0, 2)), (), *points, margin=0.06)
 

@@ -62,6 +62,7 @@ FIT_WORDS = {
     'region of 90 %': 'should hold 90 % of the true positions.',
     '90 % ellipse': 'should hold 90 % of the true positions, if the hand takes the likeliest path.',
     'held out': 'scored on recordings that were left out of the fit, so that it cannot have learnt them by heart.',
+    'as given': 'the given values of what the score is about, with all else fitted.',
     '95 %': 'the interval within which the value would come out from other recordings of this kind; wide means: not well known.',
 }
 SIMULATION_WORDS = {
@@ -173,7 +174,8 @@ def write_fit(
     """
     count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
-    fitted = f'{len(answer["parameters"])} parameters were fitted to {count} recordings.'
+    changed = sum(each['value'] != each['given'] for each in (*answer['parameters'].values(), *answer['chosen'].values()))
+    fitted = f'Fitted to {count} recordings, {changed} parameters changed.'
     caption = 'Fitted values as multiples of the given ones, with 95 % intervals by bootstrap over recordings; '
     caption += 'the line is the given value.'
     drawn = {name: each for name, each in answer['parameters'].items() if each['given'] > 0.0 and each['value'] > 0.0}

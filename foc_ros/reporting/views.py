@@ -182,6 +182,15 @@ class HandTrajectory(Record):
         """Return the rows with start_ns <= stamp <= end_ns."""
         return slice(int(np.searchsorted(self.stamps_ns, start_ns)), int(np.searchsorted(self.stamps_ns, end_ns, side='right')))
 
+    def approaches_goal(self, start_ns: int, end_ns: int, snapshots: Sequence[Prediction]) -> bool:
+        """Return whether a movement ends nearer to a goal than it begins: it is no way back."""
+        goals = next((each.goal_positions for each in snapshots if start_ns <= each.stamp_ns <= end_ns), None)
+        ends = self.positions[self.between(start_ns, end_ns)][[0, -1]]
+        if goals is None or not len(goals):
+            return False
+        begin, end = np.linalg.norm(ends[:, None] - goals, axis=2).min(axis=1).tolist()
+        return bool(end < begin)
+
     def find_movements(self) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement."""
         rows = np.flatnonzero(self.speed > ONSET_SPEED)

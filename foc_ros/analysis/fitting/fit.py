@@ -212,7 +212,8 @@ def format_parameters(answer: Mapping[str, Any]) -> Rows:
     rows: Rows = []
     for name, each in answer['parameters'].items():
         given, value, low, high = (f'{number:.3g}' for number in (each['given'], each['value'], *each['interval']))
-        rows.append((name, given, value, f'{low} to {high}', each['how']))
+        found = (value, each['how']) if value != given else ('kept', f'the best of the values tried: {each["how"]}')
+        rows.append((name, given, found[0], f'{low} to {high}' if low != high else '', found[1]))
     for name, each in answer['chosen'].items():
         rows.append((name, each['given'], each['value'], '', 'predicted positions and classes'))
     for name, each in answer['undetermined'].items():
@@ -231,7 +232,7 @@ def format_comparison(answer: Mapping[str, Any]) -> Rows:
             continue
         shown = [f'{factor * value:.{digits}f}' for value in (before, after)]
         if name == 'inside_90':
-            is_better = abs(after - COVERAGE_LEVEL) < abs(before - COVERAGE_LEVEL)
+            is_better = after > before if min(before, after) < COVERAGE_LEVEL else after < before
         else:
             is_better = after < before if name.startswith(('error_m', 'nlpd')) else after > before
         rows.append((words, *shown, '' if shown[0] == shown[1] else 'better' if is_better else 'worse'))

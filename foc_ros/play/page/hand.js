@@ -42,9 +42,10 @@ export class Hand {
     addEventListener('blur', () => this.pressed.clear());
   }
 
-  // bounds: of the scene [m]; max_speed [m/s]; coupling: stiffness of the spring between pointer and hand [N/m].
+  // bounds: of the scene [m]; hand: where it was [m]; max_speed [m/s]; coupling: stiffness of the spring between pointer and hand [N/m].
   configure(settings) {
     this.settings = settings;
+    [this.target, this.followed, this.position] = [settings.hand, settings.hand, settings.hand];
   }
 
   setForce(force, now) {
