@@ -54,7 +54,7 @@ MOVEMENT, AFTER_S = 5, 0.02
 """The movement, counted from 1, and the time after its beginning [s] of the scene: early, with several candidates."""
 SHOWN_MOVEMENTS = (0, 4, 6)
 """Rows of the movements of the recording that the animation shows."""
-PICTURES, LAST_MS, STEP_MS, COLOURS, SHOWN = 18, 1200, 140, 96, 0.02
+PICTURES, LAST_MS, STEP_MS, COLOURS, SHOWN = 18, 1200, 140, 128, 0.02
 """Pictures of a movement, durations of the last and of each other picture [ms], about a third of the real speed; colours; least
 likelihood of a path that the animation shows."""
 STEPS, GOAL = 50, np.array([0.3, 0.0])
@@ -158,9 +158,12 @@ def save_animation(drawn: list[tuple[Figure, int]], file: Path) -> None:
         buffer = io.BytesIO()
         figure.savefig(buffer, format='png', dpi=96)
         images.append(Image.open(buffer).convert('RGB'))
-    every = Image.new('RGB', (images[0].width, images[0].height * len(images)))
-    for row, image in enumerate(images):
-        every.paste(image, (0, row * image.height))
+    # a strip in each colour of the paths keeps them apart in the palette, too
+    strips = [Image.new('RGB', (images[0].width, 60), colour) for colour in draw.CLASS_COLOURS]
+    every, top = Image.new('RGB', (images[0].width, sum(each.height for each in (*images, *strips)))), 0
+    for image in (*images, *strips):
+        every.paste(image, (0, top))
+        top += image.height
     palette = every.quantize(COLOURS, dither=Image.Dither.NONE)  # one for all, so that what stays the same takes no room
     first, *others = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     durations = [duration_ms for _, duration_ms in drawn]
@@ -172,9 +175,8 @@ def api() -> Figure:
     found = re.search(r'^```python\n(.*?)^```', (ROOT / 'README.md').read_text('utf-8'), re.MULTILINE | re.DOTALL)
     if found is None:
         raise ValueError('README.md shows no Python code')
-    # without a time limit the picture does not depend on how busy the computer is
-    code, names = found.group(1).replace('foc_ros.Config()', 'foc_ros.Config(budget_s=0.0)'), dict[str, object]()
-    exec(compile(code, 'README.md', 'exec'), names)
+    names = dict[str, object]()
+    exec(compile(found.group(1), 'README.md', 'exec'), names)
     axes: Any = names['axes']
     figure: Figure = axes.figure
     return figure

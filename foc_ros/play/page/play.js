@@ -282,6 +282,7 @@ function sendScene() {
 }
 
 let shownMs = 0;
+let shownLetters = '';
 function frame(time) {
   requestAnimationFrame(frame);
   if (!settings) return;
@@ -291,8 +292,10 @@ function frame(time) {
   [view.scene, view.selected] = [arranging.scene, arranging.selected];
   draw(time);
   measure(time);
-  if (time - shownMs > 250) {
-    shownMs = time;
+  // four times a second, or at once where the scene has other letters
+  const letters = view.candidates.filter(({ likelihood }) => likelihood >= NOTED).map(({ slot }) => slot).sort().join();
+  if (letters !== shownLetters || time - shownMs > 250) {
+    [shownMs, shownLetters] = [time, letters];
     showWays();
     showJob();
     const [delayMs, mostMs] = [measured.delayMs, measured.mostMs].map(Math.round);

@@ -228,7 +228,7 @@ const SIGNS = {
   compromised: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="3" stroke-dasharray="3 4"/>', 'dotted: not known to avoid the obstacles as surely as wanted'],
   ghost: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="7" opacity=".3"/>', 'pale: no proper prediction, for the reason beside it'],
   motor: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="#0072B2" fill-opacity=".3" stroke="#0072B2"/>', 'motor noise, which η is about: one standard deviation; of finished paths with at least 5 %'],
-  total: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="none" stroke="#0072B2" stroke-dasharray="4 3"/>', 'all uncertainty of the most likely path, likewise'],
+  total: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="none" stroke="#0072B2" stroke-dasharray="4 3"/>', 'all uncertainty of the leading path, likewise'],
   obstacle: ['<circle cx="14" cy="7" r="6.5" fill="var(--ring)"/><circle cx="14" cy="7" r="5" fill="var(--disc)" stroke="var(--soft)"/>', 'obstacle; ring: standard deviation of its radius'],
   goal: ['<circle cx="14" cy="7" r="6" fill="none" stroke="var(--ink)"/>', 'goal'],
 };
