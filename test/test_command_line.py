@@ -79,7 +79,7 @@ def test_help_names_every_command_and_explains_every_argument(capsys):
     assert command_line.main(['--help']) == command_line.main([]) == 0
     shown = capsys.readouterr().out
     for command in command_line.list_commands():
-        assert f' {command} ' in shown
+        assert (f' {command} ' in shown) == (command != 'warm-up'), 'a command that does nothing is not offered'
         assert command_line.main([command, '--help']) == 0
         explained = capsys.readouterr().out
         for argument in command_line.app[command].assemble_argument_collection(parse_docstring=True):
