@@ -43,6 +43,7 @@ def library(tmp_path_factory, parameters):
 def page(browser, library):
     """Open the page anew, with the hand at the start; leave it after the test, because it keeps a processor busy."""
     visit(browser, library)
+    steer(browser, (0.0, 0.0), speed=1.0)  # the hand of the page before is where it was
     click(browser, 'restore')
     yield browser
     browser.get('about:blank')
@@ -223,8 +224,10 @@ def test_everything_can_be_done_by_keys_and_survives_a_reload(page, tmp_path):
     folder = Path(text_of(page, 'session').removeprefix('Recorded to '))
     until(lambda: file.read_bytes() == (folder / 'report' / 'index.html').read_bytes(), 'all of the report')
     kept = [text_of(page, name) for name in ('score', 'session', 'job', 'result')]
+    before = page.execute_script('return play.view.hand.position')
     page.refresh()
     wait_for(page, 'globalThis.play && play.view.candidates.length > 0', 'predictions')
+    assert page.execute_script('return play.view.hand.position') == pytest.approx(before, abs=0.01), 'the hand is where it was'
     assert [text_of(page, name) for name in ('score', 'session', 'job', 'result')] == kept
     assert not page.execute_script("return document.getElementById('download').hidden")
     page.get('about:blank')
