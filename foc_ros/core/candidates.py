@@ -76,9 +76,12 @@ def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier
     sides = find_all_sides([each.path for each in starts], problems)
     chosen = []
     for each, start, solution, found in zip(candidates, starts, earlier, sides, strict=True):
-        is_unsettled = solution is not None and solution.status.is_estimate
-        begun = replace(start, guess=each.guess) if is_unsettled else start
-        chosen.append(begun if each.contains(found) else cold_start(each.guess))
+        if not each.contains(found):
+            chosen.append(cold_start(each.guess))
+        elif solution is not None and solution.status.is_estimate:
+            chosen.append(replace(start, guess=each.guess))
+        else:
+            chosen.append(start)
     return chosen
 
 

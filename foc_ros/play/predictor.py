@@ -95,7 +95,7 @@ class Predictor:
         if sum(bool(paths) and all(path.age_s for path in paths) for paths in found) > 0.5 * REMEMBERED:  # no path is new
             return State('failing', 'this computer is too busy for new paths: those from before are shown; end other programs')
         if sum(map(is_late, recent)) > 0.5 * REMEMBERED:
-            words = 'dotted paths are not finished, and their likelihoods are estimates'
+            words = 'some dotted paths are not finished, and their likelihoods are estimates'
             return State('waiting', f'predicting, but this computer is busy: {words}')
         return State('well', 'predicting')
 

@@ -76,8 +76,10 @@ class _ReportData:
         rows = select_evenly(len(snapshots), most).tolist() if snapshots else []
         stops, frames = [snapshots[row] for row in rows], [self._encode_frame(row) for row in rows]
         openings = [choose_moment(stops, *span) for span in spans]
-        counts = [0.0 if row is None else count_likely_paths(stops[row]) for row in openings]
-        counts = [count if hand.approaches_goal(*span, snapshots) else 0.0 for count, span in zip(counts, spans, strict=True)]
+        counts = [
+            0.0 if row is None or not hand.approaches_goal(*span, snapshots) else count_likely_paths(stops[row])
+            for row, span in zip(openings, spans, strict=True)
+        ]
         samples = select_evenly(len(hand.stamps_ns), MOST_HAND_SAMPLES)
         return {
             'unit': {'speed': SPEED, 'time': TIME},

@@ -62,7 +62,7 @@ FIT_WORDS = {
     'region of 90 %': 'should hold 90 % of the true positions.',
     '90 % ellipse': 'should hold 90 % of the true positions, if the hand takes the likeliest path.',
     'held out': 'scored on recordings that were left out of the fit, so that it cannot have learnt them by heart.',
-    'as given': 'the given values of what the score is about, with all else fitted.',
+    'as given': 'these parameters at their given values, and all others fitted.',
     '95 %': 'the interval within which the value would come out from other recordings of this kind; wide means: not well known.',
 }
 SIMULATION_WORDS = {

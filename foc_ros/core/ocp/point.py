@@ -30,7 +30,7 @@ TIGHTNESS, HELD_OFF = (1e-4, 1e-2, 1.0, 1e2, 1e4), 0.5
 """How tightly a guess is followed: as the first of these with which the path stays in its class, and farther from the polygons
 than this part of the radii. Tightly followed, a guess takes an effort, and so has a variance, that makes margins meaningless."""
 UNSETTLED_EFFORT = 3.0
-"""Effort relative to that of following a guess beyond which an unsettled solution is no start: from there, the way is longer."""
+"""Effort relative to that of following the guess. An unsettled solution with more is no start: it needs more iterations."""
 
 
 @dataclass
