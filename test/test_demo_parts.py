@@ -117,8 +117,8 @@ def test_names_that_differ_at_their_end_alone_are_told_apart_on_a_terminal():
     made = make(0)
     compromised = replace(made.candidates[0].solution, status=Status.COMPROMISED)
     made = replace(made, candidates=(replace(made.candidates[0], solution=compromised), *made.candidates[1:]))
-    names = ('right of 1, right of 2, left of 3, right of 4', 'right of 1, right of 2, left of 3, left of 4')
-    sides = [tuple((name[-1], LEFT if 'left' in name else RIGHT) for name in words.split(', ')) for words in names]
+    names = ('right of 1, 2, 4, left of 3', 'right of 1, 2, left of 3, 4')
+    sides = [tuple(zip('1234', (RIGHT, RIGHT, LEFT, last), strict=True)) for last in (RIGHT, LEFT)]
     changed = [
         replace(each, candidate=replace(each.candidate, sides=one)) for each, one in zip(made.candidates, sides, strict=False)
     ]

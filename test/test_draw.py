@@ -18,7 +18,7 @@ from report_samples import START_NS, prediction, widen
 
 from foc_ros import Config, replay
 from foc_ros.core.obstacle_table import make_obstacles
-from foc_ros.core.solution import Status
+from foc_ros.core.solution import LEFT, RIGHT, Status
 from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, GHOST_COLOUR, get_candidate_style
 from foc_ros.reporting.figures import make_scene_figure, plot_prediction, write_picture
 from foc_ros.reporting.views import build_snapshot
@@ -110,6 +110,18 @@ def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it():
     lost = made.candidates[-1]
     assert f'- % {lost.description}; {lost.reason}' in legend_of(axes) and lost.status.remedy in legend_of(axes)
     assert 'goal1: left of 1, right of post; leads through obstacle post' in legend_of(axes)
+
+
+def test_classes_stand_in_the_legend_in_words_also_those_past_many_obstacles():
+    made = prediction(START_NS, NOWHERE)
+    many = tuple((f'obstacle{row}', LEFT if row % 3 else RIGHT) for row in range(12))
+    few = tuple((str(row), LEFT if row % 3 else RIGHT) for row in range(9))
+    first, second, *rest = (replace(each, candidate=replace(each.candidate, sides=few)) for each in made.candidates)
+    second = replace(second, candidate=replace(second.candidate, sides=many))
+    text = legend_of(axes_of(replace(made, candidates=(first, second, *rest))))
+    assert f'{first.candidate.goal_name or "goal0"}: right of 0, 3, 6, left of 1, 2, 4, 5, 7, 8' in text
+    assert 'goal0: right of obstacle0, obstacle3, obstacle6, …' in text
+    assert not any(each.label in text for each in made.candidates)
 
 
 def test_goals_are_called_by_their_names():

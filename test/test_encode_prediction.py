@@ -186,7 +186,7 @@ def test_a_label_has_short_lines_and_parts_no_side_from_its_obstacle():
     sides = tuple((f'cup{i}', 1) for i in range(4))
     long = replace(outcome('goal0:+cup0+cup1'), candidate=Candidate('goal0:+cup0+cup1', 0, sides, PATH, 0.3))
     (text,) = [each.text for each in made('markers', prediction(long)).markers if each.ns == 'label']
-    assert text == '60 %, left of cup0,\nleft of cup1, left of cup2,\nleft of cup3'
+    assert text == '60 %, left of cup0, cup1,\ncup2, cup3'
     many = replace(long, candidate=replace(long.candidate, sides=4 * sides))
     (text,) = [each.text for each in made('markers', prediction(many)).markers if each.ns == 'label']
     assert text == '60 %, goal0:+cup0+cup1'

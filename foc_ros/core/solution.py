@@ -85,8 +85,11 @@ def label_class(goal: int, sides: Sequence[tuple[str, int]]) -> str:
 
 
 def describe_class(sides: Iterable[tuple[str, int]], goal: str = '') -> str:
-    """Return a homotopy class in words, such as `left of l1, right of l2`; goal: its name, which comes first if it is given."""
-    words = ', '.join(f'{"left" if side == LEFT else "right"} of {name}' for name, side in sides) or 'direct'
+    """Return a homotopy class in words, such as `left of l1, l3, right of l2`; goal: its name, to come first, if any."""
+    names: dict[int, list[str]] = {}
+    for name, side in sides:
+        names.setdefault(side, []).append(name)
+    words = ', '.join(f'{"left" if side == LEFT else "right"} of {", ".join(each)}' for side, each in names.items()) or 'direct'
     return f'{goal}: {words}' if goal else words
 
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from string import ascii_uppercase
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,8 @@ CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9
 GHOST_COLOUR = '#777777'
 """Colour of a ghost, and of a candidate without a letter."""
 ELLIPSES_PER_CANDIDATE = 8
+NAME_LETTERS = 60
+"""Most letters of a class in a legend."""
 NAMED_OBSTACLES = 30
 """The obstacles of larger scenes are drawn without their ids."""
 STYLE = {
@@ -100,9 +103,8 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
 
 def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
     """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
-    name = describe_candidate(candidate, goals)
-    if len(name) > 60:  # the words of a class with many obstacles would leave no room for the plot
-        name = candidate.label
+    # the words of a class with many obstacles would leave no room for the plot
+    name = shorten(describe_candidate(candidate, goals), NAME_LETTERS, placeholder=' …')
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
     found = 'estimated' if candidate.is_estimated else 'compromised'
