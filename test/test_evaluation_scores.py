@@ -146,6 +146,7 @@ def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse():
 def test_the_verdict_is_by_the_interval(interval, words):
     errors = {'likelihood-weighted': 0.04, 'most likely': 0.03, 'constant velocity': 0.05, 'straight minimum jerk': 0.0401}
     answer = {
+        'recordings': 20,
         'comparisons': {PATH_CLASS: {'uniform': {'difference': 0.2, 'interval': interval, 'worse_tenths': [1]}}},
         'positions': {
             'displacement_m': {name: {'final': {'0.5': each}} for name, each in errors.items()},
@@ -158,6 +159,23 @@ def test_the_verdict_is_by_the_interval(interval, words):
         'like straight minimum jerk (40 mm).',
         'Uncertainty: the region of 90 % holds 70 % of the true positions 0.5 s ahead, so it is too narrow.',
     ]
+
+
+@pytest.mark.parametrize(
+    ('share', 'recordings', 'words'),
+    [
+        (1.0, 2, 'may be chance with 2 recordings'),
+        (1.0, 34, 'may be chance with 34 recordings'),
+        (1.0, 35, 'too wide'),
+        (0.6, 1, 'may be chance with 1 recording.'),
+        (0.7, 20, 'too narrow'),
+        (0.86, 5, 'about right'),
+    ],
+)
+def test_a_region_is_called_too_wide_or_narrow_only_where_chance_does_not_explain_it(share, recordings, words):
+    positions = {'displacement_m': {'likelihood-weighted': {'final': {}}}, 'inside_all': {'0.9': {'0.5': share}}}
+    (sentence,) = make_verdict({'comparisons': {}, 'positions': positions, 'recordings': recordings})
+    assert words in sentence
 
 
 def test_a_summary_counts_by_tenths_which_include_their_lower_bound():

@@ -164,11 +164,24 @@ def make_verdict(answer: Mapping[str, Any]) -> list[str]:
             sentences.append(f'Positions {horizon} s ahead: {1e3 * ours:.0f} mm away on average, {", ".join(judged)}.')
     share = answer['positions']['inside_all'][f'{COVERAGE_LEVEL:g}'][COVERAGE_S]
     if share is not None:
-        is_right = abs(share - COVERAGE_LEVEL) <= 0.05
-        words = 'about right' if is_right else 'too narrow' if share < COVERAGE_LEVEL else 'too wide'
-        holds = f'holds {100 * share:.0f} % of the true positions {COVERAGE_S} s ahead, so it is {words}.'
+        words = judge_coverage(share, answer['recordings'])
+        holds = f'holds {100 * share:.0f} % of the true positions {COVERAGE_S} s ahead, {words}.'
         sentences.append(f'Uncertainty: the region of {100 * COVERAGE_LEVEL:.0f} % {holds}')
     return sentences
+
+
+def judge_coverage(share: float, recordings: int) -> str:
+    """Return whether a share of true positions is that of the region, or differs from it by more than chance does.
+
+    The positions of one recording are alike, so chance is what it would be with one position of each: within 1.96 standard
+    deviations of a binomial share, that is where the share's 95 % interval by Wilson (1927, doi:10.2307/2276774) holds the level.
+    """
+    difference = share - COVERAGE_LEVEL
+    if abs(difference) <= 0.05:
+        return 'so it is about right'
+    if abs(difference) <= 1.96 * np.sqrt(COVERAGE_LEVEL * (1.0 - COVERAGE_LEVEL) / recordings):
+        return f'which may be chance with {recordings} recording{"s" * (recordings > 1)}'
+    return f'so it is too {"narrow" if difference < 0.0 else "wide"}'
 
 
 def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
