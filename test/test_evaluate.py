@@ -88,6 +88,28 @@ def forecast_first(observation, question, confidence):
     return Forecast.from_answer(question.answers[question.given[0]], confidence, question)
 
 
+def test_a_predictor_has_one_look_in_all_charts_of_the_page_and_no_two_have_the_same(whole, tmp_path, monkeypatch):
+    from matplotlib.container import Container
+    from matplotlib.figure import Figure
+
+    from foc_ros.reporting import study_pages
+
+    looks: dict[str, set[tuple[str, str]]] = {}
+
+    def chart(size, caption, draw, *given):
+        draw(axes := Figure(size).subplots(), *given)
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            line = handle[0] if isinstance(handle, Container) else handle
+            looks.setdefault(label, set()).add((line.get_color(), line.get_linestyle()))
+        return '', caption
+
+    monkeypatch.setattr(study_pages, 'make_chart', chart)
+    study_pages.write_evaluation(tmp_path, 'x', whole)
+    assert len(looks) == len(list(BASELINES)) - 1, 'all but the uniform guess'
+    assert all(len(each) == 1 for each in looks.values())
+    assert len(set.union(*looks.values())) == len(looks)
+
+
 def test_a_baseline_from_outside_is_compared(tables, monkeypatch):
     monkeypatch.setattr(BASELINES, '_parts', dict(BASELINES._parts))
     register_baseline('first answer', forecast_first, [0.0, 0.5])

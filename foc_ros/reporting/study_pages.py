@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from foc_ros.analysis.evaluation import report as evaluation
-from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PUBLISHED, REFITTED, UNIFORM
+from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PLAIN, PUBLISHED, REFITTED, UNIFORM
 from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS
 from foc_ros.analysis.evaluation.scores import TENTHS
 from foc_ros.analysis.fitting import fit as fitting
@@ -29,7 +29,7 @@ from .draw import compute_bounds, draw_scene, get_class_style
 from .figures import make_moment_figure
 from .page import Section, explain_tables, make_chart, make_picture, write_page
 from .report import ReportCollector
-from .views import choose_moment
+from .views import COLOURS, choose_moment
 
 FEW = 20
 """Number of recordings or trials below which a page warns."""
@@ -60,7 +60,7 @@ FIT_WORDS = {
     'log-likelihood': 'the logarithm of the probability of what the hand really did. More is better.',
     'log-density': 'how probable the true positions were. More is better; of a negative log-density less is better.',
     'region of 90 %': 'should hold 90 % of the true positions.',
-    '90 % ellipse': 'should hold 90 % of the true positions, if the hand takes the likeliest path.',
+    '90 % ellipse': 'should hold 90 % of the true positions, if the hand takes the most likely path.',
     'held out': 'scored on recordings that were left out of the fit, so that it cannot have learnt them by heart.',
     'as given': 'these parameters at their given values, and all others fitted.',
     '95 %': 'the interval within which the value would come out from other recordings of this kind; wide means: not well known.',
@@ -97,7 +97,7 @@ def write_evaluation(
     pictures = []
     for name, caption in captions.items():
         if name in answer['questions']:
-            reliability = f'{name}: how often the likeliest answer is true, over its probability, {counts}.'
+            reliability = f'{caption.partition(":")[0]}: how often the likeliest answer is true, over its probability, {counts}.'
             for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
                 pictures.append(make_chart((6.4, 4.6), words, draw, name, answer['questions'][name]))
     sections = [
@@ -134,16 +134,24 @@ def summarise_evaluation(answer: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
+def _find_look(predictor: str, all_predictors: Iterable[str]) -> dict[str, Any]:
+    """Return the look of a predictor in all charts: those of this package in the first colour, each baseline in another one."""
+    ours = {PUBLISHED: '-', REFITTED: '--', PLAIN: ':'}
+    if predictor in ours:
+        return {'color': get_class_style(0)[0], 'linestyle': ours[predictor], 'linewidth': 2.0}
+    number = [each for each in all_predictors if each not in (*ours, UNIFORM)].index(predictor)
+    colour, dash = get_class_style(1 + number + number // (COLOURS - 1))  # not the first colour
+    return {'color': colour, 'linestyle': dash, 'linewidth': 1.0}
+
+
 def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:
     score = 'right' if name == GAP else 'gain'
     for predictor, scores in by_predictor.items():
         if predictor != UNIFORM:
             heights = [each[score] if each[score] is not None else float('nan') for each in scores['by_tenth']]
-            is_ours = predictor in (PUBLISHED, REFITTED)
-            look = {'linewidth': 2.5} if is_ours else {'linewidth': 1.0, 'linestyle': '--'}
-            axes.plot(range(1, TENTHS + 1), heights, marker='.', label=predictor, **look)
+            axes.plot(range(1, TENTHS + 1), heights, marker='.', label=predictor, **_find_look(predictor, by_predictor))
     axes.set(xlabel='tenth of the distance', xticks=range(1, TENTHS + 1))
-    axes.set_ylabel(evaluation.GAP_TITLE.split(':')[0] if name == GAP else 'log-likelihood above uniform [nat]')
+    axes.set_ylabel('share of true answers' if name == GAP else 'log-likelihood above uniform [nat]')
     axes.axhline(0.0, color='0.4', linewidth=0.8)
 
 
@@ -153,7 +161,7 @@ def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> Non
         bins = [each for each in by_predictor[predictor]['reliability'] if each['count']]
         shares = np.array([each['right'] for each in bins])
         errors = np.abs(np.array([each['interval'] for each in bins]).reshape(-1, 2).T - shares)
-        look = {'marker': 'o', 'markersize': 4, 'capsize': 2, 'label': predictor}
+        look = {'marker': 'o', 'markersize': 4, 'capsize': 2, 'label': predictor, **_find_look(predictor, by_predictor)}
         (line, *_) = axes.errorbar([each['confidence'] for each in bins], shares, errors, **look)
         for each in bins if predictor == PUBLISHED else ():
             place = {'xy': (each['confidence'], each['right']), 'xytext': (5, -9), 'textcoords': 'offset points'}

@@ -48,7 +48,7 @@ COMPARISON_TITLES = {
 SCORE_TITLES = {
     'ways': 'log-likelihood of the class taken [nat]',
     'positions': 'log-density of true positions [nat]',
-    'inside_90': 'true positions in the 90 % ellipse of the likeliest candidate at 0.5 s',
+    'inside_90': 'true positions in the 90 % ellipse of the most likely candidate at 0.5 s',
     'inside_all_90': 'true positions in the 90 % region of all candidates at 0.5 s',
 }
 Rows = list[tuple[str, ...]]

@@ -95,6 +95,6 @@ def make_chart(size_in: tuple[float, float], caption: str, draw: Callable[..., N
         handles, labels = axes.get_legend_handles_labels()
         named = dict(zip(labels, handles, strict=True))  # each label once
         if named:
-            look = {'loc': 'outside lower center', 'ncols': 3, 'frameon': False, 'fontsize': 'small'}
+            look = {'loc': 'outside lower center', 'ncols': 3, 'frameon': False, 'fontsize': 'small', 'handlelength': 4.0}
             figure.legend(named.values(), named.keys(), **look)
     return make_picture(figure, caption)
