@@ -148,8 +148,9 @@ const colourAt = (row) => getComputedStyle(row.querySelector('.bar i')).backgrou
 const probe = document.body.appendChild(document.createElement('i'));
 const rows = [...document.querySelectorAll('#ways tr')].map(
   (row) => [row.querySelector('.letter').innerText, colourAt(row), row.cells[3].innerText]).filter(([letter]) => letter);
-const drawn = play.view.candidates.filter(({ likelihood, slot }) => likelihood >= 0.01 && slot !== null).map(({ slot }) => {
-  probe.style.color = colourOf(slot);
+const lettered = play.view.candidates.filter(({ likelihood, slot }) => likelihood >= 0.01 && slot !== null);
+const drawn = lettered.map(({ slot, ghost }) => {
+  probe.style.color = ghost ? ink('--soft') : colourOf(slot);
   return [letterOf(slot), getComputedStyle(probe).color];
 });
 return [rows, drawn];
@@ -167,6 +168,32 @@ def test_bars_have_the_colours_of_their_paths_and_paths_to_one_goal_differ_in_wo
     assert len(set(words)) == len(words) and all(text.startswith('goal') for text in words)
     names = [text.partition(';')[0] for text in words]
     assert names == sorted(names)  # by goals and names, so that a bar stays where it is
+
+
+def test_a_bar_is_pale_or_dotted_where_its_path_is(page):
+    shown = """return [{ ghost: 'why' }, { compromised: true }, { ghost: 'why', compromised: true }, {}].map((each) => {
+        const [letter, bar] = makeSigns({ slot: 1, likelihood: 0.5, ...each });
+        document.body.append(letter, bar);
+        const look = getComputedStyle(bar.firstChild);
+        const found = [letter.style.borderColor === look.backgroundColor, look.opacity < 0.5, look.backgroundImage !== 'none'];
+        letter.remove();
+        bar.remove();
+        return found;
+    })"""
+    pale, dotted = [True, True, False], [True, False, True]
+    assert page.execute_script(shown) == [pale, dotted, pale, [True, False, False]]
+
+
+def test_letters_of_equal_paths_stand_apart_and_only_those_that_have_room(page):
+    places = """const path = Array.from({ length: 41 }, (_, row) => [arguments[0] * row, 0]);
+        const list = Array.from({ length: 12 }, (_, slot) => ({ slot, likelihood: 0.08, path, motor: [], total: [], ghost: '' }));
+        scene.candidates(list);
+        return [scene.letters, scene.unit];"""
+    for step, least in ((0.007, 6), (0.0005, 1)):
+        letters, unit = page.execute_script(f'const {{ scene }} = play; {places}', step)
+        assert least <= len(letters) < 12
+        x = np.sort(np.array(letters)[:, 0])
+        assert (np.diff(x) > 18.0 * unit).all()  # wider than a letter
 
 
 def test_everything_can_be_done_by_keys_and_survives_a_reload(page, tmp_path):
@@ -237,12 +264,24 @@ def test_everything_can_be_done_by_keys_and_survives_a_reload(page, tmp_path):
 PHONE = 360, 640
 
 
+PLACES = """return arguments[0].map((name) => document.getElementById(name).getBoundingClientRect())
+    .map(({ top, bottom }) => [top, bottom])"""
+
+
+@pytest.mark.parametrize('size', [(1280, 720), (1366, 650)])
+def test_the_scene_and_its_buttons_are_on_one_screen(browser, library, size):
+    visit(browser, library, *size)
+    browser.execute_script("document.getElementById('status').innerHTML = 'a<br>b'")  # a status of two lines
+    click(browser, 'arrange')
+    for top, bottom in browser.execute_script(PLACES, ['scene', 'buttons', 'editing']):
+        assert 0.0 <= top < bottom <= size[1]
+    browser.get('about:blank')
+
+
 @pytest.mark.parametrize('dark', [False, True], ids=['light', 'dark'])
 def test_the_page_fits_on_a_phone(browser, library, dark):
     visit(browser, library, *PHONE, dark)
-    place = """return ['scene', 'buttons'].map((name) => document.getElementById(name).getBoundingClientRect())
-        .map(({ top, bottom }) => [top, bottom])"""
-    for top, bottom in browser.execute_script(place):
+    for top, bottom in browser.execute_script(PLACES, ['scene', 'buttons']):
         assert 0.0 <= top < bottom <= PHONE[1], 'scene and buttons are on one screen'
     assert browser.execute_script("return document.querySelector('details').open") is False, 'help is folded'
     colour = 'return getComputedStyle(document.body).backgroundColor'

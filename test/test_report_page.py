@@ -16,6 +16,7 @@ from report_samples import predictions, samples
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, collect_obstacles
 from foc_ros.reporting.encode import MOST_FRAMES
+from foc_ros.reporting.page import Section, write_page
 from foc_ros.reporting.report import write_report
 from foc_ros.reporting.views import build_hand_trajectory, build_snapshot
 
@@ -127,6 +128,37 @@ def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_t
     assert all(
         name in signs for name in ('hand before', 'hand later', 'motor noise', 'all uncertainty', 'obstacle', 'goal', 'pale')
     )
+
+
+def test_letters_of_the_chart_of_likelihoods_do_not_lie_over_each_other(browser, report):
+    show(browser, report / 'index.html')
+    found = browser.execute_script("""
+        const times = [...Array(9).keys()];
+        const line = (share, letter) => ({ points: times.map((time) => [time, share]), colour: 'red', width: 1, letter });
+        const lines = [...'ABCDEFGH'].map((letter) => line(0.02, letter));
+        report.charts.likelihoods.draw({ span: [0, 9], top: 1, lines: [line(0.005, 'X'), ...lines, line(0.5, 'Y')], now: 0 });
+        return [...document.querySelectorAll('#likelihoods .tag')].map((tag) => {
+          const { cx, cy } = tag.querySelector('circle');
+          return [tag.textContent, cx.baseVal.value, cy.baseVal.value];
+        });""")
+    assert [letter for letter, _, _ in found] == ['Y', *'ABCDEFGH'], 'those of the highest lines first, none of one near zero'
+    x, y = np.array([place for _, *place in found]).T
+    distance = np.hypot(x[:, None] - x, y[:, None] - y)[np.triu_indices(len(x), 1)]
+    assert distance.min() >= 16.0
+
+
+def test_a_wide_table_of_a_study_page_moves_within_its_box_on_a_phone(browser, tmp_path):
+    columns = ['', *(f'column {number}' for number in range(12))]
+    rows = [['estimator.acceleration_time_s', *(12 * ['0.123'])], ['eta', *(12 * ['kept, because nothing tells its value'])]]
+    write_page(tmp_path, 'x.html', 'x', [Section('wide', columns=columns, rows=rows)], (), None)
+    assert show(browser, tmp_path / 'x.html', 390, 844) == []
+    assert browser.execute_script('return document.documentElement.scrollWidth') == 390
+    assert browser.execute_script("const box = document.querySelector('.wide'); return box.scrollWidth > box.clientWidth")
+    cells = (
+        "return [...document.querySelectorAll('td, th')].map((each) => [each.scrollWidth - each.clientWidth, each.clientHeight])"
+    )
+    beyond, height = np.array(browser.execute_script(cells)).T
+    assert beyond.max() == 0 and height.max() < 90, 'columns are not narrowed to one word'
 
 
 def test_a_click_on_a_chart_leads_to_its_time_and_the_scene_zooms(browser, report):

@@ -27,7 +27,7 @@ from .draw import Bounds, compute_bounds
 WIDTH, HEIGHT = 72, 13
 """Size of the drawing [characters]; with the table it fits into 24 lines."""
 OBSTACLE, GOAL, HAND = '▒', '*', '@'
-LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   A B C candidates, the leading one first'
+LEGEND = f'{HAND} hand   {GOAL} goal   {OBSTACLE} obstacle   A B C candidates, the most likely first'
 ROWS = 4
 """Rows of the table: the default number of candidates, so that its height stays the same."""
 Show = Callable[[float, Prediction, str, Array], None]

@@ -32,6 +32,7 @@ const measured = { fps: 0, delayMs: null, mostMs: null, predictions: 0, delays: 
 // For scripts: what is drawn, what is measured, and a new scene in place of the present one.
 globalThis.play = {
   view,
+  scene,
   measured,
   settings: null,
   setScene(scene) {
@@ -242,12 +243,13 @@ function showWays() {
   const rest = others.reduce((sum, each) => sum + each.likelihood, 0);
   if (others.length) rows.push({ slot: null, likelihood: rest, words: `${others.length} more, each below 1 %`, ghost: '' });
   for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal than those shown']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
-  const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost }) => [slot, Math.round(100 * likelihood), words, ghost]));
+  const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost, compromised }) => [slot, Math.round(100 * likelihood), words, ghost, compromised]));
   if (key === shownWays) return;
   shownWays = key;
-  byId('ways').tBodies[0].replaceChildren(...rows.map(({ slot, likelihood, words, ghost }) => {
+  byId('ways').tBodies[0].replaceChildren(...rows.map((each) => {
+    const { likelihood, words, ghost } = each;
     const line = document.createElement('tr');
-    const [letter, bar] = makeSigns(slot, likelihood);
+    const [letter, bar] = makeSigns(each);
     for (const content of [letter, bar, percent(likelihood), `${words}${ghost ? `; ${ghost}` : ''}`]) line.insertCell().append(content);
     return line;
   }));

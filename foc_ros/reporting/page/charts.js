@@ -17,7 +17,8 @@ class Chart {
 
   y(value) { return this.base - (value / this.top) * (this.base - 6); }
 
-  // Draws lines (points [time, value or null], colour, width, dotted, alpha, marks, letter, name), a hatched share (points), both under the time now [s].
+  // Draws lines (points [time, value or null], colour, width, dotted, alpha, marks, letter, name), a hatched share (points), both under the
+  // time now [s]. A letter is where its line is highest and has room, those of the highest lines first.
   draw({ span, top, lines, hatched = [], now }) {
     const width = Math.max(this.box.clientWidth, 200);
     Object.assign(this, { span, top, left: 44, right: width - 20, base: this.height - 22 });
@@ -26,8 +27,13 @@ class Chart {
     for (const { points, colour, width: thick, dotted, alpha = 1, marks, letter, name = '' } of lines) {
       parts.push(`<g data-name="${name}" opacity="${alpha}"><path d="${line(points)}" fill="none" stroke="${colour}" stroke-width="${thick}"${dotted ? ' stroke-dasharray="2 4"' : ''}/>`);
       if (marks) parts.push(...points.filter(([, v]) => v !== null).map(([t, v]) => `<circle cx="${this.x(t).toFixed(2)}" cy="${this.y(v).toFixed(2)}" r="1.6" fill="${colour}"/>`));
-      if (letter) parts.push(`<g class="tag"><circle cx="${this.x(letter.at[0])}" cy="${this.y(letter.at[1])}" r="7" fill="var(--page)" stroke="${colour}" stroke-width="1.5"/><text x="${this.x(letter.at[0])}" y="${this.y(letter.at[1]) + 3.5}">${letter.text}</text></g>`);
       parts.push('</g>');
+    }
+    const taken = [];
+    const lettered = lines.filter(({ letter }) => letter).map((line) => [line, line.points.filter(([, v]) => v >= NOTED).sort((a, b) => b[1] - a[1])]);
+    for (const [{ colour, alpha = 1, letter }, high] of lettered.filter(([, high]) => high.length).sort(([, a], [, b]) => b[0][1] - a[0][1])) {
+      const [x, y] = takePlace(high.map(([t, v]) => [this.x(t), this.y(v)]), taken, 16) || [];
+      if (x) parts.push(`<g class="tag" opacity="${alpha}"><circle cx="${x}" cy="${y}" r="7" fill="var(--page)" stroke="${colour}" stroke-width="1.5"/><text x="${x}" y="${y + 3.5}">${letter}</text></g>`);
     }
     parts.push(`<path class="now" d="M0 6V${this.base}" stroke="var(--ink)" stroke-width="1.2"/>`);
     this.box.innerHTML = `<svg width="${width}" height="${this.height}" role="img" aria-label="${this.label} over time">${parts.join('')}</svg>`;

@@ -75,10 +75,8 @@ function drawLikelihoods() {
   const tracks = visibleTracks();
   const marks = tracks.reduce((sum, { points }) => sum + points.length, 0) <= MOST_MARKS;
   const lines = tracks.map(({ number, points }) => {
-    const known = points.filter(([, share]) => share !== null);
     const slot = slotOf(number);
-    const at = known[Math.floor((((number % 4) + 0.5) * known.length) / 4)];
-    return { points, marks, name: number, width: 2, colour: colourOf(slot), alpha: alphaOf(number), letter: known.length >= 3 && slot !== null && { at, text: letterOf(slot) } };
+    return { points, marks, name: number, width: 2, colour: colourOf(slot), alpha: alphaOf(number), letter: letterOf(slot) };
   });
   const [from, to] = [first(data.times, span()[0]), first(data.times, span()[1] + 1e-9)];
   const hatched = data.times.slice(from, to).map((time, row) => [time, data.unknown[from + row]]);
@@ -124,7 +122,7 @@ function fillTable(frame) {
     [row.dataset.track, row.dataset.share] = [each.track, view.share];
     row.classList.toggle('faded', faded(each.track));
     row.addEventListener('click', () => { state.focus = state.focus === each.track ? null : each.track; drawLikelihoods(); show(state.frame); });
-    const [letter, bar] = makeSigns(view.slot, view.share);
+    const [letter, bar] = makeSigns(view);
     cell(row, '').append(letter);
     cell(row, percent(view.share), 'number');
     cell(row, '').append(bar);

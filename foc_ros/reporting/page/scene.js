@@ -11,18 +11,27 @@ const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') 
 const percent = (share) => (share === null ? '' : share < 0.0005 ? '< 0.1 %' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
 // Likelihood below which a path has no letter: letters of paths that hardly anybody takes would cover the others.
 const NOTED = 0.01;
+const PALE = 0.25; // a ghost
 // Lengths come as whole tenths of a millimetre, and a list of them as the first value and then the differences.
 const LENGTH = 1e-4;
 const sums = (steps, unit) => { let sum = 0; return steps.map((step) => unit * (sum += step)); };
 const decodePath = ({ x, y }) => { const ys = sums(y, LENGTH); return sums(x, LENGTH).map((value, row) => [value, ys[row]]); };
 const decodeEllipses = (list = []) => list.map(([x, y, a, b, angle]) => [LENGTH * x, LENGTH * y, LENGTH * a, LENGTH * b, (Math.PI * angle) / 180]);
+// Takes and returns the first of places that is at a distance from all that are taken, undefined where none has room.
+function takePlace(places, taken, distance) {
+  const found = places.find(([x, y]) => taken.every(([u, v]) => Math.hypot(x - u, y - v) >= distance));
+  if (found) taken.push(found);
+  return found;
+}
 
 class Scene {
-  // Attributes: paths, what was drawn since `begin`: points [m], text, kind and width of each path, for texts under the pointer.
+  // Attributes: paths, what was drawn since `begin`: points [m], text, kind and width of each path, for texts under the pointer; letters:
+  // where they are [m].
   constructor(canvas) {
     this.canvas = canvas;
     this.pen = canvas.getContext('2d');
     this.paths = [];
+    this.letters = [];
     this.entered = new Set(); // what was written of obstacles that paths lead through
   }
 
@@ -132,15 +141,15 @@ class Scene {
   }
 
   // Draws a candidate: slot, likelihood, path [m], motor and total: ellipses [x, y, half axes, angle]; ghost: why it is none, or '', and
-  // ghost_at: the share of the path at which that is. place: share of the path for its letter, or words that are of no such place.
-  candidate({ slot, likelihood, path, motor, total, compromised, ghost, ghost_at: ghostAt, text }, alpha = 1, place = 0.6) {
+  // ghost_at: the share of the path at which that is. place: share of the path for words that are of no such place.
+  candidate({ slot, likelihood, path, motor, total, compromised, ghost, ghost_at: ghostAt, text }, alpha = 1, place = 0.5) {
     const [wide, least] = (likelihood ?? 1) < NOTED ? [2, 0.8] : [6, 1.5];
     const [colour, width] = [colourOf(slot), ghost ? wide : least + 4.5 * (likelihood ?? 0)];
-    const middle = path[Math.round((path.length - 1) * (ghostAt ?? place))];
     this.paths.push({ points: path, text, width, kind: ghost ? 'ghost' : 'path' });
     if (ghost) {
       this.trace(path);
-      this.stroke(ink('--soft'), width, [], 0.25 * alpha);
+      this.stroke(ink('--soft'), width, [], PALE * alpha);
+      const middle = path[Math.round((path.length - 1) * (ghostAt ?? place))];
       // Words of one obstacle would cover each other.
       if (!this.entered.has(ghost)) this.text(ghost, middle, ink('--soft'), { size: 11, up: 14, halo: true });
       if (typeof ghostAt === 'number') this.entered.add(ghost);
@@ -159,16 +168,22 @@ class Scene {
     }
     this.trace(path);
     this.stroke(colour, width, compromised ? [1.2 * width, 1.5 * width] : [], alpha);
-    if (slot === null || slot === undefined || likelihood < NOTED) return;
-    this.disc(middle, 9 * this.unit, ink('--page'), { filled: 1, width: 0 });
-    this.disc(middle, 9 * this.unit, colour);
-    this.text(letterOf(slot), middle, ink('--ink'));
   }
 
-  // Draws candidates, the most likely last, and their letters at different places; alphaOf: of each.
+  // Draws candidates, the most likely last, and upon them letters, those of the most likely first, where there is room; alphaOf: of each.
   candidates(list, alphaOf = () => 1) {
     list.filter(({ ghost }) => ghost).forEach((each, row) => this.candidate(each, alphaOf(each), 0.5 + 0.15 * (row % 3)));
-    [...list].reverse().filter(({ ghost }) => !ghost).forEach((each) => this.candidate(each, alphaOf(each), 0.45 + 0.12 * (list.indexOf(each) % 3)));
+    const paths = list.filter(({ ghost }) => !ghost);
+    [...paths].reverse().forEach((each) => this.candidate(each, alphaOf(each)));
+    this.letters = [];
+    for (const { slot, path } of paths.filter((each) => each.likelihood >= NOTED && letterOf(each.slot))) {
+      const shares = Array.from({ length: 10 }, (_, row) => 0.3 + 0.05 * ((3 + 2 * slot + row) % 10));
+      const at = takePlace(shares.map((share) => path[Math.round((path.length - 1) * share)]), this.letters, 20 * this.unit);
+      if (!at) continue;
+      this.disc(at, 9 * this.unit, ink('--page'), { filled: 1, width: 0 });
+      this.disc(at, 9 * this.unit, colourOf(slot));
+      this.text(letterOf(slot), at, ink('--ink'));
+    }
   }
 
   goal(place, row, { lit = false, selected = false, radius = 0.009 } = {}) {
@@ -208,11 +223,13 @@ class Scene {
   }
 }
 
-// Returns the letter of a slot and a bar as long as a share, both in its colour, for a row of a table.
-function makeSigns(slot, share) {
+// Returns the letter of a candidate and a bar as long as its likelihood, both as its path is drawn, for a row of a table.
+function makeSigns({ slot, likelihood, ghost, compromised }) {
   const [letter, bar, filling] = ['span', 'span', 'i'].map((tag) => document.createElement(tag));
-  [letter.className, letter.textContent, letter.style.borderColor] = ['letter', letterOf(slot), colourOf(slot)];
-  [bar.className, filling.style.width, filling.style.background] = ['bar', `${100 * share}%`, colourOf(slot)];
+  const [colour, alpha] = ghost ? [ink('--soft'), PALE] : [colourOf(slot), 1];
+  [letter.className, letter.textContent, letter.style.borderColor] = ['letter', letterOf(slot), colour];
+  [bar.className, filling.className] = ['bar', compromised && !ghost ? 'dotted' : ''];
+  [filling.style.width, filling.style.backgroundColor, filling.style.opacity] = [`${100 * likelihood}%`, colour, alpha];
   bar.append(filling);
   return [letter, bar];
 }
@@ -228,7 +245,7 @@ const SIGNS = {
   compromised: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="3" stroke-dasharray="3 4"/>', 'dotted: not known to avoid the obstacles as surely as wanted'],
   ghost: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="7" opacity=".3"/>', 'pale: no proper prediction, for the reason beside it'],
   motor: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="#0072B2" fill-opacity=".3" stroke="#0072B2"/>', 'motor noise, which η is about: one standard deviation; of finished paths with at least 5 %'],
-  total: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="none" stroke="#0072B2" stroke-dasharray="4 3"/>', 'all uncertainty of the leading path, likewise'],
+  total: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="none" stroke="#0072B2" stroke-dasharray="4 3"/>', 'all uncertainty of the most likely path, likewise'],
   obstacle: ['<circle cx="14" cy="7" r="6.5" fill="var(--ring)"/><circle cx="14" cy="7" r="5" fill="var(--disc)" stroke="var(--soft)"/>', 'obstacle; ring: standard deviation of its radius'],
   goal: ['<circle cx="14" cy="7" r="6" fill="none" stroke="var(--ink)"/>', 'goal'],
 };
