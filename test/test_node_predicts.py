@@ -95,9 +95,9 @@ PREFIX = '/foc/goal_likelihood/'
 
 
 def list_goal_topics(bench):
-    own = bench.node.get_name(), bench.node.get_namespace()
-    found = bench.node.get_publisher_names_and_types_by_node(*own)
-    return sorted(name.removeprefix(PREFIX) for name, _ in found if name.startswith(PREFIX))
+    """Return the goals for which the node has a topic: the graph of ROS may know them for longer."""
+    names = [each.topic_name for each in bench.node.publishers]
+    return sorted(name.removeprefix(PREFIX) for name in names if name.startswith(PREFIX))
 
 
 def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros):
@@ -105,9 +105,9 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros):
     assert not list_goal_topics(bench), 'no goal yet'
     heard = [ros.collect(bench.player, Float64, f'foc/goal_likelihood/goal{row}') for row in range(2)]
     bench.publish_scene(goals=[(0.3, 0.0, 0.1), (0.3, 0.1, 0.1)])
-    poses = iter(hand_path(40))
-    bench.move([next(poses)])
-    ros.spin_until(lambda: list_goal_topics(bench) == ['goal0', 'goal1'], 'a topic for each goal')
+    poses = iter(hand_path(60))
+    while list_goal_topics(bench) != ['goal0', 'goal1']:  # on a busy computer the first predictions may be late
+        bench.move([next(poses)])
     publishers = bench.node._goal_topics.publishers
     ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers), 'the subscriptions')
     bench.move([next(poses) for _ in range(10)])
@@ -123,14 +123,13 @@ def test_each_goal_has_a_topic_for_as_long_as_it_is_there(ros):
     bench.move([next(poses) for _ in range(4)])
     assert len(heard[1]) == before, 'a goal that is gone has no likelihood'
     bench.health()
-    assert len(bench.node._goal_topics.publishers) == 1
-    ros.spin_until(lambda: list_goal_topics(bench) == ['goal0'], 'the graph without the topic of this goal')
+    assert list_goal_topics(bench) == ['goal0']
 
     bench.deliver('goals', pose_array(TYPES, [(0.3, 0.01 * row, 0.1) for row in range(MOST_GOAL_TOPICS + 2)]))
     count = len(bench.received['likelihoods_by_name'])
     bench.move([next(poses) for _ in range(4)])
     goals, _ = bench.wait_for('likelihoods_by_name', count + 1)[-1].status
-    ros.spin_until(lambda: len(list_goal_topics(bench)) == MOST_GOAL_TOPICS, 'as many topics as there may be')
+    assert len(list_goal_topics(bench)) == MOST_GOAL_TOPICS, 'as many topics as there may be'
     assert len({each.key for each in goals.values} - {'unknown', 'other'}) == MOST_GOAL_TOPICS + 2
     bench.deliver('goals', pose_array(TYPES, []))
     bench.health()

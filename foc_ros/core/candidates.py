@@ -112,7 +112,7 @@ def _classify(candidate: Candidate, solution: Solution, sides: dict[str, int]) -
     """Return a candidate with its solution, which passes obstacles on some sides. The status says if it left its class."""
     if solution.status.has_likelihood and not candidate.contains(sides):
         solution = replace(solution, status=Status.LEFT_CLASS, message='the solution moved into another homotopy class')
-    return PredictedCandidate(candidate, solution, sides, solution.expected_effort * solution.dt, 0.0)
+    return PredictedCandidate(candidate, solution, sides, solution.effort * solution.dt, 0.0)
 
 
 def estimate_unsolved(
@@ -193,7 +193,6 @@ def _estimate(candidate: PredictedCandidate, known: PredictedCandidate) -> Predi
         message=f'{failed.message}; its effort follows from the length of its path',
         mean=mean,
         effort=effort,
-        expected=effort,
         eta=safety[0],
         safety_factor=safety[1],
         safety_shortfall=safety[2],
@@ -242,7 +241,6 @@ def estimate_unfollowed(
             dt=dt,
             mean=candidate.guess,
             effort=cost / dt,
-            expected=cost / dt,
         )
         estimated.append(PredictedCandidate(candidate, solution, dict(candidate.sides), cost, 0.0, way=NO_NUMBER))
     return estimated

@@ -101,13 +101,6 @@ class Obstacles(Record):
             return self
         return replace(self, centre=self.centre + seconds * self.velocity)
 
-    def is_near(self, other: Obstacles, distance: float) -> bool:
-        """Tell whether the other table has the same obstacles, of which no part has moved by more than a distance [m]."""
-        if self.ids != other.ids or self.vertices.shape != other.vertices.shape:
-            return False
-        pairs = ((self.centre, other.centre), (self.vertices, other.vertices), (self.radius, other.radius))
-        return all(bool((np.abs(one - two) <= distance).all()) for one, two in pairs)
-
 
 COLUMNS = tuple(each.name for each in fields(Obstacles) if each.name != 'ids')
 """Arrays of a table, with a row for each obstacle."""

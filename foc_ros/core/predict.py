@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -73,8 +73,8 @@ def predict(
     situation = prepare_situation(config, hand, obstacles, goals, knowledge.objects, goal_heights, known)
     found, candidates = _find_candidates(situation, known, knowledge.library, deadline)
     matched = known.match(candidates, stamp_ns)
-    absent, waiting = known.find_absent(candidates, matched, stamp_ns), known.find_waiting(matched, obstacles, stamp_ns)
-    solved = _solve(situation, candidates, matched, waiting, deadline.take_share(SOLVE_SHARE))
+    absent = known.find_absent(candidates, matched, stamp_ns)
+    solved = _solve(situation, candidates, matched, deadline.take_share(SOLVE_SHARE))
     answered = _answer(situation, solved, matched, absent)
     shared, unassigned = _share_likelihood(situation, answered, found.unfollowed, knowledge, hand)
     limited, unassigned = known.limit_changes(shared, unassigned, stamp_ns, absent)
@@ -129,29 +129,17 @@ def _find_candidates(
 
 
 def _solve(
-    situation: Situation,
-    candidates: Sequence[Candidate],
-    matched: Sequence[Track],
-    waiting: Collection[int],
-    deadline: Deadline,
+    situation: Situation, candidates: Sequence[Candidate], matched: Sequence[Track], deadline: Deadline
 ) -> list[PredictedCandidate]:
-    """Solve the candidates that do not wait, each from the solution of its track; return all with their numbers, in their order.
-
-    The solutions have predictive covariances. waiting: numbers of tracks of which the rest of their last solution is taken.
-    """
-    found = [
-        _hold_track(track, candidate, situation, 'unlikely, and solved again soon') if track.number in waiting else None
-        for candidate, track in zip(candidates, matched, strict=True)
-    ]
-    open_rows = [row for row, each in enumerate(found) if each is None]
-    by_goal = {goal: situation.pose_problem(goal) for goal in {candidates[row].goal for row in open_rows}}
-    earlier = [None if matched[row].has_failed else matched[row].solution for row in open_rows]
-    tried = [candidates[row] for row in open_rows]
+    """Solve the candidates, each from the solution of its track; return them with their numbers and predictive covariances."""
+    by_goal = {goal: situation.pose_problem(goal) for goal in {each.goal for each in candidates}}
+    problems, earlier = (
+        [by_goal[each.goal] for each in candidates],
+        [None if each.has_failed else each.solution for each in matched],
+    )
     until = Deadline(whole=deadline, goes_on=True)
-    solved = solve_candidates(tried, [by_goal[each.goal] for each in tried], situation.config.foc, earlier, until)
-    for row, each in zip(open_rows, solved, strict=True):
-        found[row] = situation.add_uncertainty(replace(each, way=matched[row].number))
-    return [each for each in found if each is not None]
+    solved = solve_candidates(candidates, problems, situation.config.foc, earlier, until)
+    return [situation.add_uncertainty(replace(each, way=track.number)) for each, track in zip(solved, matched, strict=True)]
 
 
 def _answer(
@@ -186,7 +174,7 @@ def _hold_track(track: Track, candidate: Candidate, situation: Situation, reason
     rest = take_remainder(track.solution, age_s, hand.mean[:2], reason)
     if rest is None or not is_there(candidate, rest, obstacles):
         return None
-    return PredictedCandidate(candidate, rest, track.sides, rest.expected_effort * rest.dt, 0.0, age_s, track.number)
+    return PredictedCandidate(candidate, rest, track.sides, rest.effort * rest.dt, 0.0, age_s, track.number)
 
 
 def _share_likelihood(

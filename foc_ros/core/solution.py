@@ -185,15 +185,14 @@ class Solution(Record):
 
     eta: achieved, the smallest over obstacles and steps, and with `lv`, `hc` and `optimal` also between the steps; eta_at:
     (obstacle id, step) where, with fractions of a step. eta_reachable: the largest eta found if the wanted one is unreachable.
-    safety_factor: k that belongs to eta; safety_shortfall: by how much it is below the wanted one, 0 where solved, and what is
-    expected of it where time ran out.
+    safety_factor: k that belongs to eta; safety_shortfall: by how much it is below the wanted one, 0 where solved.
     motor_covariance (N + 1, n, n): what motor noise alone causes, which eta is about; None where `covariance` is that.
     violation: by how much the mean comes nearer to a centre than sqrt(E[R^2] + tau) [m], 0 where it does not; violation_at:
     (obstacle id, step) where.
 
     multipliers: (obstacle id, step, value) of the active constraints, with `lv`, `hc` and `optimal` at fractions of a step; the
     value is the growth of J_aug for each metre more of required distance [m/s^6]; equivalent_weights: tau [m^2] and lambda
-    [1/s^6] of each active constraint. expected: the effort that is expected where time ran out, None elsewhere.
+    [1/s^6] of each active constraint.
     qp_solves: number of QPs solved; iterations: of `algorithm1`, None for the others; solve_s: wall time of the strategy [s].
     """
 
@@ -216,7 +215,6 @@ class Solution(Record):
     violation_at: tuple[str, float] | None = None
     multipliers: tuple[tuple[str, float, float], ...] = ()
     equivalent_weights: tuple[tuple[float, float], ...] = ()
-    expected: float | None = None
     qp_solves: int = 0
     iterations: int | None = None
     solve_s: float = 0.0
@@ -232,11 +230,6 @@ class Solution(Record):
         motor = self.covariance if self.motor_covariance is None else self.motor_covariance
         vars(other).update(vars(self), covariance=as_readonly(covariance), motor_covariance=motor)
         return other
-
-    @property
-    def expected_effort(self) -> float:
-        """The effort with which the class is compared [m^2/s^6]."""
-        return self.effort if self.expected is None else self.expected
 
     @property
     def path(self) -> Array:

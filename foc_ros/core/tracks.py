@@ -9,8 +9,6 @@ most sides, that was seen last, and is the most likely. No two candidates contin
 From its track a class has its number, the solution from which the next one starts, and its likelihood before. A class that could
 not be solved, or that the search has missed, keeps the rest of its last solution for at most `HOLD_S`: of an age a, a movement of
 duration T over [a, T], resampled at N steps of (T - a) / N, that begins where the hand is now and has the cost of that rest.
-An unlikely class keeps it too, as long as the scene stays the same. Each prediction solves one in `TURNS` of these classes: those
-whose solutions are oldest.
 
 The rate at which a likelihood changes is bounded, and so is that of the shares that no candidate has. With p_i of this
 prediction, l_i before (0 for a new class), and the time h between both,
@@ -40,15 +38,12 @@ from .types import NANOSECONDS, Array, Record, Unassigned, as_readonly
 HOLD_S = 0.2
 """Longest time for which a class that is not solved keeps its last answer, and one that is not seen its number [s]: ten
 predictions at 50 Hz, within which a solver or a search that missed a class finds it again."""
-SELDOM, TURNS, WAIT_S = 0.02, 5, 0.1
-"""A class is solved in one of TURNS predictions if its likelihood is less than the part SELDOM of the largest one. No class waits
-for more than WAIT_S [s]."""
 FULL_CHANGE_S = 0.15
 """Shortest time in which a likelihood changes by one [s]: less than people take to react to what they see."""
 LEAD = 0.15
 """Lead in likelihood that another class needs to become the most likely one: equal ones do not swap by noise."""
 MOVED_M = 0.01
-"""A goal that moves by more than this between two predictions is another goal, and an obstacle is another obstacle [m]."""
+"""A goal that moves by more than this between two predictions is another goal [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,15 +150,6 @@ class Tracks(Record):
                 taken.add(each.number)
         numbers = iter(range(self.next_number, self.next_number + len(candidates)))
         return [found.get(row) or Track(next(numbers), each, stamp_ns) for row, each in enumerate(candidates)]
-
-    def find_waiting(self, matched: Sequence[Track], obstacles: Obstacles, stamp_ns: int) -> set[int]:
-        """Return the numbers of the tracks whose last solution is good enough, because their classes are unlikely."""
-        if self.obstacles is None or not obstacles.is_near(self.obstacles, MOVED_M):
-            return set()
-        least = SELDOM * max([each.likelihood for each in matched], default=0.0)
-        unlikely = [each for each in matched if each.likelihood < least and each.is_solved_within(stamp_ns, WAIT_S)]
-        unlikely.sort(key=lambda each: (each.solved_ns, each.number))
-        return {each.number for each in unlikely[math.ceil(len(unlikely) / TURNS) :]}
 
     def find_absent(self, candidates: Sequence[Candidate], matched: Sequence[Track], stamp_ns: int) -> tuple[Track, ...]:
         """Return the tracks that were seen in the last `HOLD_S` and are no candidates now, under any name."""
@@ -306,9 +292,6 @@ def take_remainder(solution: Solution, age_s: float, position: Array, reason: st
     during = (begin + (steps - begin) * (np.arange(steps) + 0.5) / steps).astype(np.intp)
     control = as_readonly(solution.control[np.minimum(during, steps - 1)])
     message, effort = f'{reason}; the answer is from {age_s:.3g} s ago', float((control**2).sum())
-    expected = solution.expected
-    if expected is not None and solution.effort > 0.0:
-        expected *= effort / solution.effort
     return replace(
         solution,
         mean=as_readonly(mean),
@@ -316,7 +299,6 @@ def take_remainder(solution: Solution, age_s: float, position: Array, reason: st
         motor_covariance=motor,
         control=control,
         effort=effort,
-        expected=expected,
         dt=left_s / steps,
         message=message,
     )

@@ -27,9 +27,6 @@ These rows hold the mean where it is then, so that a contact slides by about as 
 APART = 0.25
 """Least time between other rows of an obstacle and one that is added, for a contact of the last QP or for a place over which a
 path would leap [steps]. Along a side there may be two contacts; more rows keep them from sliding."""
-SETTLING, SETTLED_APART = 1e-2, 0.02
-"""Gain below which a problem is near its solution, and least time there between a contact with a polygon and the place to which
-it moves [steps]. Both have rows then: with one row, a contact at a corner would swing between two places."""
 SAME = 1e-3
 """Time between contacts that count as one [steps]."""
 HELD = 1e-5
@@ -39,9 +36,8 @@ FREE = 1e-3
 """Part of the wanted safety factor that is missing where it is chosen with the control."""
 ROUNDS = 3
 """Most times that rows are added to a QP for places at which its solution breaks margins."""
-LEAP, LEAP_OF_DISTANCE = 0.02, 1e-3
-"""Broken margin, relative to the scene, for which a row is added: where margins hold against uncertainty, which shows what a path
-leaps over, and where they are but distances."""
+LEAP = 1e-3
+"""Broken margin, relative to the scene, for which a row is added."""
 CURVED = 1.0
 """Gain of a step below which second derivatives of the margins count: farther away they tell nothing."""
 ACCURACY = 3e-10
@@ -113,8 +109,7 @@ class Planner:
             return NO_CONTACTS
         moved = self.margins.find_step(plan.step[is_wanted])[:, :, None]
         margin = now.at.margin[rows] + (now.at.normal[rows] * moved).sum(axis=1)
-        bound = -(LEAP if self.margins.is_chance else LEAP_OF_DISTANCE) * self.margins.extent[rows, None, None]
-        row, obstacle, place = np.nonzero(mark_lowest(margin) & (margin < bound))
+        row, obstacle, place = np.nonzero(mark_lowest(margin) & (margin < -LEAP * self.margins.extent[rows, None, None]))
         found = Contacts(rows[row], obstacle, self.margins.times[place])
         return found.take(~_is_known(found, plan.contacts, APART))
 
@@ -159,9 +154,7 @@ class Planner:
         minima = now.at.contacts.take(now.at.contacts.mark(rows))
         kept = now.contacts.mark(rows) & (now.multipliers > 0.0)
         held, multipliers = now.contacts.take(kept), now.multipliers[kept]
-        is_settling = margins.is_polygon[held.problem, held.obstacle] & (now.gain[held.problem] < SETTLING)
-        held_apart = np.where(is_settling, SETTLED_APART, APART)[:, None]
-        more: list[tuple[Contacts, Array | float]] = [(further.take(further.mark(rows)), SAME), (held, held_apart)]
+        more = [(further.take(further.mark(rows)), SAME), (held, APART)]
         is_polygon = margins.is_polygon[minima.problem, minima.obstacle]
         if margins.between and is_polygon.any():
             kinks = minima.take(is_polygon)
@@ -174,8 +167,8 @@ class Planner:
         return places, _move_multipliers(held, multipliers, places)
 
 
-def _is_known(places: Contacts, known: Contacts, apart: Array | float) -> NDArray[np.bool_]:
-    """Return whether each place is less than a time [steps], or one of each (q, 1), apart from a known one, (q,)."""
+def _is_known(places: Contacts, known: Contacts, apart: float) -> NDArray[np.bool_]:
+    """Return whether each place is less than a time [steps] apart from a known one, (q,)."""
     same = (places.problem[:, None] == known.problem) & (places.obstacle[:, None] == known.obstacle)
     found: NDArray[np.bool_] = (same & (np.abs(places.time[:, None] - known.time) < apart)).any(axis=1)
     return found

@@ -187,13 +187,6 @@ class Problem(Record):
         length = np.sqrt((rows[is_fixed] ** 2).sum(axis=1))
         return rows[is_fixed] / length[:, None], targets[is_fixed] / length
 
-    @cached_property
-    def least_effort(self) -> float:
-        """The effort of a movement to the goal without obstacles, [m^2/s^6] for the triple integrator."""
-        rows, targets = self.fixed_goal
-        shares = np.linalg.lstsq(rows @ rows.T, targets, rcond=None)[0]
-        return float(targets @ shares) / self.horizon.gain**2
-
     def states(self, control: Array) -> Array:
         """Return the mean state of a stacked control (2N,) at steps 0..N, (N + 1, n)."""
         moved: Array = self.free + apply_impulse_response(self.horizon.states, np.asarray(control, dtype=float)).T

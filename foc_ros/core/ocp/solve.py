@@ -29,10 +29,6 @@ from .strategies import StrategyResult
 
 ETA_TOLERANCE = 1e-5
 """How far a solution may fall short of eta by rounding."""
-REMAINING = 0.5
-"""Part of what a QP promised by which the loss still falls after its step: the median in the random scenes of the tests."""
-LARGEST_GAIN = 1.0
-"""Most by which a loss is expected to fall still: far from a solution a QP promises anything."""
 FINE, MOST_PARTS = 5e-4, 2000
 """Distance between the points at which an infeasible path is measured, relative to the scene, as far as so many points of each
 step have it: it may leap over an obstacle between two steps."""
@@ -125,9 +121,9 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
         parts = min(max(math.ceil(longest), 1), MOST_PARTS) if status is Status.INFEASIBLE else 1
         violation, violated = compute_violation(problem, mean, result.tau, parts)
     effort, names = float(control @ control), problem.obstacles.ids
-    shortfall, expected = 0.0 if status is Status.SOLVED else max(problem.wanted_k - k, 0.0), None
-    if status.is_estimate:
-        expected, shortfall = _expect(problem, effort, shortfall, min(REMAINING * result.gain, LARGEST_GAIN))
+    # a condition that was not met for lack of time says nothing
+    is_met = status is Status.SOLVED or (status.is_estimate and problem.preference.is_hard)
+    shortfall = 0.0 if is_met else max(problem.wanted_k - k, 0.0)
     obstacles, times, pushes = (each.tolist() for each in result.forces)
     return Solution(
         status=status,
@@ -149,24 +145,10 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
         violation_at=None if violated is None else (names[violated[0]], violated[1]),
         multipliers=tuple((names[j], t, y * effort) for j, t, y in zip(obstacles, times, pushes, strict=True)),
         equivalent_weights=((result.tau, result.lam),) * len(times) if result.weights is None else result.weights,
-        expected=expected,
         qp_solves=result.qp_solves,
         iterations=result.iterations,
         solve_s=solve_s,
     )
-
-
-def _expect(problem: Problem, effort: float, shortfall: float, gain: float) -> tuple[float, float]:
-    """Return the effort and the shortfall of safety that are expected when the loss has fallen by a gain [ln J].
-
-    The effort does not fall below that of a movement without obstacles.
-    """
-    least, preference = problem.least_effort, problem.preference
-    if preference.is_hard or preference.beta == 0.0:
-        return max(effort * math.exp(-gain), min(least, effort)), 0.0
-    rate = preference.shortfall / preference.beta
-    less = min(shortfall, gain / rate) if rate > 0.0 else 0.0
-    return max(effort * math.exp(-max(gain - rate * less, 0.0)), min(least, effort)), shortfall - less
 
 
 def _complete_message(problem: Problem, status: Status, message: str, violation: float) -> str:

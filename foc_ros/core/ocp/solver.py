@@ -28,8 +28,8 @@ from .planner import FREE, Plan, Planner
 
 MOST_ITERATIONS = 150
 """Iterations after which a problem counts as not settled; ten are usual from a guess, three from an earlier solution."""
-NEAR, NEAR_FACTOR = 0.01, 1.5
-"""Margin relative to the scene, and safety factor relative to the wanted one, below which an obstacle has a row in the QP."""
+NEAR = 0.01
+"""Margin relative to the scene below which an obstacle has a row in the QP, as it has below the wanted safety factor."""
 LARGEST_RATE, GENTLE_RATE = 1e3, 5.0
 """Worth of a unit of safety in logarithms of cost where the wanted safety is a condition, and the one with which the search
 begins where it is larger: at a guess, margins tell little of what they cost."""
@@ -106,7 +106,7 @@ class Solver:
         motion = margins.move(rows, control)
         grid = margins.measure_grid(rows, motion, k)
         is_near = grid.value < NEAR * margins.extent[rows, None, None]
-        is_near |= grid.factor < NEAR_FACTOR * self.wanted_k[rows, None, None]
+        is_near |= grid.factor < self.wanted_k[rows, None, None]
         contacts, factors = find_minima(margins, rows, motion, k, grid, is_near)
         least = np.full(len(rows), np.inf)
         np.minimum.at(least, np.searchsorted(rows, contacts.problem), factors)
