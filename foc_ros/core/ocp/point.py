@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -144,22 +145,26 @@ def _choose(margins: Margins, problem: Problem, start: Start, row: int, angles: 
         return _follow_guess(margins, problem, start.path, row, angles), start
     control: Array = start.control * problem.horizon.gain
     if start.guess is not None:
-        followed = _follow_guess(margins, problem, start.guess, row, angles)
-        if control @ control > UNSETTLED_EFFORT * (followed @ followed):
+        largest = float(control @ control) / UNSETTLED_EFFORT
+        followed = _follow_guess(margins, problem, start.guess, row, angles, largest)
+        if followed @ followed < largest:
             return followed, cold_start(start.guess)
     return control, start
 
 
-def _follow_guess(margins: Margins, problem: Problem, guess: Array, row: int, angles: Array) -> Array:
+def _follow_guess(margins: Margins, problem: Problem, guess: Array, row: int, angles: Array, largest: float = math.inf) -> Array:
     """Return the control (2N,) that follows a guess (N + 1, 2) no more tightly than it takes to stay in its class.
 
-    angles (m,): those that it sweeps. A path that enters a polygon may be nearest to an edge on the wrong side of it.
+    angles (m,): those that it sweeps; largest: sum of the squared control that need not be exceeded, tighter paths have larger ones.
+    A path that enters a polygon may be nearest to an edge on the wrong side of it.
     """
     control, one = np.zeros(0), np.array([row])
     least = HELD_OFF * np.sqrt(margins.reach_square[row])[:, None]
     for tightness in TIGHTNESS:
         weight = problem.horizon.position_response.smoothing / tightness
         control = follow(problem, 1.0 + np.arange(margins.steps), guess[1:], weight)
+        if control @ control >= largest:
+            break
         motion = margins.move(one, control[None])
         swept, grid = margins.sweep(one, margins.find_path(motion)), margins.measure_grid(one, motion, np.zeros(1))
         if (np.abs(swept - angles) < np.pi).all() and (grid.distance[0] > least).all():

@@ -56,8 +56,6 @@ MOST_TRIALS, SHORTER = 5, 0.35
 """Steps that are tried: the whole one, and a part of the last one each."""
 SUFFICIENT = 1e-4
 """Share of the promised gain that a step has to bring."""
-GRACE = 0.02
-"""Loss by which the first step from a guess or an earlier solution may rise; later ones may rise to the last but one."""
 ROUNDING = 1e-11
 
 
@@ -96,7 +94,7 @@ class Solver:
         at = self.evaluate(rows, control, k)
         k = np.clip(at.factor, 0.0, self.wanted_k)
         gain = np.full(len(rows), np.inf)
-        bound, is_exact = at.loss + GRACE, is_cold | (not self._goes_on)
+        bound, is_exact = at.loss.copy(), is_cold | (not self._goes_on)
         count, no = np.zeros_like(rows), [np.zeros(len(rows), dtype=np.bool_) for _ in range(4)]
         return Iterates(control, k, at, contacts, multipliers, angles, no[0], no[1], gain, count, bound, is_exact, no[2], no[3])
 
@@ -128,7 +126,7 @@ class Solver:
         """Set the worth of safety, and let the sequence begin again where it is."""
         self.objective.set_rate(rate)
         now.at.loss = self.objective.compute_loss(np.arange(len(rate)), now.at.cost, now.at.factor)
-        now.bound = now.at.loss + GRACE
+        now.bound = now.at.loss.copy()
         now.is_done[:], now.is_settled[:] = False, False
 
     def _run(self, now: Iterates, deadline: Deadline, small_gain: float) -> None:

@@ -176,7 +176,8 @@ def variance_weights(states: Array, terminal: Array, stage: Array) -> Array:
 
     states (n, 2, N + 1): impulse responses of the states; terminal, stage (n,): weights.
     """
-    squares = states**2
+    is_weighed = (terminal > 0.0) | (stage > 0.0)
+    squares, terminal, stage = states[is_weighed] ** 2, terminal[is_weighed], stage[is_weighed]
     since = np.tensordot(terminal, squares[..., 1:], 1) + np.tensordot(stage, squares[..., :-1].cumsum(axis=-1), 1)
     return since[:, ::-1].ravel()
 
