@@ -13,9 +13,6 @@ from browser_helpers import show
 
 import foc_ros
 
-pytest.importorskip('furo', reason='the extra `doc` is not installed: make doc installs it')
-pytest.importorskip('sphinx_gallery', reason='the extra `doc` is not installed: make doc installs it')
-
 ROOT = Path(__file__).parents[1]
 TOO_WIDE = """
 return [...document.querySelectorAll('.content pre, .content dt.sig, .content img')]
@@ -26,7 +23,11 @@ LONG_TYPES = ('ndarray[tuple', 'TypeAliasForwardRef', '<factory>', 'dtype[', '~n
 
 @pytest.fixture(scope='module')
 def site(tmp_path_factory):
-    """Build the site without running the examples of its gallery, from a copy of what it is made from."""
+    """Return the site that FOC_ROS_SITE names, or else build it from a copy of its sources, without running the examples."""
+    if built := os.environ.get('FOC_ROS_SITE'):
+        return Path(built)
+    for package in ('furo', 'sphinx_gallery'):
+        pytest.importorskip(package, reason='the extra `doc` is not installed: make doc installs it')
     root = tmp_path_factory.mktemp('site')
     copied = shutil.ignore_patterns('auto_examples', '__pycache__')
     for name in ('doc', 'examples', 'scripts', 'config', 'test', 'benchmarks', 'launch'):
@@ -37,8 +38,8 @@ def site(tmp_path_factory):
     environment = os.environ | {'PYTHONPATH': os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')])}
     options = ['--builder', 'html', '--quiet', '--define', 'sphinx_gallery_conf.plot_gallery=False']
     command = [sys.executable, '-m', 'sphinx', *options, root / 'doc', root / 'html']
-    built = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200, check=False)
-    assert built.returncode == 0, built.stderr
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200, check=False)
+    assert done.returncode == 0, done.stderr
     return root / 'html'
 
 

@@ -216,5 +216,5 @@ def test_setup_says_what_it_does_and_linters_and_peers_are_installed_by_their_ta
     told = re.findall(r'echo [\'"]setup: (\w+)', recipes['setup'])
     assert told == ['creating', 'installing', 'ready'] and 'ready; next: make demo' in recipes['setup']
     setup = 'ros,report,play,test'
-    extras = {target: re.findall(r"'\.\[([\w,]+)\]'", recipe) for target, recipe in recipes.items()}
+    extras = {target: re.findall(r"'(?:\.|foc_ros)\[([\w,]+)\]'", recipe) for target, recipe in recipes.items()}
     assert extras == {'setup': [setup], 'lint': [setup, 'lint'], 'doc': [setup, 'doc'], 'bench': [setup, 'bench']}
