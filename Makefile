@@ -31,7 +31,8 @@ STAMP := $(VENV)/.setup-$(ROS)
 PIP = flock $(VENV) $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
 # in the form that editors and mypy follow: the path of the checkout, not an import hook
 EDITABLE := --config-settings editable_mode=compat --editable
-WORKERS ?= auto
+# one more than there are processors, because many tests wait for another process
+WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
 
 export ROS_LOG_DIR := $(CURDIR)/build/ros_log
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
