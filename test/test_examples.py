@@ -31,7 +31,7 @@ PAGES = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
 SLOW = ('07_monte_carlo', '08_replay_bag', '09_custom_strategy', '10_obstacle_source', '11_many_scenes', '14_blended_command')
 """They take more than a second: `make doc`, which runs all examples, is their only test."""
 EXAMPLE_S = 280
-"""Time limit: an example takes a few seconds, the studies of the paper half a minute, and all of them minutes on a busy machine."""
+"""Time limit: an example takes seconds, the studies of the paper half a minute, and both minutes on a busy machine."""
 pytestmark = pytest.mark.timeout(EXAMPLE_S)
 
 
