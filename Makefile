@@ -63,8 +63,10 @@ esac
 endef
 CHECK_PYTHON = $(PYTHON) -c '' 2>/dev/null || { $(EXPLAIN_PYTHON); exit 1; }
 
+# as the commands and the node do: with small matrices, the threads of OpenBLAS keep processors busy and save no time
+ONE_THREAD := OPENBLAS_NUM_THREADS=1
 # tests that share something run in one worker; what is compiled for one target is there for the next
-TEST = env -u PYTHONDONTWRITEBYTECODE ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4 --dist loadgroup
+TEST = env -u PYTHONDONTWRITEBYTECODE ROS_PYTHON_CHECK_FIELDS=1 $(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4 --dist loadgroup
 
 .PHONY: setup tools help check quick-tests test test-long lint demo doc bench people stress colcon dist clean
 
@@ -132,7 +134,7 @@ stress: $(STAMP)
 
 # a warning of Sphinx, such as a link to a page that does not exist, is a failure
 doc: $(VENV)/.doc
-	$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet --fresh-env doc build/doc
+	$(ONE_THREAD) $(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet --fresh-env doc build/doc
 
 $(VENV)/.doc: $(STAMP)
 	@echo 'doc: installing Sphinx'
