@@ -1,5 +1,6 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with what demo and test need; repeated only after a change.
-#                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them
+#                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them,
+#                  and all but the peers by make tools
 # make check       lint, and the quick tests: three quarters of a minute on two cores
 # make test        all tests but the long ones: three minutes on two cores
 # make test-long   the long studies, tests under load and the commands of the documentation
@@ -26,10 +27,12 @@ BIN := $(VENV)/bin
 # The other targets use what setup has chosen.
 ROS ?= $(if $(wildcard $(VENV)/.setup-system),system,wheels)
 STAMP := $(VENV)/.setup-$(ROS)
-PIP := $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
+# two targets do not install at the same time
+PIP = flock $(VENV) $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
 # in the form that editors and mypy follow: the path of the checkout, not an import hook
 EDITABLE := --config-settings editable_mode=compat --editable
-WORKERS ?= auto
+# one more than there are processors, because many tests wait for another process
+WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
 
 export ROS_LOG_DIR := $(CURDIR)/build/ros_log
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
@@ -60,10 +63,12 @@ esac
 endef
 CHECK_PYTHON = $(PYTHON) -c '' 2>/dev/null || { $(EXPLAIN_PYTHON); exit 1; }
 
+# as the commands and the node do: with small matrices, the threads of OpenBLAS keep processors busy and save no time
+ONE_THREAD := OPENBLAS_NUM_THREADS=1
 # tests that share something run in one worker; what is compiled for one target is there for the next
-TEST = env -u PYTHONDONTWRITEBYTECODE ROS_PYTHON_CHECK_FIELDS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4 --dist loadgroup
+TEST = env -u PYTHONDONTWRITEBYTECODE ROS_PYTHON_CHECK_FIELDS=1 $(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4 --dist loadgroup
 
-.PHONY: setup help check quick-tests test test-long lint demo doc bench people stress colcon dist clean
+.PHONY: setup tools help check quick-tests test test-long lint demo doc bench people stress colcon dist clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -80,6 +85,8 @@ $(STAMP): setup.py setup.cfg pyproject.toml
 	@echo 'setup: installing foc_ros[$(EXTRAS)], some minutes'
 	@$(PIP) install --progress-bar off $(EDITABLE) '.[$(EXTRAS)]' | sed -un 's/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  installing them, one or two minutes/p'
 	@touch $@
+
+tools: $(VENV)/.lint $(VENV)/.doc $(VENV)/.dist
 
 help:
 	@sed -n 's/^# //p; /^$$/q' Makefile
@@ -108,18 +115,18 @@ lint: $(VENV)/.lint
 
 $(VENV)/.lint: $(STAMP)
 	@echo 'lint: installing the linters'
-	@$(PIP) install --quiet $(EDITABLE) '.[lint]'
+	@$(PIP) install --quiet 'foc_ros[lint]'
 	@touch $@
 
 colcon: $(STAMP)
-	PYTHON=$(PYTHON) scripts/colcon_check
+	scripts/colcon_check
 
 dist: $(VENV)/.dist
 	PYTHON=$(BIN)/python scripts/dist_check
 
 $(VENV)/.dist: $(STAMP)
 	@echo 'dist: installing build and twine'
-	@$(PIP) install --quiet $(EDITABLE) '.[dist]'
+	@$(PIP) install --quiet 'foc_ros[dist]'
 	@touch $@
 
 stress: $(STAMP)
@@ -127,11 +134,11 @@ stress: $(STAMP)
 
 # a warning of Sphinx, such as a link to a page that does not exist, is a failure
 doc: $(VENV)/.doc
-	$(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet --fresh-env doc build/doc
+	$(ONE_THREAD) $(BIN)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet --fresh-env doc build/doc
 
 $(VENV)/.doc: $(STAMP)
 	@echo 'doc: installing Sphinx'
-	@$(PIP) install --quiet $(EDITABLE) '.[doc]'
+	@$(PIP) install --quiet 'foc_ros[doc]'
 	touch $@
 
 # the peers are large and are installed only for this
@@ -140,7 +147,7 @@ bench: $(VENV)/.bench
 
 $(VENV)/.bench: $(STAMP)
 	@echo 'bench: installing the peers'
-	@$(PIP) install --quiet $(EDITABLE) '.[bench]'
+	@$(PIP) install --quiet 'foc_ros[bench]'
 	touch $@
 
 people: $(STAMP)

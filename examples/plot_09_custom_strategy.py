@@ -16,7 +16,7 @@ import numpy as np
 
 import foc_ros
 
-LARGEST_TAU, BISECTIONS = 0.01, 25
+LARGEST_TAU, BISECTIONS = 0.01, 14
 
 
 def solve_constant_precision(problems, starts, settings, deadline) -> list[foc_ros.StrategyResult]:

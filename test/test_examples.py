@@ -31,7 +31,8 @@ PAGES = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
 SLOW = ('07_monte_carlo', '08_replay_bag', '09_custom_strategy', '10_obstacle_source', '11_many_scenes', '14_blended_command')
 """They take more than a second: `make doc`, which runs all examples, is their only test."""
 EXAMPLE_S = 280
-"""Time limit: an example takes a few seconds, and minutes on a busy machine."""
+"""Time limit: an example takes seconds, the studies of the paper half a minute, and both minutes on a busy machine."""
+pytestmark = pytest.mark.timeout(EXAMPLE_S)
 
 
 def python_blocks(page):
@@ -62,14 +63,12 @@ def test_there_are_examples_with_titles():
         assert f'[{docstring[1]}](../examples/{example.name})' in gallery, f'doc/examples.md does not list {example.name}'
 
 
-@pytest.mark.timeout(EXAMPLE_S)
 @pytest.mark.parametrize('example', [each for each in EXAMPLES if not each.stem.endswith(SLOW)], ids=lambda example: example.stem)
 def test_the_example_runs_and_makes_a_figure(example, pyplot):
     runpy.run_path(str(example), run_name='__main__')
     assert pyplot.get_fignums(), f'{example.name} makes no figure'
 
 
-@pytest.mark.timeout(EXAMPLE_S)
 @pytest.mark.parametrize('page', [page for page in PAGES if python_blocks(page)], ids=lambda page: page.name)
 def test_the_code_on_the_page_runs(page, tmp_path):
     """All blocks of a page run in their order in one process of their own, where warnings are errors."""

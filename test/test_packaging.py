@@ -216,5 +216,11 @@ def test_setup_says_what_it_does_and_linters_and_peers_are_installed_by_their_ta
     told = re.findall(r'echo [\'"]setup: (\w+)', recipes['setup'])
     assert told == ['creating', 'installing', 'ready'] and 'ready; next: make demo' in recipes['setup']
     setup = 'ros,report,play,test'
-    extras = {target: re.findall(r"'\.\[([\w,]+)\]'", recipe) for target, recipe in recipes.items()}
+    extras = {target: re.findall(r"'(?:\.|foc_ros)\[([\w,]+)\]'", recipe) for target, recipe in recipes.items()}
     assert extras == {'setup': [setup], 'lint': [setup, 'lint'], 'doc': [setup, 'doc'], 'bench': [setup, 'bench']}
+
+
+def test_tests_that_share_a_fixture_run_in_one_worker(request, package_xml):
+    """pytest-xdist finds a group by the name of its tests, and without a word it does not with a pytest that it does not know."""
+    is_grouped = getattr(request.config.option, 'loadgroup', False)
+    assert request.node.nodeid.endswith('@test_packaging.py') == is_grouped

@@ -286,8 +286,8 @@ def test_a_strategy_stops_at_its_deadline_with_the_best_so_far(strategy):
         assert late.qp_solves < free.qp_solves
 
 
-TICKS = {'optimal': 1000, 'lv': 120, 'hc': 120}
-"""Ten seconds of the default strategy, and fewer of those that seek a point of a curve, which take several times as long."""
+TICKS = {'optimal': 500, 'lv': 120, 'hc': 120}
+"""Five seconds of the default strategy, and fewer of those that seek a point of a curve, which take several times as long."""
 
 
 @pytest.mark.parametrize('strategy', TICKS)

@@ -15,30 +15,31 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parent
 
+# in the order in which they begin, the longest first, so that no worker is left with one when the others have ended
 LONG = (
-    # studies of the solver over many scenes
-    'test_tracks.py::test_*symmetric_obstacle*',
-    'test_shapes_in_ocp.py::test_what_is_solved_*',
-    'test_shapes_in_ocp.py::test_a_mean_that_only_just_*',
-    'test_shapes_in_ocp.py::test_with_the_risk_*',
-    'test_guidance_safety.py::test_ten_thousand_hostile_hands',
-    # a fit and its comparison or without obstacles, the paper's studies and long reports
-    'test_play_session.py::test_a_fit_and_its_comparison',
-    'test_fit.py::test_without_obstacles_goals_*',
-    'test_report.py::test_a_long_recording_is_thinned_out*',
-    'test_examples.py::test_*trend*',
-    'test_examples.py::test_[frw]*',
-    'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
     # the commands of the documentation, and its web site
     'test_documentation.py::test_commands_work_as_shown',
     'test_documentation_site.py::*',
+    # many hands, the paper's studies, and a fit with its comparison or without obstacles
+    'test_guidance_safety.py::test_thousands_of_hostile_hands',
+    'test_examples.py::test_*trend*',
+    'test_examples.py::test_[frw]*',
+    'test_play_session.py::test_a_fit_and_its_comparison',
+    'test_fit.py::test_without_obstacles_goals_*',
+    # studies of the solver over many scenes, and long reports
+    'test_shapes_in_ocp.py::test_what_is_solved_*',
+    'test_shapes_in_ocp.py::test_a_mean_that_only_just_*',
+    'test_shapes_in_ocp.py::test_with_the_risk_*',
+    'test_tracks.py::test_*symmetric_obstacle*',
+    'test_report.py::test_a_long_recording_is_thinned_out*',
+    'test_report_page.py::test_a_long_recording_says_where_the_slider_stops',
     # a node under load, and a process that is stopped or killed
-    'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
     'test_node_scenes.py::test_the_node_keeps_its_promises_in_a_hostile_scene',
-    'test_node_process.py::test_a_node_that_is_killed_and_started_again',
-    'test_node_process.py::test_a_*work*without_an_error',
     'test_node_predicts.py::test_ten_thousand_obstacles_at_50_hz',
     'test_node_predicts.py::test_*poses_at_1_khz*',
+    'test_node_process.py::test_a_node_that_is_killed_and_started_again',
+    'test_node_process.py::test_a_*work*without_an_error',
+    'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
 )
 
 PROCESS = (
@@ -108,7 +109,10 @@ def is_listed(file: str, function: str, patterns: tuple[str, ...]) -> bool:
 
 
 def add_marks(items: list[pytest.Item]) -> None:
-    """Mark the collected tests; those of a file with fixtures of the module run in one worker, which makes these once."""
+    """Mark the collected tests, and let the long ones begin first, in their order.
+
+    Those of a file with fixtures of the module run in one worker, which makes these once.
+    """
     for item in items:
         if not isinstance(item, pytest.Function):
             continue
@@ -120,6 +124,13 @@ def add_marks(items: list[pytest.Item]) -> None:
         fixtures = [definition for found in item._fixtureinfo.name2fixturedefs.values() for definition in found]
         if any(each.scope == 'module' for each in fixtures):
             item.add_marker(pytest.mark.xdist_group(file))
+    items.sort(key=find_place)
+
+
+def find_place(item: pytest.Item) -> int:
+    """Return the place of a test in LONG; the tests that are not long come after these."""
+    name = f'{item.path.name}::{getattr(item, "originalname", item.name)}'
+    return next((place for place, pattern in enumerate(LONG) if fnmatchcase(name, pattern)), len(LONG))
 
 
 def is_left_out(file: str, expression: str) -> bool:

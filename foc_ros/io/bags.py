@@ -143,9 +143,12 @@ class BagWriter:
 
     def __enter__(self) -> BagWriter:
         with self._named_errors():
-            check_new_bag(self.path)
-            self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
-            self._writer.open()
+            try:
+                self._writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
+                self._writer.open()
+            except WriterError:
+                check_new_bag(self.path)  # also if another process has made it meanwhile
+                raise
         self._undo = ExitStack()
         self._undo.callback(shutil.rmtree, self.path, ignore_errors=True)
         return self
