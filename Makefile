@@ -1,6 +1,5 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with what demo and test need; repeated only after a change.
-#                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them,
-#                  and all but the peers by make tools
+#                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them
 # make check       lint, and the quick tests: three quarters of a minute on two cores
 # make test        all tests but the long ones: three minutes on two cores
 # make test-long   the long studies, tests under load and the commands of the documentation
@@ -31,8 +30,7 @@ STAMP := $(VENV)/.setup-$(ROS)
 PIP = flock $(VENV) $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
 # in the form that editors and mypy follow: the path of the checkout, not an import hook
 EDITABLE := --config-settings editable_mode=compat --editable
-# one more than there are processors, because many tests wait for another process
-WORKERS ?= $(shell echo $$(($$(nproc) + 1)))
+WORKERS ?= auto
 
 export ROS_LOG_DIR := $(CURDIR)/build/ros_log
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
@@ -68,7 +66,7 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1
 # tests that share something run in one worker; what is compiled for one target is there for the next
 TEST = env -u PYTHONDONTWRITEBYTECODE ROS_PYTHON_CHECK_FIELDS=1 $(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4 --dist loadgroup
 
-.PHONY: setup tools help check quick-tests test test-long lint demo doc bench people stress colcon dist clean
+.PHONY: setup help check quick-tests test test-long lint demo doc bench people stress colcon dist clean
 
 setup: $(STAMP)
 ifneq ($(origin PYTHON),file)
@@ -85,8 +83,6 @@ $(STAMP): setup.py setup.cfg pyproject.toml
 	@echo 'setup: installing foc_ros[$(EXTRAS)], some minutes'
 	@$(PIP) install --progress-bar off $(EDITABLE) '.[$(EXTRAS)]' | sed -un 's/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  installing them, one or two minutes/p'
 	@touch $@
-
-tools: $(VENV)/.lint $(VENV)/.doc $(VENV)/.dist
 
 help:
 	@sed -n 's/^# //p; /^$$/q' Makefile
