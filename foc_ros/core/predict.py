@@ -133,10 +133,8 @@ def _solve(
 ) -> list[PredictedCandidate]:
     """Solve the candidates, each from the solution of its track; return them with their numbers and predictive covariances."""
     by_goal = {goal: situation.pose_problem(goal) for goal in {each.goal for each in candidates}}
-    problems, earlier = (
-        [by_goal[each.goal] for each in candidates],
-        [None if each.has_failed else each.solution for each in matched],
-    )
+    problems = [by_goal[each.goal] for each in candidates]
+    earlier = [None if each.has_failed else each.solution for each in matched]
     until = Deadline(whole=deadline, goes_on=True)
     solved = solve_candidates(candidates, problems, situation.config.foc, earlier, until)
     return [situation.add_uncertainty(replace(each, way=track.number)) for each, track in zip(solved, matched, strict=True)]
