@@ -193,7 +193,8 @@ def play_page() -> bytes:
         file.write_text(dump_parameter_file(Config(budget_s=0.0)), encoding='utf-8')
         with play(folder, '--params', str(file)) as started, chromium(folder / 'profile') as browser:
             visit(browser, started, 1100, 860)
-            steer(browser, (0.0, 0.0))
+            # there and back: the first predictions take longer
+            steer(browser, (0.0, 0.0), (0.06, -0.012), (0.0, 0.0), speed=0.02)
             steer(browser, (0.06, -0.012), speed=0.15)
             wait_for_answer(browser)
             picture: bytes = screenshot(browser)
