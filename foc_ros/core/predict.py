@@ -24,7 +24,7 @@ from .plant.models import TripleIntegratorModel, make_plant_model
 from .prediction import PredictedCandidate, Prediction
 from .situation import Situation, prepare_situation
 from .solution import Candidate, Status
-from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_remainder
+from .tracks import NO_TRACKS, Track, Tracks, take_remainder
 from .types import NANOSECONDS, Array, HandState, Unassigned
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
@@ -107,7 +107,6 @@ def predict(
         *known.follow(predicted, matched, solved, absent, stamp_ns),
         stamp_ns,
         goals,
-        obstacles,
         dict(enumerate(situation.durations_s)),
         unassigned,
         None if best is None else best.way,
@@ -166,7 +165,7 @@ def _hold_track(track: Track, candidate: Candidate, situation: Situation, reason
     None if it is too old, if nothing remains, or if it is no path of its class any more.
     """
     hand, obstacles = situation.hand, situation.in_the_way[candidate.goal]
-    if track.solution is None or not track.is_solved_within(hand.stamp_ns, HOLD_S):
+    if track.solution is None or not track.has_answer(hand.stamp_ns):
         return None
     age_s = (hand.stamp_ns - track.solved_ns) / NANOSECONDS
     rest = take_remainder(track.solution, age_s, hand.mean[:2], reason)

@@ -185,7 +185,8 @@ class Solution(Record):
 
     eta: achieved, the smallest over obstacles and steps, and with `lv`, `hc` and `optimal` also between the steps; eta_at:
     (obstacle id, step) where, with fractions of a step. eta_reachable: the largest eta found if the wanted one is unreachable.
-    safety_factor: k that belongs to eta; safety_shortfall: by how much it is below the wanted one, 0 where solved.
+    safety_factor: k that belongs to eta; safety_shortfall: by how much it is below the wanted one, 0 where solved, or estimated
+    where it is a condition.
     motor_covariance (N + 1, n, n): what motor noise alone causes, which eta is about; None where `covariance` is that.
     violation: by how much the mean comes nearer to a centre than sqrt(E[R^2] + tau) [m], 0 where it does not; violation_at:
     (obstacle id, step) where.

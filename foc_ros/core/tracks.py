@@ -29,7 +29,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .interpolation import interpolate_linear
-from .obstacle_table import Obstacles
 from .plant.response import fall_as_minimum_jerk
 from .prediction import PredictedCandidate
 from .solution import Candidate, Solution, agrees, label_class
@@ -71,9 +70,9 @@ class Track(Record):
         label = label_class(row, self.candidate.sides)
         return replace(self, candidate=replace(self.candidate, goal=row, label=label))
 
-    def is_solved_within(self, stamp_ns: int, seconds: float) -> bool:
-        """Tell whether there is a solution that is not older at a stamp [ns] than some seconds [s]."""
-        return self.solution is not None and 0 <= stamp_ns - self.solved_ns <= seconds * NANOSECONDS
+    def has_answer(self, stamp_ns: int) -> bool:
+        """Tell whether there is a solution that is not older at a stamp [ns] than `HOLD_S`."""
+        return self.solution is not None and 0 <= stamp_ns - self.solved_ns <= HOLD_S * NANOSECONDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,7 @@ class Tracks(Record):
     """What one prediction passes to the next.
 
     followed: the tracks of its candidates; absent: those that the search no longer finds, for `HOLD_S`; stamp_ns: of the
-    prediction, None if there was none; goals (g, 2) [m]; obstacles: where they were; durations_s: time to go to each goal [s];
+    prediction, None if there was none; goals (g, 2) [m]; durations_s: time to go to each goal [s];
     unassigned: what no candidate had; most_likely: number of the most likely class; next_number: of the next new class;
     next_goal: row of the goal at which the search begins.
     """
@@ -90,7 +89,6 @@ class Tracks(Record):
     absent: tuple[Track, ...] = ()
     stamp_ns: int | None = None
     goals: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    obstacles: Obstacles | None = None
     durations_s: dict[int, float] = field(default_factory=dict)
     unassigned: Unassigned = field(default_factory=Unassigned)
     most_likely: int | None = None
@@ -225,16 +223,16 @@ class Tracks(Record):
     ) -> tuple[tuple[Track, ...], tuple[Track, ...]]:
         """Return the tracks of the candidates after a prediction, with new solutions where there are, and the absent ones.
 
-        predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found, or
-        with the rest of what it had found before; absent: the tracks that are no candidates.
+        predicted: as published; matched: the track of each candidate; solved: all candidates with what the solver has found;
+        absent: the tracks that are no candidates.
         """
         likelihoods = {each.way: each.likelihood for each in predicted}
         present = []
         for track, found in zip(matched, solved, strict=True):
-            is_new, has_failed = found.has_likelihood and not found.age_s, not found.has_likelihood
+            is_new = found.has_likelihood
             newest = (found.solution, stamp_ns, found.sides) if is_new else (track.solution, track.solved_ns, track.sides)
             share = likelihoods.get(track.number, 0.0)
-            present.append(Track(track.number, found.candidate, stamp_ns, share, *newest, has_failed))
+            present.append(Track(track.number, found.candidate, stamp_ns, share, *newest, not is_new))
         return tuple(present), tuple(replace(each, likelihood=likelihoods.get(each.number, 0.0)) for each in absent)
 
     def _find_recent(self, stamp_ns: int) -> list[Track]:

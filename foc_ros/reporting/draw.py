@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from string import ascii_uppercase
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -104,7 +103,9 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
 def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
     """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
     # the words of a class with many obstacles would leave no room for the plot
-    name = shorten(describe_candidate(candidate, goals), NAME_LETTERS, placeholder=' …')
+    name = describe_candidate(candidate, goals)
+    if len(name) > NAME_LETTERS:
+        name = f'{name[: NAME_LETTERS - 1]}…'
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
     found = 'estimated' if candidate.is_estimated else 'compromised'
