@@ -26,8 +26,7 @@ BIN := $(VENV)/bin
 # The other targets use what setup has chosen.
 ROS ?= $(if $(wildcard $(VENV)/.setup-system),system,wheels)
 STAMP := $(VENV)/.setup-$(ROS)
-# two targets do not install at the same time
-PIP = flock $(VENV) $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
+PIP := $(BIN)/python -m pip --disable-pip-version-check --retries 10 --timeout 120
 # in the form that editors and mypy follow: the path of the checkout, not an import hook
 EDITABLE := --config-settings editable_mode=compat --editable
 WORKERS ?= auto
