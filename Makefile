@@ -1,7 +1,7 @@
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with what demo and test need; repeated only after a change.
 #                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them
 # make check       lint, and the quick tests: three quarters of a minute on two cores
-# make test        all tests but the long ones: three minutes on two cores
+# make test        all tests but the long ones: three and a half minutes on two cores
 # make test-long   the long studies, tests under load and the commands of the documentation
 #                  test/tiers.py lists the long tests (mark `long`), and those that start another process, a ROS graph or a
 #                  browser, or take more than half a second (mark `process`); make check has neither

@@ -105,7 +105,13 @@ PROCESS = (
 
 
 def is_listed(file: str, function: str, patterns: tuple[str, ...]) -> bool:
-    return any(fnmatchcase(f'{file}::{function}', pattern) for pattern in patterns)
+    return find_place(file, function, patterns) < len(patterns)
+
+
+def find_place(file: str, function: str, patterns: tuple[str, ...]) -> int:
+    """Return the place of the first pattern that names a test, the number of patterns if none does."""
+    name = f'{file}::{function}'
+    return next((place for place, pattern in enumerate(patterns) if fnmatchcase(name, pattern)), len(patterns))
 
 
 def add_marks(items: list[pytest.Item]) -> None:
@@ -124,13 +130,7 @@ def add_marks(items: list[pytest.Item]) -> None:
         fixtures = [definition for found in item._fixtureinfo.name2fixturedefs.values() for definition in found]
         if any(each.scope == 'module' for each in fixtures):
             item.add_marker(pytest.mark.xdist_group(file))
-    items.sort(key=find_place)
-
-
-def find_place(item: pytest.Item) -> int:
-    """Return the place of a test in LONG; the tests that are not long come after these."""
-    name = f'{item.path.name}::{getattr(item, "originalname", item.name)}'
-    return next((place for place, pattern in enumerate(LONG) if fnmatchcase(name, pattern)), len(LONG))
+    items.sort(key=lambda item: find_place(item.path.name, getattr(item, 'originalname', item.name), LONG))
 
 
 def is_left_out(file: str, expression: str) -> bool:

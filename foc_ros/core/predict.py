@@ -24,7 +24,7 @@ from .plant.models import TripleIntegratorModel, make_plant_model
 from .prediction import PredictedCandidate, Prediction
 from .situation import Situation, prepare_situation
 from .solution import Candidate, Status
-from .tracks import NO_TRACKS, Track, Tracks, take_remainder
+from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_remainder
 from .types import NANOSECONDS, Array, HandState, Unassigned
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
@@ -165,9 +165,9 @@ def _hold_track(track: Track, candidate: Candidate, situation: Situation, reason
     None if it is too old, if nothing remains, or if it is no path of its class any more.
     """
     hand, obstacles = situation.hand, situation.in_the_way[candidate.goal]
-    if track.solution is None or not track.has_answer(hand.stamp_ns):
-        return None
     age_s = (hand.stamp_ns - track.solved_ns) / NANOSECONDS
+    if track.solution is None or not 0.0 <= age_s <= HOLD_S:
+        return None
     rest = take_remainder(track.solution, age_s, hand.mean[:2], reason)
     if rest is None or not is_there(candidate, rest, obstacles):
         return None

@@ -70,10 +70,6 @@ class Track(Record):
         label = label_class(row, self.candidate.sides)
         return replace(self, candidate=replace(self.candidate, goal=row, label=label))
 
-    def has_answer(self, stamp_ns: int) -> bool:
-        """Tell whether there is a solution that is not older at a stamp [ns] than `HOLD_S`."""
-        return self.solution is not None and 0 <= stamp_ns - self.solved_ns <= HOLD_S * NANOSECONDS
-
 
 @dataclass(frozen=True, eq=False)
 class Tracks(Record):

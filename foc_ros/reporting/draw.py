@@ -102,9 +102,8 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
 
 def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
     """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
-    # the words of a class with many obstacles would leave no room for the plot
     name = describe_candidate(candidate, goals)
-    if len(name) > NAME_LETTERS:
+    if len(name) > NAME_LETTERS:  # the words of a class with many obstacles would leave no room for the plot
         name = f'{name[: NAME_LETTERS - 1]}…'
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'

@@ -171,10 +171,10 @@ def make_verdict(answer: Mapping[str, Any]) -> list[str]:
 
 
 def judge_coverage(share: float, recordings: int) -> str:
-    """Return whether a share of true positions is that of the region, or differs from it by more than chance does.
+    """Return in words whether the region that should hold `COVERAGE_LEVEL` of the true positions holds a share of them by chance.
 
-    The positions of one recording are alike, so chance is what it would be with one position of each: within 1.96 standard
-    deviations of a binomial share, that is where the share's 95 % interval by Wilson (1927, doi:10.2307/2276774) holds the level.
+    The positions of one recording are alike, so each recording counts as one position. A difference is chance up to 1.96
+    standard deviations of a binomial share: then the 95 % interval of Wilson (1927, doi:10.2307/2276774) holds the level.
     """
     difference = share - COVERAGE_LEVEL
     if abs(difference) <= 0.05:

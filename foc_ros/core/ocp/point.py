@@ -155,8 +155,8 @@ def _choose(margins: Margins, problem: Problem, start: Start, row: int, angles: 
 def _follow_guess(margins: Margins, problem: Problem, guess: Array, row: int, angles: Array, largest: float = math.inf) -> Array:
     """Return the control (2N,) that follows a guess (N + 1, 2) no more tightly than it takes to stay in its class.
 
-    angles (m,): those that it sweeps; largest: squared control at which it ends, as tighter paths have larger ones.
-    A path that enters a polygon may be nearest to an edge on the wrong side of it.
+    angles (m,): those that it sweeps; largest: no tighter path is tried after a control whose sum of squares is at least this,
+    because tighter ones need more. A path that enters a polygon may be nearest to an edge on the wrong side of it.
     """
     control, one = np.zeros(0), np.array([row])
     least = HELD_OFF * np.sqrt(margins.reach_square[row])[:, None]

@@ -121,9 +121,9 @@ def _evaluate_one(problem: Problem, result: StrategyResult, minimum: tuple[float
         parts = min(max(math.ceil(longest), 1), MOST_PARTS) if status is Status.INFEASIBLE else 1
         violation, violated = compute_violation(problem, mean, result.tau, parts)
     effort, names = float(control @ control), problem.obstacles.ids
-    # a condition that was not met for lack of time says nothing
-    is_met = status is Status.SOLVED or (status.is_estimate and problem.preference.is_hard)
-    shortfall = 0.0 if is_met else max(problem.wanted_k - k, 0.0)
+    # of a class that had no time to meet a condition, it is not known whether it misses it
+    is_unknown = status.is_estimate and problem.preference.is_hard
+    shortfall = 0.0 if status is Status.SOLVED or is_unknown else max(problem.wanted_k - k, 0.0)
     obstacles, times, pushes = (each.tolist() for each in result.forces)
     return Solution(
         status=status,

@@ -29,7 +29,7 @@ from .planner import FREE, Plan, Planner
 MOST_ITERATIONS = 150
 """Iterations after which a problem counts as not settled; ten are usual from a guess, three from an earlier solution."""
 NEAR = 0.01
-"""Margin relative to the scene below which an obstacle has a row in the QP, as it has below the wanted safety factor."""
+"""An obstacle has a row in the QP where its margin relative to the scene is below this, or its safety factor too small."""
 LARGEST_RATE, GENTLE_RATE = 1e3, 5.0
 """Worth of a unit of safety in logarithms of cost where the wanted safety is a condition, and the one with which the search
 begins where it is larger: at a guess, margins tell little of what they cost."""
