@@ -126,11 +126,12 @@ def measure_warm(build: Callable[[], Obstacles], name: str, is_quick: bool) -> R
     for tick in range(ticks):
         mean, left_s = _follow_plan(ours, generator), scenes.DURATION_S - (tick + 1) * TICK_S
         problem = scenes.build_problem(obstacles, mean, left_s)
-        shifted = resample(replace(ours, control=control), TICK_S, problem.horizon.dt, scenes.STEPS)[1]
+        begin, stride = np.array([TICK_S / ours.dt]), np.array([problem.horizon.dt / ours.dt])
+        shifted = resample(ours.path[None], control[None], begin, stride, scenes.STEPS)[1][0]
         arguments = peer.prepare(problem, shifted.reshape(2, -1).T)
         began = time.perf_counter()
         problem = scenes.build_problem(obstacles, mean, left_s)
-        ours = solve_problem(problem, warm_start(ours, problem), SETTINGS)
+        ours = solve_problem(problem, warm_start([ours], [problem])[0], SETTINGS)
         times.append(time.perf_counter() - began)
         began = time.perf_counter()
         variables = peer.solve(arguments)

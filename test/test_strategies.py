@@ -129,7 +129,7 @@ def test_a_warm_start_is_corrected_to_the_goal_from_where_the_hand_really_is(str
     before = solved(one_obstacle(0.86), BOWED, strategy)
     state = np.array([0.002, 0.001, 0.03, 0.01, 0.8, 0.2])  # not where the plan would be, and far from its acceleration
     problem = replace(one_obstacle(0.86), initial_mean=state)
-    start = warm_start(before, problem)
+    (start,) = warm_start([before], [problem])
     found = solve_problem(problem, start, FocConfig(strategy=strategy))
     fresh = solve_problem(problem, cold_start(BOWED), FocConfig(strategy=strategy))
     assert found.status is fresh.status is Status.SOLVED
@@ -141,7 +141,7 @@ def test_a_movement_at_another_pace_begins_as_the_earlier_one_from_where_the_han
     before = solved(one_obstacle(0.86), BOWED, 'optimal')
     rest = reach(one_obstacle().obstacles, steps=40, duration=0.8 * slower)
     state = before.mean[10] / slower ** np.repeat([0, 1, 2], 2)
-    start = warm_start(replace(before, multipliers=()), replace(rest, initial_mean=state))
+    (start,) = warm_start([replace(before, multipliers=())], [replace(rest, initial_mean=state)])
     np.testing.assert_allclose(start.path, before.path[10:], atol=1e-9)
     np.testing.assert_allclose(start.control.reshape(2, 40).T, before.control[10:] / slower**3, rtol=1e-9, atol=1e-9)
 
@@ -324,7 +324,7 @@ def test_beside_a_box_before_a_hand_at_rest_eta_is_met(gap_mm, radius, yaw):
 def test_a_warm_start_finds_what_a_cold_one_finds(seed, preference):
     problem, guess = make_reach(seed, preference)
     cold = solved(problem, guess, 'optimal')
-    warm = solve_problem(problem, warm_start(cold, problem), FocConfig(strategy='optimal'))
+    warm = solve_problem(problem, warm_start([cold], [problem])[0], FocConfig(strategy='optimal'))
     assert warm.status is cold.status
     rule = QUARTER_SHORTFALL if preference is QUARTER_SHORTFALL else SafetyPreference(1.0, 3.0)
     exact = 1e-6 if preference is HARD else 1e-4

@@ -18,7 +18,7 @@ from .likelihood import BETWEEN_OPERATORS, ClassGoals, compute_likelihoods, comp
 from .obstacle_table import Obstacles
 from .obstacles.clearance import is_free, measure_clearance
 from .obstacles.risk import centre_trajectories
-from .ocp.problem import Problem
+from .ocp.problem import Problem, group_by_response
 from .ocp.solve import solve_problems
 from .ocp.start import Start, cold_start, warm_start
 from .prediction import PredictedCandidate
@@ -69,10 +69,11 @@ def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier
 
     Where the earlier solution was not settled, the start has both.
     """
-    starts = [
-        cold_start(each.guess) if solution is None else warm_start(solution, problem)
-        for each, problem, solution in zip(candidates, problems, earlier, strict=True)
-    ]
+    starts = [cold_start(each.guess) for each in candidates]
+    for rows in group_by_response(problems):
+        known = {row: solution for row in rows if (solution := earlier[row]) is not None}
+        for row, start in zip(known, warm_start(list(known.values()), [problems[row] for row in known]), strict=True):
+            starts[row] = start
     sides = find_all_sides([each.path for each in starts], problems)
     chosen = []
     for each, start, solution, found in zip(candidates, starts, earlier, sides, strict=True):

@@ -60,18 +60,19 @@ def locate(times: Array, steps: int) -> tuple[NDArray[np.intp], Array]:
 
 
 def interpolate_linear(values: Array, at: Array) -> Array:
-    """Return values (m, ...) at times (m,) [steps], linear between those at steps 0..N, (N + 1, ...)."""
-    step, share = locate(at, len(values) - 1)
-    share = share.reshape(-1, *(1,) * (values.ndim - 1))
-    found: Array = (1.0 - share) * values[step] + share * values[step + 1]
+    """Return values (..., m, n) at times (..., m) [steps], linear between those at steps 0..N, (..., N + 1, n)."""
+    step, share = locate(at[..., None], values.shape[-2] - 1)
+    found: Array = (1.0 - share) * np.take_along_axis(values, step, -2) + share * np.take_along_axis(values, step + 1, -2)
     return found
 
 
-def interpolate_position(mean: Array, dt: float, times: Array) -> Array:
-    """Return the mean position (..., 2) [m] at times (...) [s] from states (N + 1, n) at steps of dt [s]."""
-    step, share = locate(times / dt, len(mean) - 1)
-    ends = pair_steps(np.stack((mean[:, :2], dt * mean[:, 2:4]), axis=1))
-    position: Array = (hermite(share)[..., None, :] @ ends[step])[..., 0, :]
+def interpolate_position(mean: Array, dt: Array | float, times: Array) -> Array:
+    """Return the mean positions (..., m, 2) [m] at times (..., m) [s] from states (..., N + 1, n) at steps of dt (...) [s]."""
+    dt = np.asarray(dt)[..., None]
+    step, share = locate(times / dt, mean.shape[-2] - 1)
+    known = np.concatenate((mean[..., :2], dt[..., None] * mean[..., 2:4]), axis=-1)
+    ends = [np.take_along_axis(known, each[..., None], -2) for each in (step, step + 1)]
+    position: Array = (hermite(share)[..., None, :] @ np.concatenate(ends, axis=-1).reshape(*times.shape, 4, 2))[..., 0, :]
     return position
 
 

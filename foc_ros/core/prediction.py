@@ -142,7 +142,8 @@ class PredictedCandidate:
         InputError
             For a time beyond the prediction, or a candidate without a path.
         """
-        return interpolate_position(self.mean, self.solution.dt, self._check_times(t))
+        times = self._check_times(t)
+        return interpolate_position(self.mean, self.solution.dt, times.reshape(-1)).reshape(*times.shape, 2)
 
     def covariance_at(self, t: ArrayLike) -> Array:
         """Return the covariance of the position at times between the steps, too: the total uncertainty.

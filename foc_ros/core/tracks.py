@@ -275,16 +275,15 @@ def take_remainder(solution: Solution, age_s: float, position: Array, reason: st
     steps, left_s = len(solution.control), float(solution.times[-1]) - age_s
     if left_s <= solution.dt:
         return None
-    begin, motor = age_s / solution.dt, solution.motor_covariance
+    begin = age_s / solution.dt
     at = np.linspace(begin, steps, steps + 1)
-    mean, covariance = interpolate_linear(solution.mean, at), as_readonly(interpolate_linear(solution.covariance, at))
+    mean, covariance = interpolate_linear(solution.mean, at), _interpolate_matrices(solution.covariance, at)
     aside, fall = position - mean[0, :2], fall_as_minimum_jerk(np.linspace(0.0, 1.0, steps + 1)[:, None])
     for order in range(mean.shape[1] // 2):
         mean[:, 2 * order : 2 * order + 2] += fall[order] * (aside / left_s**order)
-    if motor is not None:
-        motor = as_readonly(interpolate_linear(motor, at))
     during = (begin + (steps - begin) * (np.arange(steps) + 0.5) / steps).astype(np.intp)
     control = as_readonly(solution.control[np.minimum(during, steps - 1)])
+    motor = None if solution.motor_covariance is None else _interpolate_matrices(solution.motor_covariance, at)
     message, effort = f'{reason}; the answer is from {age_s:.3g} s ago', float((control**2).sum())
     return replace(
         solution,
@@ -296,3 +295,9 @@ def take_remainder(solution: Solution, age_s: float, position: Array, reason: st
         dt=left_s / steps,
         message=message,
     )
+
+
+def _interpolate_matrices(covariance: Array, at: Array) -> Array:
+    """Return covariances (m, n, n) at times (m,) [steps], from those at steps 0..N, (N + 1, n, n)."""
+    found = interpolate_linear(covariance.reshape(len(covariance), -1), at)
+    return as_readonly(found.reshape(-1, *covariance.shape[1:]))

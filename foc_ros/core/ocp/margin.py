@@ -124,6 +124,7 @@ class Margins:
         self.response = problems[0].horizon.position_response
         self.steps = self.response.steps
         self._set_times(between)
+        self.start = np.stack([each.initial_mean[:2] for each in problems])
         self.extent = np.array([each.extent for each in problems])
         self.step_s = np.array([each.horizon.dt for each in problems])
         self.noise_variance = np.stack([each.noise_variance for each in problems])
@@ -191,7 +192,7 @@ class Margins:
 
     def _measure_missing(self) -> Array:
         """Return by how much the hand is inside the margin of each obstacle now, (b, m) [m]."""
-        x, y = (np.stack([each.initial_mean[:2] for each in self.problems])[:, None] - self.centre).transpose(2, 0, 1)
+        x, y = (self.start[:, None] - self.centre).transpose(2, 0, 1)
         variance = self.centre_variance + self._free.variance[:, 0, 0][:, None]
         k = np.array([each.wanted_k for each in self.problems])[:, None] * self.is_chance
         where = np.arange(len(self.problems))[:, None], np.arange(self.count)
@@ -292,8 +293,8 @@ class Margins:
 
     def turn(self, rows: Indices, path: Array) -> Array:
         """Return by how much this line turns between the points of the grid, from now on, (r, m, T) [rad]."""
-        start = np.stack([self.problems[row].initial_mean[:2] for row in rows.tolist()])
-        return self._turn(rows, np.concatenate((start[..., None], path), axis=2), np.concatenate(([0.0], self.times)))
+        from_now = np.concatenate((self.start[rows, :, None], path), axis=2)
+        return self._turn(rows, from_now, np.concatenate(([0.0], self.times)))
 
     def sweep_steps(self, paths: Array) -> Array:
         """Return the swept angles of positions (b, N + 1, 2) of all problems at steps 0..N, (b, m)."""

@@ -82,9 +82,15 @@ class Objective:
         costs = [known[id(each)] for each in problems]
         self.weights = np.stack([each.weights for each in costs]) + lam[:, None] * np.stack([each.variance for each in costs])
         self.fixed = np.array([each.fixed for each in costs])
-        self.goal_rows, self.goal_targets = _pad([each.goal_rows for each in costs]), _pad([each.goal_targets for each in costs])
-        self.soft_rows, self.soft_targets = _pad([each.soft_rows for each in costs]), _pad([each.soft_targets for each in costs])
-        self.soft_weights = _pad([each.soft_weights for each in costs])
+        self.goal_rows, self.goal_targets = (
+            pad_rows([each.goal_rows for each in costs]),
+            pad_rows([each.goal_targets for each in costs]),
+        )
+        self.soft_rows, self.soft_targets = (
+            pad_rows([each.soft_rows for each in costs]),
+            pad_rows([each.soft_targets for each in costs]),
+        )
+        self.soft_weights = pad_rows([each.soft_weights for each in costs])
         self.beta = np.array([each.preference.beta for each in problems])
         # by this the losses of problems with different steps differ from those of costs in m^2/s^5
         self._scale = np.array([math.log(each.horizon.dt) - 2.0 * math.log(each.horizon.gain) for each in problems])
@@ -139,7 +145,7 @@ class Objective:
         return behind
 
 
-def _pad(tables: Sequence[Array]) -> Array:
+def pad_rows(tables: Sequence[Array]) -> Array:
     """Return arrays with different numbers of rows as one, filled up by zeros."""
     most = max(len(each) for each in tables)
     if all(len(each) == most for each in tables):

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,7 +14,7 @@ from foc_ros.core.deadline import NEVER, Deadline
 from foc_ros.core.types import Array
 
 from .iterates import Iterates
-from .margin import Contacts, Margins
+from .margin import Contacts, Indices, Margins
 from .minima import find_minima
 from .problem import Problem
 from .solver import LARGEST_RATE, MOST_ITERATIONS, Solver
@@ -132,43 +131,47 @@ def solve_at(
 
 
 def _begin(margins: Margins, problems: Sequence[Problem], starts: Sequence[Start]) -> tuple[Array, list[Start], Array]:
-    """Return the controls (b, 2N) at which the search begins, with their starts, and the swept angles (b, m) of the classes."""
-    angles = margins.sweep_steps(np.stack([each.path for each in starts]))
-    chosen = [_choose(margins, *each, row, angles[row]) for row, each in enumerate(zip(problems, starts, strict=True))]
-    controls, begun = zip(*chosen, strict=True)
-    return np.stack(controls), list(begun), angles
+    """Return the controls (b, 2N) at which the search begins, with their starts, and the swept angles (b, m) of the classes.
 
-
-def _choose(margins: Margins, problem: Problem, start: Start, row: int, angles: Array) -> tuple[Array, Start]:
-    """Return the control (2N,) at which the search for one problem begins, with its start."""
-    if start.control is None:
-        return _follow_guess(margins, problem, start.path, row, angles), start
-    control: Array = start.control * problem.horizon.gain
-    if start.guess is not None:
-        largest = float(control @ control) / UNSETTLED_EFFORT
-        followed = _follow_guess(margins, problem, start.guess, row, angles, largest)
-        if followed @ followed < largest:
-            return followed, cold_start(start.guess)
-    return control, start
-
-
-def _follow_guess(margins: Margins, problem: Problem, guess: Array, row: int, angles: Array, largest: float = math.inf) -> Array:
-    """Return the control (2N,) that follows a guess (N + 1, 2) no more tightly than it takes to stay in its class.
-
-    angles (m,): those that it sweeps; largest: no tighter path is tried after a control whose sum of squares is at least this,
-    because tighter ones need more. A path that enters a polygon may be nearest to an edge on the wrong side of it.
+    The search begins at the guess where there is no earlier solution, or one that was not settled and needs much more effort.
     """
-    control, one = np.zeros(0), np.array([row])
-    least = HELD_OFF * np.sqrt(margins.reach_square[row])[:, None]
+    angles, chosen = margins.sweep_steps(np.stack([each.path for each in starts])), list(starts)
+    control, most = np.zeros((len(starts), 2 * margins.steps)), np.full(len(starts), np.inf)
+    for row, (problem, start) in enumerate(zip(problems, starts, strict=True)):
+        if start.control is not None:
+            control[row] = start.control * problem.horizon.gain
+            most[row] = control[row] @ control[row] / UNSETTLED_EFFORT
+    guesses = [start.path if start.control is None else start.guess for start in starts]
+    rows = np.array([row for row, guess in enumerate(guesses) if guess is not None], dtype=np.intp)
+    followed = _follow_guesses(margins, rows, guesses, angles, most)
+    for row, found in zip(rows.tolist(), followed, strict=True):
+        if found @ found < most[row]:
+            control[row], chosen[row] = found, cold_start(guesses[row])
+    return control, chosen, angles
+
+
+def _follow_guesses(margins: Margins, rows: Indices, guesses: Sequence[Array | None], angles: Array, most: Array) -> Array:
+    """Return the controls (r, 2N) that follow guesses of problems (r,) no more tightly than it takes to stay in their classes.
+
+    guesses (N + 1, 2), angles (b, m) that they sweep, and most (b,): of all problems. No tighter path is tried after a control
+    whose sum of squares is at least `most`, because tighter ones need more. A path that enters a polygon may be nearest to an
+    edge on the wrong side of it.
+    """
+    control, left = np.zeros((len(rows), 2 * margins.steps)), np.arange(len(rows))
+    times, smoothing = 1.0 + np.arange(margins.steps), margins.response.smoothing
     for tightness in TIGHTNESS:
-        weight = problem.horizon.position_response.smoothing / tightness
-        control = follow(problem, 1.0 + np.arange(margins.steps), guess[1:], weight)
-        if control @ control >= largest:
+        if not len(left):
             break
-        motion = margins.move(one, control[None])
-        swept, grid = margins.sweep(one, margins.find_path(motion)), margins.measure_grid(one, motion, np.zeros(1))
-        if (np.abs(swept - angles) < np.pi).all() and (grid.distance[0] > least).all():
-            break
+        now = rows[left]
+        where, places = np.repeat(np.arange(len(now)), margins.steps), np.concatenate([guesses[row][1:] for row in now.tolist()])
+        problems, weight = [margins.problems[row] for row in now.tolist()], np.full(len(now), smoothing / tightness)
+        control[left] = follow(problems, where, np.tile(times, len(now)), places, weight)
+        is_open = (control[left] ** 2).sum(axis=1) < most[now]
+        left, now = left[is_open], now[is_open]
+        motion = margins.move(now, control[left])
+        swept, grid = margins.sweep(now, margins.find_path(motion)), margins.measure_grid(now, motion, np.zeros(len(now)))
+        least = HELD_OFF * np.sqrt(margins.reach_square[now])[..., None]
+        left = left[~((np.abs(swept - angles[now]) < np.pi).all(axis=1) & (grid.distance > least).all(axis=(1, 2)))]
     return control
 
 

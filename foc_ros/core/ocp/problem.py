@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypedDict, Unpack
@@ -269,3 +270,11 @@ def rest_to_goal(
         risk=options.get('risk', CANTELLI),
         preference=options.get('preference', HARD),
     )
+
+
+def group_by_response(problems: Sequence[Problem]) -> list[list[int]]:
+    """Return the rows of the problems that have the same response of the position to the control, for each response."""
+    groups: dict[int, list[int]] = {}
+    for row, problem in enumerate(problems):
+        groups.setdefault(id(problem.horizon.position_response), []).append(row)
+    return list(groups.values())

@@ -23,7 +23,7 @@ from foc_ros.core.types import Array, as_readonly
 
 from .margin import Margins
 from .minima import find_least_factors
-from .problem import Problem
+from .problem import Problem, group_by_response
 from .start import Start
 from .strategies import StrategyResult
 
@@ -64,11 +64,8 @@ def solve_problems(
         strategy reached, or the smallest violation. No exception is raised for that.
     """
     strategy = STRATEGIES.get(settings.strategy)
-    groups: dict[int, list[int]] = {}
-    for row, problem in enumerate(problems):
-        groups.setdefault(id(problem.horizon.position_response), []).append(row)
     solved: dict[int, Solution] = {}
-    for rows in groups.values():
+    for rows in group_by_response(problems):
         group = [
             each if each.qp_backend == settings.qp_backend else replace(each, qp_backend=settings.qp_backend)
             for each in (problems[row] for row in rows)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -14,7 +15,9 @@ from foc_ros.core.solution import Solution
 from foc_ros.core.types import Array
 
 from .margin import Indices
+from .objective import pad_rows
 from .problem import Problem
+from .qp import number_rows
 
 HELD = 3e-3
 """Distance from the places where an earlier solution touched obstacles, relative to the scene, that counts as much as a change of
@@ -61,88 +64,111 @@ def cold_start(guess: Array) -> Start:
     return Start(np.asarray(guess, dtype=float))
 
 
-def warm_start(previous: Solution, problem: Problem) -> Start:
-    """Start at an earlier solution, from where the hand is on it now, at the pace with which it ends at the new time.
+def warm_start(previous: Sequence[Solution], problems: Sequence[Problem]) -> list[Start]:
+    """Start at earlier solutions, from where the hand is on each now, at the pace with which it ends at the new time.
 
     A movement at r times its pace has the same path. Its velocity is r times as large, its jerk r^3 times, and a force about r^2
-    times. The least change of this control leads the hand to the places where the earlier solution touched obstacles.
+    times. The least change of this control leads the hand to the places where the earlier solution touched obstacles. All
+    solutions have the same number of steps, and all problems the same response to the control.
     """
-    steps, dt, gain = problem.horizon.steps, problem.horizon.dt, problem.horizon.gain
-    begin_s = _find_hand(previous, problem)
-    pace = (previous.dt * len(previous.control) - begin_s) / (dt * steps)
-    path, control = resample(previous, begin_s, pace * dt, steps)
-    control *= pace ** (previous.mean.shape[1] // 2)
-    row = {identity: index for index, identity in enumerate(problem.obstacles.ids)}
-    cost = max(previous.effort, np.finfo(float).tiny)
+    if not previous:
+        return []
+    steps = problems[0].horizon.steps
+    dt, mean = np.array([each.dt for each in previous]), np.stack([each.mean for each in previous])
+    gain, step_s = (np.array([getattr(each.horizon, read) for each in problems]) for read in ('gain', 'dt'))
+    begin = _find_hand(mean, dt, problems)
+    stride = (mean.shape[1] - 1 - begin) / steps
+    path, control = resample(mean[..., :2], np.stack([each.control for each in previous]), begin, stride, steps)
+    control *= ((stride * dt / step_s) ** (mean.shape[2] // 2))[:, None]
+    cost = np.maximum([each.effort for each in previous], np.finfo(float).tiny)
     kept = [
-        (row[identity], shifted, multiplier / cost)
-        for identity, time, multiplier in previous.multipliers
-        if identity in row and 1 <= (shifted := (time * previous.dt - begin_s) / (pace * dt)) <= steps
+        (row, problem.obstacles.ids.index(identity), shifted, multiplier / cost[row])
+        for row, (solution, problem) in enumerate(zip(previous, problems, strict=True))
+        for identity, time, multiplier in solution.multipliers
+        if identity in problem.obstacles.ids and 1 <= (shifted := (time - begin[row]) / stride[row]) <= steps
     ]
-    table = np.array(kept, dtype=float).reshape(-1, 3)
-    forces = Forces(table[:, 0].astype(np.intp), table[:, 1].copy(), table[:, 2].copy())
-    if kept:
-        places = interpolate_position(previous.mean, previous.dt, forces.time * pace * dt + begin_s)
-        weight = (HELD * problem.extent) ** 2 / cost
-        control = follow(problem, forces.time, places, weight / gain**2, control * gain) / gain
-    return Start(path, control, forces, previous.safety_factor, previous.lam)
+    table = np.array(kept, dtype=float).reshape(-1, 4)
+    where, obstacle, (time, multiplier) = table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2:].T
+    moments_s = (begin[where] + stride[where] * time) * dt[where]
+    places = interpolate_position(mean[where], dt[where], moments_s[:, None])[:, 0]
+    weight = (HELD * np.array([each.extent for each in problems])) ** 2 / cost
+    control = follow(problems, where, time, places, weight / gain**2, control * gain[:, None]) / gain[:, None]
+    forces = [Forces(*(each[where == row] for each in (obstacle, time, multiplier))) for row in range(len(problems))]
+    begun = zip(path, control, forces, previous, strict=True)
+    return [Start(each, moved, pushes, solution.safety_factor, solution.lam) for each, moved, pushes, solution in begun]
 
 
-def _find_hand(previous: Solution, problem: Problem) -> float:
-    """Return the time [s] of the state of an earlier movement to which the hand gets with the least effort.
+def _find_hand(mean: Array, dt: Array, problems: Sequence[Problem]) -> Array:
+    """Return the times (b,) [steps] of states of earlier movements to which the hand gets with the least effort.
 
     It is not the time that has passed: a hand at rest is at the beginning, for as long as it rests.
     """
-    count, new_s = len(previous.control), problem.horizon.dt * problem.horizon.steps
+    count, orders = mean.shape[1] - 1, mean.shape[2] // 2
+    new_s = np.array([each.horizon.dt * each.horizon.steps for each in problems])[:, None]
     at = np.linspace(0.0, TRIED * count, int(TRIED * count) * PARTS + 1)
-    states = interpolate_linear(previous.mean, at)
-    orders = states.shape[1] // 2
-    pace, order = (previous.dt * (count - at) / new_s)[:, None, None], np.arange(orders)[:, None]
-    errors = states[:, : 2 * orders].reshape(-1, orders, 2) * pace**order - problem.initial_mean[: 2 * orders].reshape(orders, 2)
-    errors *= new_s**order
-    effort = (errors * (ERROR_EFFORT[:orders, :orders] @ errors)).sum(axis=(1, 2))
-    return float(previous.dt * at[effort.argmin()])
+    states = interpolate_linear(mean, np.broadcast_to(at, (len(mean), len(at)))).reshape(len(mean), len(at), orders, 2)
+    pace, order = (dt[:, None] * (count - at) / new_s)[..., None, None], np.arange(orders)[:, None]
+    hand = np.stack([each.initial_mean for each in problems]).reshape(-1, 1, orders, 2)
+    errors = (states * pace**order - hand) * new_s[..., None, None] ** order
+    effort = (errors * (ERROR_EFFORT[:orders, :orders] @ errors)).sum(axis=(2, 3))
+    begin: Array = at[effort.argmin(axis=1)]
+    return begin
 
 
-def resample(previous: Solution, begin_s: float, dt: float, steps: int) -> tuple[Array, Array]:
-    """Return path (steps + 1, 2) and stacked control (2 steps,) of a solution at new steps of dt [s], from a time of it on."""
-    count = len(previous.control)
-    at = np.minimum((begin_s + dt * np.arange(steps + 1)) / previous.dt, count)
+def resample(path: Array, control: Array, begin: Array, stride: Array, steps: int) -> tuple[Array, Array]:
+    """Return what is left of movements, at new steps: paths (b, steps + 1, 2) and stacked controls (b, 2 steps).
+
+    Parameters
+    ----------
+    path, control
+        Positions (b, N + 1, 2) [m] and controls (b, N, 2).
+    begin, stride
+        Where the rest begins, and the length of its steps, (b,) [steps].
+    """
+    at = np.minimum(begin[:, None] + stride[:, None] * np.arange(steps + 1), control.shape[1])
     # the mean over each new step: the integral of the control, which is linear within the old steps
-    total = np.concatenate((np.zeros((1, 2)), np.cumsum(previous.control, axis=0)))
-    control = np.diff(interpolate_linear(total, at), axis=0) * (previous.dt / dt)
-    return interpolate_linear(previous.path, at), control.T.ravel()
+    total = np.concatenate((np.zeros((len(control), 1, 2)), np.cumsum(control, axis=1)), axis=1)
+    left = np.diff(interpolate_linear(total, at), axis=1) / stride[:, None, None]
+    return interpolate_linear(path, at), left.swapaxes(1, 2).reshape(len(control), -1)
 
 
-def follow(problem: Problem, times: Array, places: Array, weight: float, control: Array | None = None) -> Array:
-    """Return the control nearest to a given one with which the mean meets the goal and is near some places at their times.
+def follow(
+    problems: Sequence[Problem], where: Indices, times: Array, places: Array, weight: Array, control: Array | None = None
+) -> Array:
+    """Return the controls nearest to given ones with which the means meet the goals and are near some places at their times.
 
-    It minimises the squared distances from the places plus a weight of the squared change of the control. Its dual has one
+    They minimise the squared distances from the places plus a weight of the squared change of the control. Their dual has one
     unknown for each coordinate of a place and for each state that the goal fixes.
 
     Parameters
     ----------
-    problem
-        The problem, of N steps.
-    times, places
-        Times (q,) in steps, after 0, and positions (q, 2) [m].
+    problems
+        b problems of N steps, with the same response to the control.
+    where, times, places
+        Rows of the problems (q,), times (q,) in steps, after 0, and positions (q, 2) [m].
     weight
-        Of the squared change of the control in units of `Horizon.gain` [m^2].
+        Of the squared change of each control in units of `Horizon.gain`, (b,) [m^2].
     control
-        The given control (2N,), in units of `Horizon.gain`; zero where there is none.
+        The given controls (b, 2N), in units of `Horizon.gain`; zero where there are none.
 
     Returns
     -------
     Array
-        The control (2N,), in units of `Horizon.gain`.
+        The controls (b, 2N), in units of `Horizon.gain`.
     """
-    horizon = problem.horizon
-    control = np.zeros(2 * horizon.steps) if control is None else control
-    goal, targets = problem.fixed_goal
-    free = interpolate_position(problem.free, horizon.dt, times * horizon.dt)
-    rows = np.concatenate((goal, horizon.position_response.at(times).reshape(-1, len(control))))
-    missing = np.concatenate((targets, (places - free).ravel())) - rows @ control
-    square = rows @ rows.T
-    may_miss = JITTER * square.diagonal() + np.repeat((0.0, weight), (len(goal), 2 * len(times)))
-    followed: Array = control + rows.T @ np.linalg.solve(square + np.diag(may_miss), missing)
+    horizon, count = problems[0].horizon, len(problems)
+    control = np.zeros((count, 2 * horizon.steps)) if control is None else control
+    goal, targets = (pad_rows([each.fixed_goal[part] for each in problems]) for part in (0, 1))
+    numbered = number_rows(where, count)
+    dt, free = np.array([each.horizon.dt for each in problems]), np.stack([each.free for each in problems])
+    missing = places - interpolate_position(free[where], dt[where], (times * dt[where])[:, None])[:, 0]
+    response = numbered.spread(horizon.position_response.at(times))
+    rows = np.concatenate((goal, response.reshape(count, -1, 2 * horizon.steps)), axis=1)
+    wanted = np.concatenate((targets, numbered.spread(missing).reshape(count, -1)), axis=1)
+    square = rows @ rows.swapaxes(1, 2)
+    at, ends = np.arange(square.shape[1]), goal.shape[1]
+    square[:, at, at] += JITTER * np.where(at < ends, 1.0, square[:, at, at])
+    square[:, at[ends:], at[ends:]] += weight[:, None]
+    pushes = np.linalg.solve(square, wanted[..., None] - rows @ control[..., None])
+    followed: Array = control + (rows.swapaxes(1, 2) @ pushes)[..., 0]
     return followed
