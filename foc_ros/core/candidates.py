@@ -79,7 +79,7 @@ def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier
     for each, start, solution, found in zip(candidates, starts, earlier, sides, strict=True):
         if not each.contains(found):
             chosen.append(cold_start(each.guess))
-        elif solution is not None and solution.status.is_estimate:
+        elif solution is not None and solution.status is Status.DEADLINE:
             chosen.append(replace(start, guess=each.guess))
         else:
             chosen.append(start)
