@@ -34,7 +34,8 @@ LARGEST_RATE, GENTLE_RATE = 1e3, 5.0
 """Worth of a unit of safety in logarithms of cost where the wanted safety is a condition, and the one with which the search
 begins where it is larger: at a guess, margins tell little of what they cost."""
 ROUGH_GAIN = 1e-3
-"""Gain, as a logarithm of cost, at which the search with the gentle worth ends."""
+"""Gain, as a logarithm of cost, at which the search with the gentle worth ends, and by which the last step of a later prediction
+may miss what its QP foretold."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
 LAST_GAIN = 1e-4
@@ -195,7 +196,7 @@ class Solver:
             missed = np.abs(now.at.loss[rows] - at.loss - plan.fall[place])
             is_free = plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
             is_exact = is_free | now.is_exact[rows]
-            is_small = np.where(is_exact, plan.gain[place], missed) < LAST_GAIN
+            is_small = np.where(is_exact, plan.gain[place] < LAST_GAIN, missed < ROUGH_GAIN)
             is_met = is_free | (at.factor >= self.objective.wanted_k[rows])
             is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True
