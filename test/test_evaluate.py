@@ -68,7 +68,7 @@ def test_reaches_past_an_obstacle_are_scored_by_class(whole):
     assert by_class['foc']['gain'] > 0.1 and by_class['constant velocity']['gain'] > 0.0
     assert sum(each['predictions'] for each in by_class['foc']['by_tenth']) == by_class['foc']['predictions']
     assert sum(each['count'] for each in by_class['foc']['reliability']) == by_class['foc']['predictions']
-    assert whole['parameters']['foc.steps'] == 20
+    assert whole['parameters']['foc.steps'] == 15
     assert whole['labels_not_taken'] == {'left too': 'label 0, path 1'}
 
 

@@ -215,7 +215,7 @@ def test_displacements_are_averaged_up_to_the_horizon_and_ellipses_cover_what_is
 
 @pytest.mark.parametrize('apart', [0.0, 1.5, 10.0])
 def test_the_region_holds_its_share_of_samples(apart):
-    draws, count = np.random.default_rng(5), 4000
+    draws, count = np.random.default_rng(5), 2000
     likelihood = np.array([0.6, 0.3, 0.1])
     mean = apart * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     covariance = np.array([np.diag([1.0, 1.0]), [[2.0, 0.9], [0.9, 0.5]], np.diag([0.1, 0.1])])
