@@ -131,6 +131,6 @@ def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles
 
 def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a fit in this process predict seldom and try few settings."""
-    monkeypatch.setattr(fit, 'PREDICTIONS', 3)
+    monkeypatch.setattr(fit, 'PREDICTIONS', 2)
     for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
         monkeypatch.setattr(race, name, few)
