@@ -20,11 +20,12 @@ LONG = (
     # the commands of the documentation, and its web site
     'test_documentation.py::test_commands_work_as_shown',
     'test_documentation_site.py::*',
-    # many hands, the paper's studies, and a fit with its comparison or without obstacles
+    # many hands, the paper's studies, and fits of everything, with their comparison or without obstacles
     'test_guidance_safety.py::test_thousands_of_hostile_hands',
     'test_examples.py::test_*trend*',
     'test_examples.py::test_[frw]*',
     'test_play_session.py::test_a_fit_and_its_comparison',
+    'test_fit.py::test_everything_is_fitted_*',
     'test_fit.py::test_without_obstacles_goals_*',
     # studies of the solver and of the search over many scenes, and long reports
     'test_solution_numbers.py::test_nothing_is_below_*',
