@@ -77,7 +77,7 @@ def recorded(*each: Observation, name: str = 'one') -> ObservedRecording:
 
 TWO_CLASSES = make_candidates([[LEFT], [RIGHT]])
 
-PARAMETERS = '/**: {ros__parameters: {rate_hz: 4.0, foc.steps: 20, foc.strategy: fixed, foc.tau: 1.0e-4, foc.lam: 0.0}}'
+PARAMETERS = '/**: {ros__parameters: {rate_hz: 4.0, foc.steps: 15, foc.strategy: fixed, foc.tau: 1.0e-4, foc.lam: 0.0}}'
 
 
 def reach(aside: float, end: tuple[float, float], seconds: float = 1.0, rest: float = 0.2, rate: float = 40.0):
@@ -131,6 +131,6 @@ def recorded_hand(name: str, times: np.ndarray, positions: np.ndarray, obstacles
 
 def use_few_predictions(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a fit in this process predict seldom and try few settings."""
-    monkeypatch.setattr(fit, 'PREDICTIONS', 3)
+    monkeypatch.setattr(fit, 'PREDICTIONS', 2)
     for name, few in {'DURATIONS': (), 'NOISES': (0.5,), 'ETAS': (0.7,)}.items():
         monkeypatch.setattr(race, name, few)

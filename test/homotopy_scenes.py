@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes for the tests of the homotopy classes, and a brute-force search for these that shares nothing with the package."""
 
-from pathlib import Path
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
@@ -16,7 +14,6 @@ from foc_ros.core.obstacles.shapes import make_box_polygon
 
 CLEARANCE = 0.005
 GOAL = np.array([0.35, 0.0])
-AVOIDING = Path(__file__).parents[2] / 'shared' / 'data' / 'd3il_avoiding'
 
 ANY = 1e6
 """A detour that leaves out no class."""

@@ -6,22 +6,19 @@ import contextlib
 import io
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from evaluation_samples import reach, write_tables
-from homotopy_scenes import AVOIDING
 
 from foc_ros.analysis.evaluation import Forecast, register_baseline
 from foc_ros.analysis.evaluation.baselines import BASELINES
-from foc_ros.analysis.evaluation.observations import GAP, PATH_CLASS, ask, ask_all, find_relevant_obstacles, observe
 from foc_ros.analysis.evaluation.observations import GOAL as GOAL_QUESTION
-from foc_ros.analysis.evaluation.report import find_gaps, find_label_mismatches
+from foc_ros.analysis.evaluation.observations import PATH_CLASS, ask_all, observe
+from foc_ros.analysis.evaluation.report import find_label_mismatches
 from foc_ros.analysis.evaluation.scores import leave_goals_out
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
-from foc_ros.core.config import replace_values
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.ros.parameters import load_parameter_file
 
@@ -68,7 +65,7 @@ def test_reaches_past_an_obstacle_are_scored_by_class(whole):
     assert by_class['foc']['gain'] > 0.1 and by_class['constant velocity']['gain'] > 0.0
     assert sum(each['predictions'] for each in by_class['foc']['by_tenth']) == by_class['foc']['predictions']
     assert sum(each['count'] for each in by_class['foc']['reliability']) == by_class['foc']['predictions']
-    assert whole['parameters']['foc.steps'] == 20
+    assert whole['parameters']['foc.steps'] == 15
     assert whole['labels_not_taken'] == {'left too': 'label 0, path 1'}
 
 
@@ -282,22 +279,3 @@ def test_the_goal_that_is_left_out_was_reached_in_the_task_plane(tmp_path):
     (tmp_path / 'goals.csv').write_text('x_m,y_m,z_m\n0.3,0.0,-0.1\n0.3,0.0,0.1\n')
     (left,) = leave_goals_out(find_recordings(tmp_path), 'xz').values()
     assert left.scene.goals.tolist() == [[0.3, 0.0, -0.1]]
-
-
-THUMB_STICK = Path(__file__).parents[1] / 'doc' / 'examples' / 'thumb_stick.yaml'
-
-
-@pytest.mark.skipif(not AVOIDING.is_dir(), reason='optional data ../shared/data/d3il_avoiding is not there')
-def test_the_classes_taken_are_as_labelled(tmp_path):
-    name = '053'
-    config = replace_values(load_parameter_file(THUMB_STICK), {'rate_hz': 0.5})
-    recording = observe(find_recordings(AVOIDING)[name], config)
-    first, relevant = recording.observations[0], find_relevant_obstacles(recording)
-    assert first.row.tolist() == [0, 1, 1, 2, 2, 2]
-    assert ask(PATH_CLASS, first, relevant).possible == 24
-    assert ask(GAP, first, relevant).possible == 2
-    # a goal stands behind each gap of the last row
-    assert ask(GOAL_QUESTION, first, relevant).truth == find_gaps(first)[2]
-    label = next(line for line in (AVOIDING / 'labels.csv').read_text().splitlines() if line.startswith(f'{name},'))
-    (tmp_path / 'labels.csv').write_text(f'recording,gap_row1,gap_row2,gap_row3\n{label}\n')
-    assert find_label_mismatches(tmp_path, [recording]) == {}

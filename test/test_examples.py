@@ -28,7 +28,10 @@ from foc_ros import Status
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
-SLOW = ('07_monte_carlo', '08_replay_bag', '09_custom_strategy', '10_obstacle_source', '11_many_scenes', '14_blended_command')
+SLOW = (
+    '03_likelihood_over_eta', '04_strategies', '07_monte_carlo', '08_replay_bag', '09_custom_strategy',
+    '10_obstacle_source', '11_many_scenes', '14_blended_command', '15_cartesian_impedance',
+)  # fmt: skip
 """They take more than a second: `make doc`, which runs all examples, is their only test."""
 EXAMPLE_S = 280
 """Time limit: an example takes seconds, the studies of the paper half a minute, and both minutes on a busy machine."""

@@ -31,13 +31,8 @@ def _fit(folder, capsys, *arguments, **parameters):
     return json.loads(printed.out), load_parameter_file(output)
 
 
-@pytest.fixture(scope='module')
-def past_an_obstacle(tmp_path_factory):
-    return write_fit_tables(tmp_path_factory.mktemp('fit') / 'data')
-
-
-def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle, capsys):
-    answer, config = _fit(past_an_obstacle, capsys)
+def test_everything_is_fitted_and_written_for_the_node(tmp_path, capsys):
+    answer, config = _fit(write_fit_tables(tmp_path / 'data'), capsys)
     assert answer['recordings'] == 6 and answer['failed'] == {}
     values = flatten(config)
     fitted = {'estimator.position_stddev', 'estimator.jerk_density', 'duration.fitts_a_s', 'duration.fitts_b_s'}
@@ -63,7 +58,7 @@ def test_everything_is_fitted_and_written_for_the_node(past_an_obstacle, capsys)
     # six recordings determine how the hand moves, not how classes are weighed, so that these gain nothing
     assert answer['comparison']['class_gain']['after'] > answer['comparison']['class_gain']['before'] - 0.02
     assert answer['comparison']['nlpd']['after'] < answer['comparison']['nlpd']['before']
-    assert answer['node'][0] == f'python -m foc_ros node --ros-args --params-file {past_an_obstacle.parent / "fitted.yaml"}'
+    assert answer['node'][0] == f'python -m foc_ros node --ros-args --params-file {tmp_path / "fitted.yaml"}'
     assert any('too alike to tell intercept and slope apart' in words for words in answer['warnings'])
 
 

@@ -11,7 +11,7 @@ from prediction_samples import outcome
 
 import foc_ros
 from foc_ros.core.config import Config, GuidanceConfig
-from foc_ros.core.guidance.guide import DOUBT, EVIDENCE, GuidanceInput, GuidanceState, combine, guide, weigh_candidates
+from foc_ros.core.guidance.guide import DOUBT, GuidanceInput, GuidanceState, combine, guide, weigh_candidates
 from foc_ros.core.guidance.limits import build_margins
 from foc_ros.core.guidance.paths import POSITION_STDDEV, compute_stiffness, find_crossing, find_need
 from foc_ros.core.obstacle_table import make_obstacles
@@ -51,33 +51,6 @@ def test_the_stiffness_is_linear_in_the_precision_between_its_bounds(stddev, sha
     variance = max(stddev**2 - POSITION_STDDEV**2, 0.0)
     stiffness = compute_stiffness(np.array([variance * np.eye(2)]), SETTINGS)
     assert stiffness[0] == pytest.approx(share * 100.0 * np.eye(2), abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ('weights', 'forces', 'is_crossing', 'force', 'expected'),
-    [
-        pytest.param([0.6, 0.4], [1.0, 2.0], False, 1.4, 1.0, id='both help'),
-        pytest.param([0.6, 0.2], [1.0, 2.0], False, 0.6 * 1.25, 0.6, id='nobody knows for 0.2'),
-        pytest.param([0.5, 0.5], [1.0, -1.0], False, 0.0, None, id='it helps with one half'),
-        pytest.param([0.5, 0.4], [1.0, -1.0], False, 0.0, None, id='it helps with one half at most'),
-        pytest.param([0.75, 0.25], [1.0, -1.0], False, 0.5 / 0.75 * 0.5, 0.5, id='one is against it'),
-        pytest.param([0.75, 0.25], [1.0, -1.0], True, 0.5, 0.5, id='the other leads across an obstacle'),
-        pytest.param([0.75, 0.25], [0.0, 0.0], False, 0.0, 1.0, id='none pulls'),
-    ],
-)
-def test_a_force_is_the_mean_of_those_that_help_times_its_expected_benefit(weights, forces, is_crossing, force, expected):
-    found, agreement = combine(np.array(weights), np.array([[0.0, each] for each in forces]), np.array([False, is_crossing]))
-    assert found == pytest.approx([0.0, force])
-    assert expected is None or agreement == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(('across', 'odds'), [(0.0, 3.0), (EVIDENCE, 3.0 * np.e**2), (-EVIDENCE, 3.0 / np.e**2)])
-def test_the_acceleration_of_the_hand_tells_which_candidate_it_follows(across, odds):
-    forces = np.array([[0.0, 2.0], [0.0, -0.1]])
-    weights = weigh_candidates(np.array([0.6, 0.2]), forces, np.array([5.0, across]), 0.1, 0.1)
-    assert weights[0] / weights[1] == pytest.approx(odds)
-    nobody = (0.2 + DOUBT) / 0.6 * np.exp(-across / EVIDENCE)
-    assert 1.0 - weights.sum() == pytest.approx(nobody * weights[0])
 
 
 def test_a_force_yields_to_a_hand_that_accelerates_against_it():

@@ -16,7 +16,7 @@ from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import Status
 from foc_ros.core.types import Array
 
-FEW, BATCH, BATCHES = 200, 1500, 2
+FEW, BATCH, BATCHES = range(100, 200), 1500, 2
 
 
 def check_bounds(run):
@@ -53,7 +53,7 @@ def check_many(seeds):
 
 
 def test_hostile_hands():
-    check_many(range(FEW))
+    check_many(FEW)
 
 
 @pytest.mark.parametrize('batch', range(BATCHES))

@@ -278,14 +278,6 @@ def test_what_a_blocked_class_had_is_unknown_until_the_others_have_won_it():
     assert changed[-1].unknown < 0.01
 
 
-def test_an_obstacle_that_has_a_new_name_in_each_message_is_one_obstacle():
-    predictor = make_predictor(Config(budget_s=0.0), GOAL, POST)
-    for tick in range(15):
-        predictor.set_obstacles(foc_ros.Circle((0.17, 0.01), 0.03, name=f'{100 + tick}'))
-        prediction = predictor.update(TICK_S * tick, (0.0, 0.0))
-        assert {each.label for each in prediction} == {f'goal0:-{100 + tick}', f'goal0:+{100 + tick}'}
-
-
 def test_two_classes_that_an_obstacle_does_not_tell_apart_when_the_hand_is_there_are_one_without_its_name():
     """The post moves ahead of the hand, past the goal. Noise decides on which side of it the shorter guess is."""
     noise, predictor = np.random.default_rng(0), make_predictor(Config(budget_s=0.0), GOAL)

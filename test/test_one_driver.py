@@ -19,7 +19,7 @@ from foc_ros.io.topics import CLOUD, GOALS, HAND
 from foc_ros.ros.messages.encode_inputs import encode_goals, encode_hand_pose, encode_obstacles
 
 CONFIG = replace_values(
-    Config(), {'rate_hz': 1000.0, 'budget_s': 0.0, 'foc.steps': 10, 'homotopy.max_candidates': 3, 'experience.learning': 'online'}
+    Config(), {'rate_hz': 1000.0, 'budget_s': 0.0, 'foc.steps': 10, 'homotopy.max_candidates': 2, 'experience.learning': 'online'}
 )
 PERIOD_S, SLOW_S, JUMP = 0.1, 2.2, 12
 SCENE = [(0.15, 0.01, 0.0, 0.03, 0.002, 7), (0.22, -0.04, 0.0, 0.02, 0.001, 9)]

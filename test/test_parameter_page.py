@@ -5,8 +5,10 @@
 import re
 from pathlib import Path
 
+import pytest
+
 from foc_ros.core.config import Config, list_parameters
-from foc_ros.ros.parameters import dump_parameter_file
+from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, FILE = ROOT / 'doc' / 'parameters.md', ROOT / 'config' / 'foc.yaml'
@@ -65,6 +67,11 @@ def test_the_page_is_current():
 
 def test_the_parameter_file_is_current():
     assert FILE.read_text('utf-8') == dump_parameter_file(Config()), REMEDY
+
+
+@pytest.mark.parametrize('name', ['free_hand', 'thumb_stick'])
+def test_the_parameters_of_the_documentation_can_be_read(name):
+    assert load_parameter_file(ROOT / 'doc' / 'examples' / f'{name}.yaml') != Config()
 
 
 def test_every_parameter_is_read_somewhere():

@@ -46,9 +46,9 @@ from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 HAND = {'type': 'hand', 't': 10.0, 'x': 0.1, 'y': 0.0, 'event': None}
 
 
-@pytest.fixture(autouse=True)
-def _no_warning_of_sockets():
-    """Collect the sockets of refused connections here, which Tornado leaves to the garbage collector."""
+@pytest.fixture
+def sockets():
+    """Collect the sockets of refused connections after a test, which Tornado leaves to the garbage collector."""
     with warnings.catch_warnings():
         warnings.simplefilter('ignore', ResourceWarning)
         yield
@@ -89,6 +89,7 @@ async def read(socket, kind):
     raise AssertionError(f'closed before a message {kind}')
 
 
+@pytest.mark.usefixtures('sockets')
 def test_only_files_of_the_page_are_served(tmp_path):
     async def test(address):
         for path, file in FILES.items():
@@ -102,6 +103,7 @@ def test_only_files_of_the_page_are_served(tmp_path):
     serve(tmp_path, test)
 
 
+@pytest.mark.usefixtures('sockets')
 def test_another_page_and_a_name_that_was_made_to_lead_here_are_refused(tmp_path):
     async def test(address):
         port = address.rpartition(':')[2]
@@ -118,6 +120,7 @@ def test_another_page_and_a_name_that_was_made_to_lead_here_are_refused(tmp_path
     serve(tmp_path, test)
 
 
+@pytest.mark.usefixtures('sockets')
 def test_bad_messages_are_refused_and_harm_nothing(tmp_path):
     async def test(address):
         socket = await connect(address)
@@ -144,6 +147,7 @@ def test_bad_messages_are_refused_and_harm_nothing(tmp_path):
     serve(tmp_path, test)
 
 
+@pytest.mark.usefixtures('sockets')
 def test_a_wrong_option_is_refused_in_one_line(tmp_path, capsys):
     with (tmp_path / 'file').open('w'):
         pass

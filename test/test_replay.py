@@ -296,13 +296,13 @@ def test_guidance_of_a_recording_takes_no_jump_for_work():
 
 
 def test_guidance_is_the_same_each_time(tmp_path, capsys):
-    """In the first 4 s of the packaged recording."""
+    """In the first 3 s of the packaged recording."""
     values = {'rate_hz': 2.0, 'foc.steps': 20, 'homotopy.max_candidates': 2}
     values |= {'guidance.clearance': 0.0, 'guidance.rate_hz': 25.0, 'guidance.hold_s': 1.0}
     parameters, out = write_parameters(tmp_path, replace_values(Config(), values)), tmp_path / 'out'
     with BagReader(RECORDING) as reader:
         items = [(item.topic, item.log_ns, item.message) for item in reader]
-    bag = write_bag(tmp_path / 'bag', [each for each in items if each[1] < items[0][1] + 4 * 10**9])
+    bag = write_bag(tmp_path / 'bag', [each for each in items if each[1] < items[0][1] + 3 * 10**9])
 
     def run(*options):
         assert main(['replay', str(bag), '--params', parameters, '--json', *options]) == 0

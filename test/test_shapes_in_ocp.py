@@ -27,7 +27,7 @@ from foc_ros.core.plant.plants import build_triple_integrator_horizon
 from foc_ros.core.solution import Status
 
 GOAL = np.array([0.3, 0.0])
-SAMPLES = 20_000
+SAMPLES = 10_000
 Z = NormalDist().inv_cdf(1 - 1e-3 / 1000)
 """Of all counts of the shapes together, one in a thousand runs is off by more."""
 GUESS = bowed((0, 0), GOAL, 50, 0.09)

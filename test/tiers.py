@@ -20,13 +20,17 @@ LONG = (
     # the commands of the documentation, and its web site
     'test_documentation.py::test_commands_work_as_shown',
     'test_documentation_site.py::*',
-    # many hands, the paper's studies, and a fit with its comparison or without obstacles
+    # many hands, the paper's studies, and fits of everything, with their comparison or without obstacles
     'test_guidance_safety.py::test_thousands_of_hostile_hands',
     'test_examples.py::test_*trend*',
     'test_examples.py::test_[frw]*',
     'test_play_session.py::test_a_fit_and_its_comparison',
+    'test_fit.py::test_everything_is_fitted_*',
     'test_fit.py::test_without_obstacles_goals_*',
-    # studies of the solver over many scenes, and long reports
+    # studies of the solver and of the search over many scenes, and long reports
+    'test_solution_numbers.py::test_nothing_is_below_*',
+    'test_reference_cases.py::test_classes_are_as_good_*',
+    'test_homotopy.py::test_brute_force_finds_*',
     'test_shapes_in_ocp.py::test_what_is_solved_*',
     'test_shapes_in_ocp.py::test_a_mean_that_only_just_*',
     'test_shapes_in_ocp.py::test_with_the_risk_*',
@@ -39,7 +43,9 @@ LONG = (
     'test_node_predicts.py::test_*poses_at_1_khz*',
     'test_node_process.py::test_a_node_that_is_killed_and_started_again',
     'test_node_process.py::test_a_*work*without_an_error',
-    'test_parallel.py::test_a_scheduler_that_dies_ends_the_run_in_words',
+    'test_parallel.py::test_a_scheduler_that_dies_*',
+    'test_parallel.py::test_a_killed_worker_*',
+    'test_parallel.py::test_an_evaluation_*',
 )
 
 PROCESS = (
@@ -70,8 +76,6 @@ PROCESS = (
     'test_reference_cases.py::test_*class*',
     'test_shapes_in_ocp.py::*',
     'test_strategies.py::*',
-    'test_solution_numbers.py::test_nothing_is_below_*',
-    'test_homotopy.py::test_brute_force_finds_*',
     'test_homotopy.py::test_candidates_stay_*',
     'test_extensions.py::test_a_qp_backend_*',
     'test_tracks.py::test_*_class_*',
