@@ -93,7 +93,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     fit.config = replace_values(fit.config, UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
     fit.comparison = compare_configs(compared, (config, fit.config), thinned)
-    fit.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
+    fit.warnings[:0] = find_worse_positions(fit.comparison)
     return fit
 
 
@@ -172,19 +172,6 @@ def find_worse_positions(comparison: Mapping[str, Mapping[str, float | None]]) -
         for horizon, before, after in errors
         if before is not None and after is not None and after > 1.05 * before + 0.001
     ]
-
-
-def find_lower_coverage(fit: Fit) -> list[str]:
-    """Return a sentence where the coverage falls by 1 %: of held-out predictions if there are any, else of all."""
-    shares = fit.scores.get('inside_all_90', {})
-    changes = {'of recordings held out ': (shares.get('as given'), shares.get('without the recording'))}
-    if 'inside_90' in fit.comparison:
-        changes[''] = (fit.comparison['inside_90']['before'], fit.comparison['inside_90']['after'])
-    for kind, (before, after) in changes.items():
-        if before is not None and after is not None and after < before - 0.01:
-            held = f'the region of {100 * COVERAGE_LEVEL:.0f} % holds fewer true positions {kind}0.5 s ahead'
-            return [f'{held} with the fitted parameters: {100 * after:.0f} % instead of {100 * before:.0f} %']
-    return []
 
 
 def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
