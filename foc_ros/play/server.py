@@ -14,7 +14,6 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from socket import socket
 from typing import Any
@@ -116,7 +115,7 @@ async def serve(config: Config, data: Path, host: str, sockets: Sequence[socket]
     sys.setswitchinterval(0.001)  # a thread that waits for Python's global lock gets it sooner than after 5 ms
 
     def make_predictor(given: Config, receive: Receive) -> Predictor:
-        return Predictor(given, partial(loop.call_soon_threadsafe, receive))
+        return Predictor(given, lambda outcome: loop.call_soon_threadsafe(receive, outcome))
 
     session = Session(make_predictor, config, data)
     server = listen(session, host, sockets)
