@@ -15,6 +15,7 @@ from foc_ros.analysis.evaluation.positions import compute_log_densities
 from foc_ros.analysis.evaluation.truth import HORIZONS, TIMES_S
 from foc_ros.analysis.fitting import SettingTable, race
 from foc_ros.analysis.fitting.direct import FADING, fit_duration, fit_estimator, fit_fading, fit_wait
+from foc_ros.analysis.fitting.fit import Fit
 from foc_ros.analysis.fitting.one_replay import fit_widening
 from foc_ros.analysis.fitting.race import Replays, make_eta_settings
 from foc_ros.analysis.recordings import find_recordings

@@ -164,14 +164,6 @@ def keep_last_run(samples: list[HandSample], sample: HandSample, *made: list[Any
     return begins_anew
 
 
-def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = None) -> Iterator[Prediction]:
-    """Yield every prediction of a recording; chosen: topic by input name. Raises RecordingError."""
-    with BagReader(bag, chosen) as reader:
-        for step in Replay(config).steps(reader):
-            if step.prediction is not None:
-                yield step.prediction
-
-
 GuidanceUpdate = tuple[int, GuidanceOutput, SampleHeader]
 """Stamp [ns] of an update, its output, and where its hand sample was."""
 

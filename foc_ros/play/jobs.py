@@ -27,12 +27,8 @@ Note = Callable[[str], None]
 """Takes a line about the progress of a command."""
 
 
-class CommandError(FocError):
-    """A command that failed; the message is its last line."""
-
-
 async def run_command(note: Note, *arguments: str | Path) -> str:
-    """Run a command of foc_ros and return its standard output; raises CommandError. It is ended when this is cancelled.
+    """Run a command of foc_ros and return its standard output; FocError has its last line. It is ended when this is cancelled.
 
     A command that could not use some of the recordings has an answer all the same, and is no error.
     """
@@ -62,7 +58,7 @@ async def run_command(note: Note, *arguments: str | Path) -> str:
             await process.wait()
         answer = (await output).decode()
     if process.returncode and not answer:
-        raise CommandError(lines[-1] or f'foc_ros {arguments[0]} ended with exit code {process.returncode}')
+        raise FocError(lines[-1] or f'foc_ros {arguments[0]} ended with exit code {process.returncode}')
     return answer
 
 
