@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter, defaultdict, deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ from foc_ros.io.json_output import encode_guidance, encode_prediction
 from foc_ros.io.terminal import show_progress
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
 from foc_ros.ros.guidance import GuidanceLoop
-from foc_ros.ros.intake import DROPPED, Intake
+from foc_ros.ros.intake import DROPPED, Arrival, Intake
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, SampleHeader
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -62,7 +62,6 @@ class Replay:
     def __init__(self, config: Config) -> None:
         self.pipeline = Pipeline(config, load_library(config.homotopy.library))
         self.intake = Intake(self.pipeline)
-        self._held: dict[str, deque[Item]] = defaultdict(deque)
         self._begin_recording()
 
     def _begin_recording(self) -> None:
@@ -90,8 +89,7 @@ class Replay:
                     self._note(item.role, SampleStatus.ACCEPTED)
                 yield item, None
             else:
-                self._held[item.role].append(item)
-                self._transforms.add(item.role, item.message, now_s)
+                self._transforms.add(item.role, Arrival(item.message, now_s, item))
             for role in self._transforms.roles:
                 yield from self._release(role, now_s)
         for role in self._transforms.roles:
@@ -140,7 +138,7 @@ class Replay:
                 status = None
             self._note(role, status)
             is_taken = role == HAND and status is not None and status.is_taken
-            yield self._held[role].popleft(), self.intake.sample if is_taken else None
+            yield arrival.item, self.intake.sample if is_taken else None
 
     def _note(self, role: str, status: SampleStatus | None) -> None:
         """Count a message, and why it was refused if it was."""
