@@ -18,7 +18,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from foc_ros.analysis.fitting.fit import find_worse_positions
+from foc_ros.analysis.fitting.fit import find_worse_positions, show_value
 from foc_ros.core.errors import FocError, InputError
 
 from .recording import OPERATOR, PARAMETERS, UNGUIDED, Recording
@@ -130,7 +130,7 @@ class Jobs:
         self.operator = folder / OPERATOR
         self._note_fitted(not losses)
         fitted = {**answer['parameters'], **answer['chosen']}
-        rows = [(name, _format(each['given']), _format(each['value'])) for name, each in fitted.items()]
+        rows = [(name, show_value(each['given']), show_value(each['value'])) for name, each in fitted.items()]
         changed = [row for row in rows if row[1] != row[2]]
         self._say('result', columns=('parameter', 'before', 'after'), rows=changed)
         text = 'Predictions now use your parameters.'
@@ -174,7 +174,3 @@ def summarise_evaluation(answer: Mapping[str, Any]) -> dict[str, str]:
 def _name_unused(failed: Mapping[str, str]) -> str:
     """Return a sentence that names trials and why they were not used, empty if all were."""
     return f' Not used: {", ".join(f"{name} ({reason})" for name, reason in failed.items())}.' if failed else ''
-
-
-def _format(value: object) -> str:
-    return f'{value:.4g}' if isinstance(value, float) else str(value)

@@ -198,15 +198,19 @@ def format_parameters(answer: Mapping[str, Any]) -> Rows:
     """Return the rows of the parameters in an answer of `fit --json`; of those that are not determined, with the reason."""
     rows: Rows = []
     for name, each in answer['parameters'].items():
-        given, value, low, high = (f'{number:.3g}' for number in (each['given'], each['value'], *each['interval']))
+        given, value, low, high = map(show_value, (each['given'], each['value'], *each['interval']))
         found = (value, each['how']) if value != given else ('kept', f'the best of the values tried: {each["how"]}')
         rows.append((name, given, found[0], f'{low} to {high}' if low != high else '', found[1]))
     for name, each in answer['chosen'].items():
-        rows.append((name, each['given'], each['value'], '', 'predicted positions and classes'))
+        rows.append((name, show_value(each['given']), each['value'], '', 'predicted positions and classes'))
     for name, each in answer['undetermined'].items():
-        given = each['given'] if isinstance(each['given'], str) else f'{each["given"]:.3g}'
-        rows.append((name, given, 'kept', '', f'not determined: {each["why"]}'))
+        rows.append((name, show_value(each['given']), 'kept', '', f'not determined: {each["why"]}'))
     return rows
+
+
+def show_value(value: object) -> str:
+    """Return the value of a parameter as tables show it."""
+    return f'{value:.3g}' if isinstance(value, float) else str(value)
 
 
 def format_comparison(answer: Mapping[str, Any]) -> Rows:
