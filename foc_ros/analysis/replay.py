@@ -61,11 +61,10 @@ class Replay:
 
     def __init__(self, config: Config) -> None:
         self.pipeline = Pipeline(config, load_library(config.homotopy.library))
-        self.intake = Intake(self.pipeline)
         self._begin_recording()
 
     def _begin_recording(self) -> None:
-        self._tree = TransformTree()
+        self.intake, self._tree = Intake(self.pipeline), TransformTree()
         self._transforms = Transforms(self._tree, self.intake)
         self._received: Counter[str] = Counter()
         self._refused: Counter[tuple[str, str]] = Counter()
@@ -105,8 +104,6 @@ class Replay:
 
     def forget_scene(self) -> None:
         """Forget scene, working frame, transforms and counts of refusals: another recording has its own."""
-        for source in tuple(self.pipeline.scene.sources):
-            self.intake.remove_source(source)
         self.pipeline.forget_scene()
         hand = self.pipeline.hand_state
         if hand is not None:  # the next sample restarts the filter, also if its stamp is only a little earlier than the last one
