@@ -13,7 +13,6 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib import import_module
 from itertools import count, islice
 from pathlib import Path
 from types import TracebackType
@@ -87,7 +86,6 @@ class NodeProcess:
         self._environment, self._log, self._arguments = environment, log, arguments
 
     def __enter__(self) -> NodeProcess:
-        import_module('foc_ros.core.pipeline')  # reads the files that the node is about to read, so that it starts sooner
         with self._log.open('wb') as log:
             self._process = subprocess.Popen(  # noqa: S603  the arguments are those of the program
                 [sys.executable, '-m', 'foc_ros', 'node', *self._arguments],
