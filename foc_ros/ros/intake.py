@@ -27,7 +27,7 @@ STILL_S = 1.0
 
 
 class Arrival(NamedTuple):
-    """A message, when it arrived [s], where it is recorded, and the frame and transform of its headers, or the error of these."""
+    """A message, when it arrived [s], its record in a bag, and the frame and transform of its headers, or the error of these."""
 
     message: Any
     received_s: float
