@@ -128,9 +128,9 @@ def test_files_and_messages_may_be_compressed(tmp_path, kind, is_folder):
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
-        ('', 'not the metadata of a bag, and not used'),
+        ('', 'not the metadata of this bag, and not used'),
         (metadata('', 3), 'it names no file'),
-        (metadata('other.db3', 3), 'of another bag, and not used'),
+        (metadata('other.db3', 3), 'it names other.db3, and here is one.mcap'),
         (metadata('one.mcap', 3), 'metadata.yaml is wrong: it states 3'),
         (metadata('one.mcap', 99), 'states 99 messages'),
         (metadata('one.mcap, two.mcap', 19), 'two.mcap, which .* missing'),

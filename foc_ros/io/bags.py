@@ -108,11 +108,10 @@ class BagReader:
         words = f'states {stated} messages, and the files hold {self.message_count}'
         if missing:
             self._report_loss(f'{missing}; it {words}')
-        elif stated is not None and stated != self.message_count:
-            if stated < self.message_count:
-                warn(f'{self.path}: metadata.yaml is wrong: it {words}')
-            else:
-                self._report_loss(f'metadata.yaml {words}')
+        elif stated is not None and stated < self.message_count:
+            warn(f'{self.path}: metadata.yaml is wrong: it {words}')
+        elif stated not in (None, self.message_count):
+            self._report_loss(f'metadata.yaml {words}')
         self._assign_topics()
 
     def _assign_topics(self) -> None:
@@ -264,12 +263,11 @@ def _read_metadata(file: Path, found: Collection[str]) -> tuple[list[str], int |
         names = list(dict.fromkeys(_strip_compression(PurePath(each).name) for each in stated['relative_file_paths']))
         if not names or type(count) is not int:
             raise ValueError('it names no file, or no number of messages')
+        if not set(names) & set(found):
+            raise ValueError(f'it names {", ".join(names)}, and here is {", ".join(found)}')
     except Exception as error:  # whatever stands in it
-        reason = ' '.join(str(error).split()) or type(error).__name__
-        warn(f'{file}: not the metadata of a bag, and not used ({type(error).__name__}: {reason})')
-        return [], None
-    if not set(names) & set(found):
-        warn(f'{file}: of another bag, and not used: it names {", ".join(names)}, and here is {", ".join(found) or "none"}')
+        reason = ' '.join(str(error).split())
+        warn(f'{file}: not the metadata of this bag, and not used ({type(error).__name__}: {reason})')
         return [], None
     return names, count
 
