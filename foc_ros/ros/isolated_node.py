@@ -11,11 +11,10 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count, islice
 from pathlib import Path
-from types import TracebackType
 
 import foc_ros
 from foc_ros.core.errors import FocError
@@ -82,14 +81,13 @@ class NodeProcess:
     log: file for its output; arguments: those of ROS. Attributes: pid; is_clean, whether it has ended, without an error.
     """
 
-    def __init__(self, environment: Mapping[str, str], log: Path, *arguments: str) -> None:
-        self._environment, self._log, self._arguments = environment, log, arguments
+    def __init__(self, log: Path, *arguments: str) -> None:
+        self._log, self._arguments = log, arguments
 
     def __enter__(self) -> NodeProcess:
         with self._log.open('wb') as log:
             self._process = subprocess.Popen(  # noqa: S603  the arguments are those of the program
                 [sys.executable, '-m', 'foc_ros', 'node', *self._arguments],
-                env=self._environment,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -100,7 +98,7 @@ class NodeProcess:
         self.pid, self.is_clean = self._process.pid, False
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self._process.terminate()
         try:
             self._process.wait(5.0)

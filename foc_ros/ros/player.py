@@ -7,7 +7,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from types import TracebackType
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -64,7 +63,7 @@ class Player:
             self._node.create_subscription(find_message_class(kind), topic, partial(self._note, topic), DEPTH, raw=True)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self._executor.shutdown()
         self._node.destroy_node()
         self._context.try_shutdown()
