@@ -55,8 +55,8 @@ def reserve_domain() -> Iterator[int]:
 
 
 @contextmanager
-def isolated_graph() -> Iterator[tuple[int, Path]]:
-    """Join a ROS graph of its own within the context, also with new processes; yield its domain and the folder for its logs."""
+def isolated_graph() -> Iterator[Path]:
+    """Join a ROS graph of its own within the context, also with new processes; yield the folder for its logs."""
     before, package = dict(os.environ), str(Path(foc_ros.__file__).parents[1])
     with tempfile.TemporaryDirectory(prefix='foc_ros_graph_') as logs, reserve_domain() as domain:
         try:
@@ -69,7 +69,7 @@ def isolated_graph() -> Iterator[tuple[int, Path]]:
                 'PYTHONPATH': os.pathsep.join(filter(None, [package, os.environ.get('PYTHONPATH')])),
                 'PYTHONUNBUFFERED': '1',
             }
-            yield domain, Path(logs)
+            yield Path(logs)
         finally:
             os.environ.clear()
             os.environ.update(before)

@@ -32,23 +32,18 @@ DEPTH = 200
 class Player:
     """A ROS node, as a context, that publishes the raw messages of a recording and subscribes to the outputs of another node.
 
-    tick: called all the time, returns False where the player is to end; domain: of the ROS graph.
+    tick: called all the time, returns False where the player is to end.
     """
 
     def __init__(
-        self,
-        items: Sequence[Item],
-        outputs: Mapping[str, str],
-        receive: Callable[[str, bytes], None],
-        tick: Callable[[], bool],
-        domain: int,
+        self, items: Sequence[Item], outputs: Mapping[str, str], receive: Callable[[str, bytes], None], tick: Callable[[], bool]
     ) -> None:
-        self._items, self._outputs, self._receive, self._tick, self._domain = items, outputs, receive, tick, domain
+        self._items, self._outputs, self._receive, self._tick = items, outputs, receive, tick
         self._last_received = 0.0
 
     def __enter__(self) -> Player:
         self._context = rclpy.Context()
-        rclpy.init(context=self._context, args=[], domain_id=self._domain, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(context=self._context, args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._node = Node('foc_player', context=self._context, enable_rosout=False, start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
