@@ -20,7 +20,7 @@ from unittest.mock import patch
 import numpy as np
 import scenes
 
-from foc_ros.analysis.replay import replay
+from foc_ros import replay
 from foc_ros.core import predict as predictor
 from foc_ros.core.candidates import solve_candidates
 from foc_ros.core.config import Config, FocConfig

@@ -274,10 +274,13 @@ def replay(recording: str | Path, config: Config | None = None, topics: Mapping[
     Prediction
         One for every hand pose that is due, in their order.
     """
-    from foc_ros.analysis.replay import replay as replay_bag
+    from foc_ros.analysis.replay import Replay
+    from foc_ros.io.bags import BagReader
 
-    for prediction in replay_bag(recording, check_config(config), topics):
-        yield Prediction(**vars(prediction))
+    with BagReader(recording, topics) as reader:
+        for step in Replay(check_config(config)).steps(reader):
+            if step.prediction is not None:
+                yield Prediction(**vars(step.prediction))
 
 
 def load_config(file: str | Path) -> Config:

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import random
 import sys
 import tempfile
@@ -241,7 +240,7 @@ def run_node(parameters: Mapping[str, object]) -> Iterator[NodeProcess]:
     options = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
     with (
         tempfile.TemporaryDirectory() as folder,
-        NodeProcess(os.environ, Path(folder) / 'node.txt', '--ros-args', *options) as node,
+        NodeProcess(Path(folder) / 'node.txt', '--ros-args', *options) as node,
     ):
         yield node
 

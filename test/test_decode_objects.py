@@ -13,7 +13,7 @@ from bag_helpers import CONFIG, messages, ns, write_by_rosbags
 from message_helpers import BAGS, SECOND, STORE, both_kinds, collision_object, detection, detections, pose_array, pose_stamped
 from rosbags.rosbag2 import StoragePlugin
 
-from foc_ros.analysis.replay import replay
+from foc_ros import replay
 from foc_ros.core.errors import LostHandError, MessageError, RecordingError
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.obstacles.polygons import make_box_polygon

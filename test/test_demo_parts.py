@@ -205,7 +205,8 @@ sys.path.insert(0, {str(ROOT)!r})
 from pathlib import Path
 from foc_ros.ros.isolated_node import NodeProcess
 os.chdir({str(package.parent)!r})
-with NodeProcess(os.environ | {{'PYTHONPATH': {str(package.parent)!r}}}, Path({str(tmp_path / 'log.txt')!r})) as node:
+os.environ['PYTHONPATH'] = {str(package.parent)!r}
+with NodeProcess(Path({str(tmp_path / 'log.txt')!r})) as node:
     print(node.pid, flush=True)
     time.sleep(60)
 """

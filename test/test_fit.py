@@ -82,8 +82,9 @@ def test_two_recordings_do_not_determine_the_likelihood(tmp_path, capsys):
         'why': 'all values tried, 0.5 to 16, explain the recordings within 2 nat',
     }
     assert 'estimator.position_stddev' in answer['parameters']
-    shown = {row[0]: row[2] for row in fitting.format_parameters(answer)}
-    assert shown['likelihood.beta'] == 'kept'
+    answer['chosen'] = {'covariance.near': {'given': 1.5, 'value': '1.0'}}
+    shown = {row[0]: row[1:3] for row in fitting.format_parameters(answer)}
+    assert shown['likelihood.beta'] == (f'{given["likelihood.beta"]:.3g}', 'kept') and shown['covariance.near'] == ('1.5', '1.0')
 
 
 FIXED = {'foc.strategy': 'fixed', 'foc.tau': 1e-4}

@@ -15,7 +15,7 @@ from foc_ros.analysis.evaluation.positions import compute_log_densities
 from foc_ros.analysis.evaluation.truth import HORIZONS, TIMES_S
 from foc_ros.analysis.fitting import SettingTable, race
 from foc_ros.analysis.fitting.direct import FADING, fit_duration, fit_estimator, fit_fading, fit_wait
-from foc_ros.analysis.fitting.fit import Fit, find_lower_coverage
+from foc_ros.analysis.fitting.fit import Fit
 from foc_ros.analysis.fitting.one_replay import fit_widening
 from foc_ros.analysis.fitting.race import Replays, make_eta_settings
 from foc_ros.analysis.recordings import find_recordings
@@ -269,22 +269,6 @@ def test_worse_positions_are_written_only_if_allowed_or_if_a_terminal_agrees(
     assert 'error of positions 0.5 s ahead [mm]' in shown and ('Run the node' in shown) == is_written
     assert (f'{output} is not written; --allow positions writes it all the same' in error) != is_written
     assert answer is not None or (worse in error and error.count('become worse') == 1)
-
-
-@pytest.mark.parametrize(
-    ('held_out', 'before', 'after', 'words'),
-    [
-        ((0.92, 0.81), 0.9, 0.9, 'of recordings held out 0.5 s ahead with the fitted parameters: 81 % instead of 92 %'),
-        ((None, None), 0.93, 0.85, 'true positions 0.5 s ahead with the fitted parameters: 85 % instead of 93 %'),
-        ((0.8, 0.9), 0.9, 0.9, None),
-        ((None, None), None, None, None),
-    ],
-)
-def test_a_lower_coverage_is_told_in_one_sentence(held_out, before, after, words):
-    fit = Fit(config=SEARCH_CONFIG, comparison={'inside_90': {'before': before, 'after': after}})
-    fit.scores = {'inside_all_90': dict(zip(('as given', 'without the recording'), held_out, strict=True))}
-    found = find_lower_coverage(fit)
-    assert len(found) == (words is not None) and all(each.endswith(words) for each in found)
 
 
 S = np.array(TIMES_S)

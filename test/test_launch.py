@@ -19,7 +19,7 @@ import pytest
 import yaml
 from message_helpers import message_types
 
-from foc_ros.analysis.replay import replay
+from foc_ros import replay
 from foc_ros.core.config import Config, list_parameters
 from foc_ros.core.errors import RecordingError
 from foc_ros.io import csv_tables as tables

@@ -96,7 +96,7 @@ def test_the_library_predicts_what_a_replay_does(bag, replayed):
 
 def test_the_page_predicts_what_a_replay_does(bag, replayed):
     from foc_ros.play.predictor import Predictor
-    from foc_ros.play.scene import View
+    from foc_ros.play.scene import View, view_prediction
 
     received, arrived = list[Prediction](), Event()
 
@@ -118,4 +118,4 @@ def test_the_page_predicts_what_a_replay_does(bag, replayed):
                     arrived.clear()
     finally:
         page.stop()
-    assert [strip(each) for each in received] == [strip(each) for each in replayed[0]]
+    assert [strip(each) for each in received] == [strip(view_prediction(each).prediction) for each in replayed[0]]

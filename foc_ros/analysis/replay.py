@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter, defaultdict, deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ from foc_ros.io.json_output import encode_guidance, encode_prediction
 from foc_ros.io.terminal import show_progress
 from foc_ros.io.topics import HAND, STATIC_TRANSFORMS, TRANSFORMS, TYPES
 from foc_ros.ros.guidance import GuidanceLoop
-from foc_ros.ros.intake import DROPPED, Intake
+from foc_ros.ros.intake import DROPPED, Arrival, Intake
 from foc_ros.ros.messages.encode_guidance import GUIDANCE_OUTPUTS, SampleHeader
 from foc_ros.ros.messages.encode_prediction import encode_outputs
 from foc_ros.ros.messages.types import RosbagsTypes
@@ -61,12 +61,10 @@ class Replay:
 
     def __init__(self, config: Config) -> None:
         self.pipeline = Pipeline(config, load_library(config.homotopy.library))
-        self.intake = Intake(self.pipeline)
-        self._held: dict[str, deque[Item]] = defaultdict(deque)
         self._begin_recording()
 
     def _begin_recording(self) -> None:
-        self._tree = TransformTree()
+        self.intake, self._tree = Intake(self.pipeline), TransformTree()
         self._transforms = Transforms(self._tree, self.intake)
         self._received: Counter[str] = Counter()
         self._refused: Counter[tuple[str, str]] = Counter()
@@ -90,8 +88,7 @@ class Replay:
                     self._note(item.role, SampleStatus.ACCEPTED)
                 yield item, None
             else:
-                self._held[item.role].append(item)
-                self._transforms.add(item.role, item.message, now_s)
+                self._transforms.add(item.role, Arrival(item.message, now_s, item))
             for role in self._transforms.roles:
                 yield from self._release(role, now_s)
         for role in self._transforms.roles:
@@ -107,8 +104,6 @@ class Replay:
 
     def forget_scene(self) -> None:
         """Forget scene, working frame, transforms and counts of refusals: another recording has its own."""
-        for source in tuple(self.pipeline.scene.sources):
-            self.intake.remove_source(source)
         self.pipeline.forget_scene()
         hand = self.pipeline.hand_state
         if hand is not None:  # the next sample restarts the filter, also if its stamp is only a little earlier than the last one
@@ -140,7 +135,7 @@ class Replay:
                 status = None
             self._note(role, status)
             is_taken = role == HAND and status is not None and status.is_taken
-            yield self._held[role].popleft(), self.intake.sample if is_taken else None
+            yield arrival.item, self.intake.sample if is_taken else None
 
     def _note(self, role: str, status: SampleStatus | None) -> None:
         """Count a message, and why it was refused if it was."""
@@ -162,14 +157,6 @@ def keep_last_run(samples: list[HandSample], sample: HandSample, *made: list[Any
             each.clear()
     samples.append(sample)
     return begins_anew
-
-
-def replay(bag: Path | str, config: Config, chosen: Mapping[str, str] | None = None) -> Iterator[Prediction]:
-    """Yield every prediction of a recording; chosen: topic by input name. Raises RecordingError."""
-    with BagReader(bag, chosen) as reader:
-        for step in Replay(config).steps(reader):
-            if step.prediction is not None:
-                yield step.prediction
 
 
 GuidanceUpdate = tuple[int, GuidanceOutput, SampleHeader]

@@ -7,7 +7,6 @@ It shows the predictions, and leaves a bag and a report.
 
 from __future__ import annotations
 
-import os
 import shutil
 import signal
 import threading
@@ -175,7 +174,7 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: thread
         if name in (*PAIR, DIAGNOSTICS):
             recorder.add_received(name, TYPESTORE.deserialize_cdr(raw, RECEIVED[topic]), now)
 
-    with isolated_graph() as (domain, logs), NodeProcess(os.environ, logs / 'node.txt') as node, show_live() as show:
+    with isolated_graph() as logs, NodeProcess(logs / 'node.txt') as node, show_live() as show:
         from foc_ros.ros.player import Player  # rclpy reads the environment when it is imported
 
         def tick() -> bool:
@@ -185,7 +184,7 @@ def _play(items: list[Item], bag: BagWriter, recorder: Recorder, stopped: thread
                 show(now, recorder.snapshots[-1], recorder.describe(items), recorder.samples[-1].position)
             return not stopped.is_set()
 
-        with Player(items, RECEIVED, receive, tick, domain) as player:
+        with Player(items, RECEIVED, receive, tick) as player:
             if not player.connect(lambda: recorder.is_scene_known):
                 return
             began = time.monotonic()

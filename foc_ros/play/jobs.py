@@ -18,7 +18,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from foc_ros.analysis.fitting.fit import find_worse_positions
+from foc_ros.analysis.fitting.fit import find_worse_positions, show_value
 from foc_ros.core.errors import FocError, InputError
 
 from .recording import OPERATOR, PARAMETERS, UNGUIDED, Recording
@@ -27,12 +27,8 @@ Note = Callable[[str], None]
 """Takes a line about the progress of a command."""
 
 
-class CommandError(FocError):
-    """A command that failed; the message is its last line."""
-
-
 async def run_command(note: Note, *arguments: str | Path) -> str:
-    """Run a command of foc_ros and return its standard output; raises CommandError. It is ended when this is cancelled.
+    """Run a command of foc_ros and return its standard output; FocError has its last line. It is ended when this is cancelled.
 
     A command that could not use some of the recordings has an answer all the same, and is no error.
     """
@@ -62,7 +58,7 @@ async def run_command(note: Note, *arguments: str | Path) -> str:
             await process.wait()
         answer = (await output).decode()
     if process.returncode and not answer:
-        raise CommandError(lines[-1] or f'foc_ros {arguments[0]} ended with exit code {process.returncode}')
+        raise FocError(lines[-1] or f'foc_ros {arguments[0]} ended with exit code {process.returncode}')
     return answer
 
 
@@ -134,7 +130,7 @@ class Jobs:
         self.operator = folder / OPERATOR
         self._note_fitted(not losses)
         fitted = {**answer['parameters'], **answer['chosen']}
-        rows = [(name, _format(each['given']), _format(each['value'])) for name, each in fitted.items()]
+        rows = [(name, show_value(each['given']), show_value(each['value'])) for name, each in fitted.items()]
         changed = [row for row in rows if row[1] != row[2]]
         self._say('result', columns=('parameter', 'before', 'after'), rows=changed)
         text = 'Predictions now use your parameters.'
@@ -178,7 +174,3 @@ def summarise_evaluation(answer: Mapping[str, Any]) -> dict[str, str]:
 def _name_unused(failed: Mapping[str, str]) -> str:
     """Return a sentence that names trials and why they were not used, empty if all were."""
     return f' Not used: {", ".join(f"{name} ({reason})" for name, reason in failed.items())}.' if failed else ''
-
-
-def _format(value: object) -> str:
-    return f'{value:.4g}' if isinstance(value, float) else str(value)

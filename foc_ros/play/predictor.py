@@ -32,7 +32,7 @@ REMEMBERED = 20
 """Number of predictions from which the state is told."""
 Outcome = View | tuple[GuidanceOutput, SampleHeader]
 """A prediction for the page, or guidance and where it holds."""
-Receive = Callable[[Outcome], None]
+Receive = Callable[[Outcome], object]
 
 
 @dataclass(frozen=True)

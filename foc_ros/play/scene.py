@@ -147,14 +147,9 @@ def make_random_scene(random: np.random.Generator, goals: Sequence[PlacedPoint])
 
 
 class View(NamedTuple):
-    """A prediction for the page.
-
-    prediction: as it was made; ordered: with the candidate first that is called most likely; candidates: as the page draws them,
-    in this order.
-    """
+    """A prediction, the candidate first that is called most likely, and its candidates as the page draws them."""
 
     prediction: Prediction
-    ordered: Prediction
     candidates: list[dict[str, Any]]
 
 
@@ -171,4 +166,4 @@ def view_prediction(prediction: Prediction) -> View:
     ]
     no_likelihood = {'way': None, 'likelihood': None}
     views += [{'goal': each.candidate.goal, **no_likelihood, **encode_unsolved(ordered, each)} for each in lost]
-    return View(prediction, ordered, views)
+    return View(ordered, views)

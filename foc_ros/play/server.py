@@ -29,7 +29,7 @@ from foc_ros.reporting import page as report_page
 
 from .address import describe_page, is_loopback
 from .messages import LONGEST_MESSAGE, parse_message
-from .predictor import Outcome, Predictor, Receive
+from .predictor import Predictor, Receive
 from .session import Session
 
 FOLDER = Path(__file__).parent / 'page'
@@ -115,10 +115,7 @@ async def serve(config: Config, data: Path, host: str, sockets: Sequence[socket]
     sys.setswitchinterval(0.001)  # a thread that waits for Python's global lock gets it sooner than after 5 ms
 
     def make_predictor(given: Config, receive: Receive) -> Predictor:
-        def pass_on(outcome: Outcome) -> None:
-            loop.call_soon_threadsafe(receive, outcome)
-
-        return Predictor(given, pass_on)
+        return Predictor(given, lambda outcome: loop.call_soon_threadsafe(receive, outcome))
 
     session = Session(make_predictor, config, data)
     server = listen(session, host, sockets)

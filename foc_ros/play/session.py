@@ -277,7 +277,7 @@ class Session:
                 self._say('force', force=force.round(4).tolist())
 
     def _receive_prediction(self, view: scene.View) -> None:
-        prediction, stamp_ns = view.ordered, view.ordered.stamp_ns
+        prediction, stamp_ns = view.prediction, view.prediction.stamp_ns
         hand = next((hand for stamp, hand in reversed(self._hands) if stamp == stamp_ns), None)
         if self._tasks is not None and prediction.most_likely is not None:
             self._tasks.note_most_likely(stamp_ns * 1e-9, prediction.candidates[0].way)
@@ -287,7 +287,7 @@ class Session:
             candidates = [each | {'slot': slot} for each, slot in zip_longest(view.candidates, slots)]
             shares = {'unknown': round(prediction.unknown, 4), 'other': round(prediction.other, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)
-        self._record(lambda recording: recording.add_prediction(view.prediction))  # afterwards: the page does not wait for it
+        self._record(lambda recording: recording.add_prediction(prediction))  # afterwards: the page does not wait for it
 
     # what the page is told
 

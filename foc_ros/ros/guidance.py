@@ -74,7 +74,7 @@ class GuidanceLoop:
     def __init__(
         self,
         config: Config,
-        publish: Callable[[GuidanceOutput, SampleHeader], None],
+        publish: Callable[[GuidanceOutput, SampleHeader], object],
         report: Callable[[Exception], None] = lambda _: None,
         warn: Callable[[str], None] = lambda _: None,
     ) -> None:

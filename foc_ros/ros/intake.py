@@ -27,10 +27,11 @@ STILL_S = 1.0
 
 
 class Arrival(NamedTuple):
-    """A message that can be taken, when it arrived [s], and the frame and transform of its headers, or the error of these."""
+    """A message, when it arrived [s], its record in a bag, and the frame and transform of its headers, or the error of these."""
 
     message: Any
     received_s: float
+    item: Any = None
     look_up: FrameLookup = keep_frame
     error: str = ''
     is_inexact: bool = False

@@ -11,12 +11,10 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from itertools import count, islice
 from pathlib import Path
-from types import TracebackType
 
 import foc_ros
 from foc_ros.core.errors import FocError
@@ -57,8 +55,8 @@ def reserve_domain() -> Iterator[int]:
 
 
 @contextmanager
-def isolated_graph() -> Iterator[tuple[int, Path]]:
-    """Join a ROS graph of its own within the context, also with new processes; yield its domain and the folder for its logs."""
+def isolated_graph() -> Iterator[Path]:
+    """Join a ROS graph of its own within the context, also with new processes; yield the folder for its logs."""
     before, package = dict(os.environ), str(Path(foc_ros.__file__).parents[1])
     with tempfile.TemporaryDirectory(prefix='foc_ros_graph_') as logs, reserve_domain() as domain:
         try:
@@ -71,7 +69,7 @@ def isolated_graph() -> Iterator[tuple[int, Path]]:
                 'PYTHONPATH': os.pathsep.join(filter(None, [package, os.environ.get('PYTHONPATH')])),
                 'PYTHONUNBUFFERED': '1',
             }
-            yield domain, Path(logs)
+            yield Path(logs)
         finally:
             os.environ.clear()
             os.environ.update(before)
@@ -83,15 +81,13 @@ class NodeProcess:
     log: file for its output; arguments: those of ROS. Attributes: pid; is_clean, whether it has ended, without an error.
     """
 
-    def __init__(self, environment: Mapping[str, str], log: Path, *arguments: str) -> None:
-        self._environment, self._log, self._arguments = environment, log, arguments
+    def __init__(self, log: Path, *arguments: str) -> None:
+        self._log, self._arguments = log, arguments
 
     def __enter__(self) -> NodeProcess:
-        import_module('foc_ros.core.pipeline')  # reads the files that the node is about to read, so that it starts sooner
         with self._log.open('wb') as log:
             self._process = subprocess.Popen(  # noqa: S603  the arguments are those of the program
                 [sys.executable, '-m', 'foc_ros', 'node', *self._arguments],
-                env=self._environment,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -102,7 +98,7 @@ class NodeProcess:
         self.pid, self.is_clean = self._process.pid, False
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self._process.terminate()
         try:
             self._process.wait(5.0)

@@ -205,7 +205,7 @@ class FocNode(LifecycleNode):
         waiting = [] if role == MARKERS else endpoints.take_queued(self._inputs[role])
         now_s = monotonic()
         for each in (*messages, *waiting):
-            self._transforms.add(role, each, now_s)
+            self._transforms.add(role, Arrival(each, now_s))
         if role == HAND and messages:
             self._is_hand_fast = bool(waiting) or now_s - self._hand_s < REST_S / 2.0
             self._hand_s = now_s

@@ -7,7 +7,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from types import TracebackType
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -33,23 +32,18 @@ DEPTH = 200
 class Player:
     """A ROS node, as a context, that publishes the raw messages of a recording and subscribes to the outputs of another node.
 
-    tick: called all the time, returns False where the player is to end; domain: of the ROS graph.
+    tick: called all the time, returns False where the player is to end.
     """
 
     def __init__(
-        self,
-        items: Sequence[Item],
-        outputs: Mapping[str, str],
-        receive: Callable[[str, bytes], None],
-        tick: Callable[[], bool],
-        domain: int,
+        self, items: Sequence[Item], outputs: Mapping[str, str], receive: Callable[[str, bytes], None], tick: Callable[[], bool]
     ) -> None:
-        self._items, self._outputs, self._receive, self._tick, self._domain = items, outputs, receive, tick, domain
+        self._items, self._outputs, self._receive, self._tick = items, outputs, receive, tick
         self._last_received = 0.0
 
     def __enter__(self) -> Player:
         self._context = rclpy.Context()
-        rclpy.init(context=self._context, args=[], domain_id=self._domain, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(context=self._context, args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._node = Node('foc_player', context=self._context, enable_rosout=False, start_parameter_services=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -64,7 +58,7 @@ class Player:
             self._node.create_subscription(find_message_class(kind), topic, partial(self._note, topic), DEPTH, raw=True)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self._executor.shutdown()
         self._node.destroy_node()
         self._context.try_shutdown()

@@ -11,7 +11,7 @@ replay.
 from __future__ import annotations
 
 from bisect import bisect_right, insort
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from operator import attrgetter
@@ -49,33 +49,33 @@ class Transforms:
 
     def __init__(self, source: TransformSource | None, intake: Intake) -> None:
         self._source, self._intake = source, intake
-        self._held: dict[str, deque[tuple[Any, float]]] = {}
+        self._held: defaultdict[str, deque[Arrival]] = defaultdict(deque)
 
     @property
     def roles(self) -> list[str]:
         """The inputs of which messages are held, the hand last: it is predicted from the scene that waits with it."""
         return sorted((role for role, queue in self._held.items() if queue), key=lambda role: role == HAND)
 
-    def add(self, role: str, message: Any, now_s: float) -> None:
-        """Append a message of an input that arrives at a time [s]."""
-        self._held.setdefault(role, deque()).append((message, now_s))
+    def add(self, role: str, arrival: Arrival) -> None:
+        """Append a message of an input."""
+        self._held[role].append(arrival)
 
     def release(self, role: str, now_s: float) -> Iterator[Arrival]:
         """Yield the messages of an input that need not be held any longer; each is to be taken before the next is asked for."""
-        queue, pipeline = self._held.get(role, ()), self._intake.pipeline
+        queue, pipeline = self._held[role], self._intake.pipeline
         while queue:
-            message, received_s = queue[0]
+            arrival = queue[0]
             # at most 1,000 are held: 1 s of a hand at 1 kHz
-            is_overdue = now_s - received_s >= pipeline.config.frames.tolerance_s or len(queue) > 1000
+            is_overdue = now_s - arrival.received_s >= pipeline.config.frames.tolerance_s or len(queue) > 1000
             try:
-                look_up, is_inexact = self._find_lookup(role, message, is_overdue)
-                arrival = Arrival(message, received_s, look_up, is_inexact=is_inexact)
+                look_up, is_inexact = self._find_lookup(role, arrival.message, is_overdue)
+                arrival = arrival._replace(look_up=look_up, is_inexact=is_inexact)
             except TransformUnavailableError as error:
                 if not is_overdue:
                     break
-                arrival = Arrival(message, received_s, error=f'no transform to {pipeline.frame_id}: {error}')
-            except Exception:  # the message is not checked yet, and will be refused
-                arrival = Arrival(message, received_s)
+                arrival = arrival._replace(error=f'no transform to {pipeline.frame_id}: {error}')
+            except Exception:  # noqa: S110  the message is not checked yet, and will be refused
+                pass
             queue.popleft()
             yield arrival
 

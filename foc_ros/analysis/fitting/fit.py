@@ -93,7 +93,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     fit.config = replace_values(fit.config, UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
     fit.comparison = compare_configs(compared, (config, fit.config), thinned)
-    fit.warnings[:0] = [*find_worse_positions(fit.comparison), *find_lower_coverage(fit)]
+    fit.warnings[:0] = find_worse_positions(fit.comparison)
     return fit
 
 
@@ -174,19 +174,6 @@ def find_worse_positions(comparison: Mapping[str, Mapping[str, float | None]]) -
     ]
 
 
-def find_lower_coverage(fit: Fit) -> list[str]:
-    """Return a sentence where the coverage falls by 1 %: of held-out predictions if there are any, else of all."""
-    shares = fit.scores.get('inside_all_90', {})
-    changes = {'of recordings held out ': (shares.get('as given'), shares.get('without the recording'))}
-    if 'inside_90' in fit.comparison:
-        changes[''] = (fit.comparison['inside_90']['before'], fit.comparison['inside_90']['after'])
-    for kind, (before, after) in changes.items():
-        if before is not None and after is not None and after < before - 0.01:
-            held = f'the region of {100 * COVERAGE_LEVEL:.0f} % holds fewer true positions {kind}0.5 s ahead'
-            return [f'{held} with the fitted parameters: {100 * after:.0f} % instead of {100 * before:.0f} %']
-    return []
-
-
 def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
     """Return a fit as plain values; node: the commands that run the node with it, without and with a ROS installation."""
     before, options = flatten(given), f'--ros-args --params-file {output}'
@@ -211,15 +198,19 @@ def format_parameters(answer: Mapping[str, Any]) -> Rows:
     """Return the rows of the parameters in an answer of `fit --json`; of those that are not determined, with the reason."""
     rows: Rows = []
     for name, each in answer['parameters'].items():
-        given, value, low, high = (f'{number:.3g}' for number in (each['given'], each['value'], *each['interval']))
+        given, value, low, high = map(show_value, (each['given'], each['value'], *each['interval']))
         found = (value, each['how']) if value != given else ('kept', f'the best of the values tried: {each["how"]}')
         rows.append((name, given, found[0], f'{low} to {high}' if low != high else '', found[1]))
     for name, each in answer['chosen'].items():
-        rows.append((name, each['given'], each['value'], '', 'predicted positions and classes'))
+        rows.append((name, show_value(each['given']), each['value'], '', 'predicted positions and classes'))
     for name, each in answer['undetermined'].items():
-        given = each['given'] if isinstance(each['given'], str) else f'{each["given"]:.3g}'
-        rows.append((name, given, 'kept', '', f'not determined: {each["why"]}'))
+        rows.append((name, show_value(each['given']), 'kept', '', f'not determined: {each["why"]}'))
     return rows
+
+
+def show_value(value: object) -> str:
+    """Return the value of a parameter as tables show it."""
+    return f'{value:.3g}' if isinstance(value, float) else str(value)
 
 
 def format_comparison(answer: Mapping[str, Any]) -> Rows:
