@@ -24,7 +24,7 @@ from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obs
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, write_whole
-from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
+from foc_ros.ros.messages.ranking import describe_briefly, find_drawn_curve
 
 from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghosts
 
@@ -42,8 +42,6 @@ CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9
 GHOST_COLOUR = '#777777'
 """Colour of a ghost, and of a candidate without a letter."""
 ELLIPSES_PER_CANDIDATE = 8
-NAME_LETTERS = 60
-"""Most letters of a class in a legend."""
 ROOM_PT = 11.0
 """Distance of the middle of a letter from other text, so that its circle touches none, nor the circle of a letter."""
 NAMED_OBSTACLES = 30
@@ -104,9 +102,7 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
 
 def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
     """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
-    name = describe_candidate(candidate, goals)
-    if len(name) > NAME_LETTERS:  # the words of a class with many obstacles would leave no room for the plot
-        name = f'{name[: NAME_LETTERS - 1]}…'
+    name = describe_briefly(candidate, goals)
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
     found = 'estimated' if candidate.is_estimated else 'compromised'
