@@ -24,7 +24,7 @@ from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obs
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, write_whole
-from foc_ros.ros.messages.ranking import describe_briefly, find_drawn_curve
+from foc_ros.ros.messages.ranking import MOST_LETTERS, describe_candidate, find_drawn_curve
 
 from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghosts
 
@@ -102,7 +102,7 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
 
 def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
     """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
-    name = describe_briefly(candidate, goals)
+    name = describe_candidate(candidate, goals, MOST_LETTERS)
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
     found = 'estimated' if candidate.is_estimated else 'compromised'

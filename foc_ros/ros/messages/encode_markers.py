@@ -22,7 +22,7 @@ from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 
 from .plane import lift
-from .ranking import describe_briefly, find_drawn_curve, order_candidates
+from .ranking import MOST_LETTERS, describe_candidate, find_drawn_curve, order_candidates
 from .types import MessageTypes, make_header
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
@@ -101,7 +101,7 @@ class _MarkerEncoder:
         width = 0.002 + 0.004 * likelihood
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=points)
         if _is_labelled(outcome):
-            words = describe_briefly(outcome, len(self._prediction.goal_positions))
+            words = describe_candidate(outcome, len(self._prediction.goal_positions), MOST_LETTERS)
             text = f'{share}, {words}{notes}'.replace(' of ', '\0of\0')  # no line parts a side from its obstacle
             lines = textwrap.wrap(text, LINE_LETTERS, break_long_words=False, break_on_hyphens=False)
             place = points[round((0.45 + 0.12 * (index % 3)) * (len(points) - 1))]  # labels of neighbours stand apart

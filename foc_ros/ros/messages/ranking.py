@@ -49,15 +49,10 @@ def compute_cost_ratios(outcomes: tuple[PredictedCandidate, ...]) -> list[float]
     return [1.0 if cost <= least else min(cost / least, MAX_RATIO) if least > 0.0 else MAX_RATIO for cost in costs]
 
 
-def describe_candidate(outcome: PredictedCandidate, goals: int) -> str:
-    """Return the class of a candidate in words, with its goal if there are several goals."""
-    return outcome.description if goals > 1 else describe_class(outcome.candidate.sides)
-
-
-def describe_briefly(outcome: PredictedCandidate, goals: int) -> str:
-    """Return the same, cut to MOST_LETTERS."""
-    words = describe_candidate(outcome, goals)
-    return words if len(words) <= MOST_LETTERS else f'{words[: MOST_LETTERS - 1]}…'
+def describe_candidate(outcome: PredictedCandidate, goals: int, most: int | None = None) -> str:
+    """Return the class of a candidate in words, with its goal if there are several goals; most: letters to which they are cut."""
+    words = outcome.description if goals > 1 else describe_class(outcome.candidate.sides)
+    return words if most is None or len(words) <= most else f'{words[: most - 1]}…'
 
 
 def find_drawn_curve(outcome: PredictedCandidate) -> Array:
