@@ -199,6 +199,7 @@ def test_a_plot_survives_subplots_and_savefig(name, tmp_path):
         assert box.x0 >= whole.x0 and box.x1 <= whole.x1 and box.y0 >= whole.y0 and box.y1 <= whole.y1
         assert not any(box.overlaps(other) for other in others)
     assert axes.get_window_extent(renderer).height > 50.0
+    assert given is not None or boxes[1].y0 < 20.0, 'no empty room in a figure of its own'
     plt.close('all')
 
 
