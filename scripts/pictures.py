@@ -103,6 +103,7 @@ def pictures(hand: HandTrajectory, snapshots: list[Prediction]) -> Iterator[tupl
                 slots = {label: tracks.slots[track] for label, track in tracks.tracks[row].items() if track in tracks.slots}
                 draw.draw_candidates(scene, snapshot, slots)
                 draw.draw_hand(scene, hand, snapshot.stamp_ns, (start_ns, end_ns))
+                draw.draw_letters(scene, snapshot, slots)
                 until_now = CandidateTracks(tracks.snapshots[: row + 1], tracks.tracks[: row + 1], tracks.slots)
                 draw_likelihoods(shares, until_now, start_ns)
                 limits = (0.0, (end_ns - start_ns) / NANOSECONDS)

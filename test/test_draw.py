@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 from importlib.resources import files
-from itertools import islice
+from itertools import combinations, islice
 
 import numpy as np
 import pytest
@@ -163,6 +163,23 @@ def layouts():
     }
 
 
+@pytest.mark.parametrize('name', ['new', 'two', 'four'])
+def test_letters_of_equal_paths_cover_neither_each_other_nor_the_reason_of_a_ghost(name):
+    made = prediction(START_NS, NOWHERE)
+    *_, lost = made.candidates
+    found = replace(lost, solution=replace(lost.solution, status=Status.SOLVED), likelihood=0.25)
+    equal = [replace(found, candidate=replace(found.candidate, label=f'goal1:{row}')) for row in range(4)]
+    axes = plot_prediction(replace(made, candidates=(*equal, lost), most_likely=equal[0].label), layouts()[name])
+    axes.figure.draw_without_rendering()
+    point = axes.figure.dpi / 72.0
+    places = {text.get_text(): axes.transData.transform(text.get_position()) for text in axes.texts if text.get_text() in 'ABCD'}
+    boxes = [text.get_window_extent().padded(5.0 * point) for text in axes.texts if text.get_text() == 'eta unreachable']
+    assert len(places) == 4 and len(boxes) == 1
+    assert not any(box.contains(*place) for box in boxes for place in places.values())
+    assert all(np.hypot(*(one - other)) > 11.0 * point for one, other in combinations(places.values(), 2))
+    plt.close('all')
+
+
 @pytest.mark.parametrize('name', ['new', 'one', 'two', 'four', 'placed'])
 def test_a_plot_survives_subplots_and_savefig(name, tmp_path):
     """The legend is within the figure and covers no other axes, also when it is drawn again."""
@@ -176,12 +193,13 @@ def test_a_plot_survives_subplots_and_savefig(name, tmp_path):
     renderer = axes.figure.canvas.get_renderer()
     (below,) = [each for each in axes.figure.axes if each.get_gid() == f'legend {id(axes)}']
     boxes, whole = [each.get_window_extent(renderer) for each in legends_of(axes)], axes.figure.bbox
-    assert len(boxes) == 2 and not boxes[0].overlaps(boxes[1])
+    assert len(boxes) == 2 and 0.0 < boxes[0].y0 - boxes[1].y1 < 10.0, 'the signs are just below the candidates'
     others = [each.get_tightbbox(renderer) for each in axes.figure.axes if each is not below]
     for box in boxes:
         assert box.x0 >= whole.x0 and box.x1 <= whole.x1 and box.y0 >= whole.y0 and box.y1 <= whole.y1
         assert not any(box.overlaps(other) for other in others)
     assert axes.get_window_extent(renderer).height > 50.0
+    assert given is not None or boxes[1].y0 < 20.0, 'no empty room in a figure of its own'
     plt.close('all')
 
 

@@ -90,14 +90,15 @@ def test_a_predictor_has_one_look_in_all_charts_of_the_page_and_no_two_have_the_
     from matplotlib.figure import Figure
 
     from foc_ros.reporting import study_pages
+    from foc_ros.reporting.draw import CLASS_COLOURS
 
-    looks: dict[str, set[tuple[str, str]]] = {}
+    looks: dict[str, set[tuple[str, str, str]]] = {}
 
     def chart(size, caption, draw, *given):
         draw(axes := Figure(size).subplots(), *given)
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             line = handle[0] if isinstance(handle, Container) else handle
-            looks.setdefault(label, set()).add((line.get_color(), line.get_linestyle()))
+            looks.setdefault(label, set()).add((line.get_color(), line.get_linestyle(), line.get_marker()))
         return '', caption
 
     monkeypatch.setattr(study_pages, 'make_chart', chart)
@@ -105,6 +106,7 @@ def test_a_predictor_has_one_look_in_all_charts_of_the_page_and_no_two_have_the_
     assert len(looks) == len(list(BASELINES)) - 1, 'all but the uniform guess'
     assert all(len(each) == 1 for each in looks.values())
     assert len(set.union(*looks.values())) == len(looks)
+    assert not {colour for colour, *_ in set.union(*looks.values())} & {*CLASS_COLOURS}, 'these are the colours of paths'
 
 
 def test_a_baseline_from_outside_is_compared(tables, monkeypatch):

@@ -183,11 +183,14 @@ def test_a_bar_is_pale_or_dotted_where_its_path_is(page):
 def test_letters_of_equal_paths_stand_apart_and_only_those_that_have_room(page):
     places = """const path = Array.from({ length: 41 }, (_, row) => [arguments[0] * row, 0]);
         const candidate = { likelihood: 0.08, path, motor: [], total: [], ghost: '' };
-        play.scene.candidates(Array.from({ length: 12 }, (_, slot) => ({ slot, ...candidate })));
+        const ghost = arguments[1] ? [{ ...candidate, ghost: 'eta unreachable' }] : [];
+        play.scene.begin();
+        play.scene.candidates([...Array.from({ length: 12 }, (_, slot) => ({ slot, ...candidate })), ...ghost]);
         return [play.scene.letters, play.scene.unit];"""
-    for step, least in ((0.007, 6), (0.0005, 1)):
-        letters, unit = page.execute_script(places, step)
+    for step, is_ghost, least in ((0.007, False, 6), (0.007, True, 3), (0.0005, False, 1)):
+        letters, unit = page.execute_script(places, step, is_ghost)
         assert least <= len(letters) < 12
+        assert not is_ghost or min(abs(x - 20 * step) for x, _ in letters) > 45.0 * unit, 'the words have their room'
         assert (np.diff(np.sort(np.array(letters)[:, 0])) > 18.0 * unit).all()  # wider than a letter
 
 

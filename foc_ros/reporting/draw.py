@@ -24,7 +24,7 @@ from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obs
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, write_whole
-from foc_ros.ros.messages.ranking import describe_candidate, find_drawn_curve
+from foc_ros.ros.messages.ranking import MOST_LETTERS, describe_candidate, find_drawn_curve
 
 from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghosts
 
@@ -42,8 +42,8 @@ CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9
 GHOST_COLOUR = '#777777'
 """Colour of a ghost, and of a candidate without a letter."""
 ELLIPSES_PER_CANDIDATE = 8
-NAME_LETTERS = 60
-"""Most letters of a class in a legend."""
+ROOM_PT = 11.0
+"""Distance of the middle of a letter from other text, so that its circle touches none, nor the circle of a letter."""
 NAMED_OBSTACLES = 30
 """The obstacles of larger scenes are drawn without their ids."""
 STYLE = {
@@ -102,9 +102,7 @@ def get_candidate_style(slot: int | None, likelihood: float, is_compromised: boo
 
 def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = ' ', reason: str = '') -> str:
     """Return the line of a candidate; goals: number of goals; reason: why it is a ghost."""
-    name = describe_candidate(candidate, goals)
-    if len(name) > NAME_LETTERS:  # the words of a class with many obstacles would leave no room for the plot
-        name = f'{name[: NAME_LETTERS - 1]}…'
+    name = describe_candidate(candidate, goals, MOST_LETTERS)
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
     found = 'estimated' if candidate.is_estimated else 'compromised'
@@ -184,7 +182,7 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     paths = [each for each, reason, _ in views if not reason]
     count = sum(each.likelihood < NOTED for each in paths)
     more = f'{count} more path{"s, each" if count > 1 else ""} below {100 * NOTED:.0f} %'
-    for rank, each in reversed(list(enumerate(paths))):
+    for each in reversed(paths):
         is_noted, is_first = each.likelihood >= NOTED, each is snapshot.candidates[0]
         slot = slots.get(each.label) if is_noted else None
         style = get_candidate_style(slot, each.likelihood, not each.is_solved)
@@ -194,8 +192,6 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
             _draw_ellipses(axes, each, style['color'], is_total=is_first)
         label = describe_in_legend(each, goals, get_letter(slot)) if is_noted else more
         axes.plot(*find_drawn_curve(each).T, zorder=3, label=label, gid=order[each.label] if is_noted else None, **style)
-        path = each.solution.path
-        draw_tag(axes, path[int((0.45 + 0.12 * (rank % 3)) * (len(path) - 1))], get_letter(slot), style['color'])
     for number, (each, reason, place) in enumerate(view for view in reversed(views) if view[1]):
         is_noted, curve = not each.has_likelihood or each.likelihood >= NOTED, find_drawn_curve(each)
         label = describe_in_legend(each, goals, get_letter(slots.get(each.label) if is_noted else None), reason)
@@ -208,6 +204,19 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
             axes.annotate(reason, curve[round(share * (len(curve) - 1))], annotation_clip=True, **look)
         if place is not None:
             entered.add(reason)
+
+
+def draw_letters(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -> None:
+    """Write the letters of the paths, when all else is drawn: each where it covers no text, or where there is most room."""
+    axes.figure.draw_without_rendering()  # texts have places only then
+    for each, (ghost, _) in zip(snapshot, describe_ghosts(snapshot), strict=True):
+        if not ghost and each.likelihood >= NOTED and each.label in slots:
+            slot, path = slots[each.label], each.solution.path
+            places = path[[round(share * (len(path) - 1)) for share in 0.3 + 0.05 * ((3 + 2 * slot + np.arange(10)) % 10)]]
+            points, room = axes.transData.transform(places), np.full(len(places), ROOM_PT * axes.figure.dpi / 72.0)
+            for low, high in (text.get_window_extent().get_points() for text in axes.texts):
+                room = np.minimum(room, np.linalg.norm(np.maximum(0.0, np.maximum(low - points, points - high)), axis=1))
+            draw_tag(axes, places[np.argmax(room)], get_letter(slot), get_candidate_style(slot, each.likelihood)['color'])
 
 
 def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, is_total: bool) -> None:

@@ -22,7 +22,7 @@ from .draw import Bounds, Figure, Span, compute_bounds, open_figure
 from .views import SLOTS, HandTrajectory, build_snapshot
 
 WIDTH_IN = 6.4
-SIZE_PT, COLUMNS = 8.0, 70
+SIZE_PT, COLUMNS = 7.5, 70
 """Size of the text, where there is room for it [pt], and characters in a line of a candidate."""
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
@@ -37,10 +37,12 @@ def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array |
     """
     draw.draw_scene(axes, snapshot.obstacles, snapshot.goal_positions, bounds, names=snapshot.goal_names)
     shown = snapshot.candidates_with_likelihood
-    draw.draw_candidates(axes, snapshot, {each.label: slot for slot, each in enumerate(shown[:SLOTS])})
+    slots = {each.label: slot for slot, each in enumerate(shown[:SLOTS])}
+    draw.draw_candidates(axes, snapshot, slots)
     if hand is not None and len(hand):
         draw.draw_hand_now(axes, hand)
     draw_legend(axes, None if shown else 'no candidate could be solved', is_alone)
+    draw.draw_letters(axes, snapshot, slots)
 
 
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
@@ -92,7 +94,7 @@ def _frame_scene(snapshot: Prediction) -> tuple[Array, Bounds]:
 
 
 def _get_height(bounds: Bounds) -> float:
-    return float(np.clip(0.9 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.6
+    return float(np.clip(0.85 * WIDTH_IN * (bounds[3] - bounds[2]) / (bounds[1] - bounds[0]), 2.0, 7.0)) + 0.55
 
 
 def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> None:
@@ -101,11 +103,16 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     is_added: whether the figure becomes higher by it; otherwise the text is as small as the place needs.
     """
     from matplotlib.lines import Line2D
+    from matplotlib.transforms import ScaledTranslation
 
     figure, name = axes.figure, f'legend {id(axes)}'
     for earlier in [each for each in figure.axes if each.get_gid() == name]:
         earlier.remove()
-    slot, place = _PLACES.setdefault(axes, (axes.get_subplotspec(), axes.get_position(original=True)))
+    if is_added:
+        figure.get_layout_engine().execute(figure)  # the axes have all of the figure only then
+    slot = axes.get_subplotspec()
+    place = axes.get_position(original=True) if is_added or slot is None else slot.get_position(figure)
+    slot, place = _PLACES.setdefault(axes, (slot, place))
     width_in = figure.get_figwidth() * place.width
     columns, sign_columns = (40, 1) if width_in < 3.5 else (COLUMNS, 2)
     handles, labels = axes.get_legend_handles_labels()
@@ -121,19 +128,22 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     lines = sum(1 + text.count('\n') for text in texts) + -(-len(signs) // sign_columns) + (title is not None)
     size_pt = min(SIZE_PT, 72.0 * width_in / (0.62 * (columns + 5)))
     wanted_in = lines * LINE * size_pt / 72.0 + 0.05
+    height_in = figure.get_figheight() * place.height
     if is_added:
         figure.set_figheight(figure.get_figheight() + wanted_in)
-    height_in = figure.get_figheight() * place.height
+        height_in += wanted_in
     wanted_in = min(wanted_in, 0.5 * height_in)
     size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (LINE * max(lines, 1)))
     below = _take_place(axes, slot, place, height_in, wanted_in)
     below.set(gid=name)
     below.axis('off')
-    look = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
+    look: dict[str, Any] = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
     font, handles = {'family': 'monospace', 'size': size_pt}, [named[label] for label in candidates]
-    below.add_artist(below.legend(handles, texts, title=title, loc='upper left', prop=font, **look))
+    upper = below.add_artist(below.legend(handles, texts, title=title, loc='upper left', prop=font, **look))
+    down = ScaledTranslation(0.0, -upper.get_window_extent().height / figure.dpi - 0.08, figure.dpi_scale_trans)
+    look |= {'loc': 'upper left', 'bbox_to_anchor': (0.0, 1.0), 'bbox_transform': below.transAxes + down}
     handles, font = [named[label] for label in signs], {'size': size_pt}
-    below.legend(handles, signs, loc='lower left', ncols=sign_columns, columnspacing=2.0, prop=font, **look)
+    below.legend(handles, signs, ncols=sign_columns, columnspacing=2.0, prop=font, **look)
 
 
 def _take_place(axes: Any, slot: Any, place: Any, height_in: float, wanted_in: float) -> Any:

@@ -29,7 +29,7 @@ from .draw import compute_bounds, draw_scene, get_class_style
 from .figures import make_moment_figure
 from .page import Section, explain_tables, make_chart, make_picture, write_page
 from .report import ReportCollector
-from .views import COLOURS, choose_moment
+from .views import choose_moment
 
 FEW = 20
 """Number of recordings or trials below which a page warns."""
@@ -135,13 +135,12 @@ def summarise_evaluation(answer: Mapping[str, Any]) -> list[str]:
 
 
 def _find_look(predictor: str, all_predictors: Iterable[str]) -> dict[str, Any]:
-    """Return the look of a predictor in all charts: those of this package in the first colour, each baseline in another one."""
+    """Return the look of a predictor in all charts, in no colour of a path: black lines of this package, grey signs of others."""
     ours = {PUBLISHED: '-', REFITTED: '--', PLAIN: ':'}
     if predictor in ours:
-        return {'color': get_class_style(0)[0], 'linestyle': ours[predictor], 'linewidth': 2.0}
+        return {'color': 'black', 'linestyle': ours[predictor], 'linewidth': 2.0, 'marker': '.'}
     number = [each for each in all_predictors if each not in (*ours, UNIFORM)].index(predictor)
-    colour, dash = get_class_style(1 + number + number // (COLOURS - 1))  # not the first colour
-    return {'color': colour, 'linestyle': dash, 'linewidth': 1.0}
+    return {'color': '0.5', 'linewidth': 1.0, 'marker': 'osD^vP*X<>'[number % 10], 'markersize': 5.0}
 
 
 def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:
@@ -149,7 +148,7 @@ def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:
     for predictor, scores in by_predictor.items():
         if predictor != UNIFORM:
             heights = [each[score] if each[score] is not None else float('nan') for each in scores['by_tenth']]
-            axes.plot(range(1, TENTHS + 1), heights, marker='.', label=predictor, **_find_look(predictor, by_predictor))
+            axes.plot(range(1, TENTHS + 1), heights, label=predictor, **_find_look(predictor, by_predictor))
     axes.set(xlabel='tenth of the distance', xticks=range(1, TENTHS + 1))
     axes.set_ylabel('share of true answers' if name == GAP else 'log-likelihood above uniform [nat]')
     axes.axhline(0.0, color='0.4', linewidth=0.8)
@@ -161,7 +160,7 @@ def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> Non
         bins = [each for each in by_predictor[predictor]['reliability'] if each['count']]
         shares = np.array([each['right'] for each in bins])
         errors = np.abs(np.array([each['interval'] for each in bins]).reshape(-1, 2).T - shares)
-        look = {'marker': 'o', 'markersize': 4, 'capsize': 2, 'label': predictor, **_find_look(predictor, by_predictor)}
+        look = {'capsize': 2, 'label': predictor, **_find_look(predictor, by_predictor)}
         (line, *_) = axes.errorbar([each['confidence'] for each in bins], shares, errors, **look)
         for each in bins if predictor == PUBLISHED else ():
             place = {'xy': (each['confidence'], each['right']), 'xytext': (5, -9), 'textcoords': 'offset points'}

@@ -25,13 +25,12 @@ function takePlace(places, taken, distance) {
 }
 
 class Scene {
-  // Attributes: paths, what was drawn since `begin`: points [m], text, kind and width of each path, for texts under the pointer; letters:
-  // where they are [m].
+  // Attributes: paths, what was drawn since `begin`: points [m], text, kind and width of each path, for texts under the pointer; letters,
+  // words: where they are [m], of words beside ghosts several places.
   constructor(canvas) {
     this.canvas = canvas;
     this.pen = canvas.getContext('2d');
-    this.paths = [];
-    this.letters = [];
+    [this.paths, this.words, this.letters] = [[], [], []];
     this.entered = new Set(); // what was written of obstacles that paths lead through
   }
 
@@ -68,8 +67,7 @@ class Scene {
     pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
     pen.setTransform(scale, 0, 0, -scale, origin[0], origin[1]);
     pen.lineJoin = 'round';
-    this.paths = [];
-    this.entered = new Set();
+    [this.paths, this.words, this.entered] = [[], [], new Set()];
   }
 
   stroke(colour, width, dash = [], alpha = 1) {
@@ -87,6 +85,7 @@ class Scene {
     this.pen.globalAlpha = 1;
   }
 
+  // Returns the width [m].
   text(words, [x, y], colour, { size = 12, up = 0, halo = false, align = 'center' } = {}) {
     const { pen, origin, scale, pixel } = this;
     pen.save();
@@ -100,7 +99,9 @@ class Scene {
     }
     pen.fillStyle = colour;
     pen.fillText(words, 0, 0);
+    const { width } = pen.measureText(words);
     pen.restore();
+    return width / scale;
   }
 
   trace(points) {
@@ -149,9 +150,10 @@ class Scene {
     if (ghost) {
       this.trace(path);
       this.stroke(ink('--soft'), width, [], PALE * alpha);
-      const middle = path[Math.round((path.length - 1) * (ghostAt ?? place))];
+      const [x, y] = path[Math.round((path.length - 1) * (ghostAt ?? place))];
       // Words of one obstacle would cover each other.
-      if (!this.entered.has(ghost)) this.text(ghost, middle, ink('--soft'), { size: 11, up: 14, halo: true });
+      const length = this.entered.has(ghost) ? 0 : this.text(ghost, [x, y], ink('--soft'), { size: 11, up: 14, halo: true });
+      for (let along = 0; along < length; along += 9 * this.unit) this.words.push([x - length / 2 + along, y + 14 * this.unit]);
       if (typeof ghostAt === 'number') this.entered.add(ghost);
       return;
     }
@@ -175,15 +177,16 @@ class Scene {
     list.filter(({ ghost }) => ghost).forEach((each, row) => this.candidate(each, alphaOf(each), 0.5 + 0.15 * (row % 3)));
     const paths = list.filter(({ ghost }) => !ghost);
     [...paths].reverse().forEach((each) => this.candidate(each, alphaOf(each)));
-    this.letters = [];
+    const taken = [...this.words];
     for (const { slot, path } of paths.filter((each) => each.likelihood >= NOTED && letterOf(each.slot))) {
       const shares = Array.from({ length: 10 }, (_, row) => 0.3 + 0.05 * ((3 + 2 * slot + row) % 10));
-      const at = takePlace(shares.map((share) => path[Math.round((path.length - 1) * share)]), this.letters, 20 * this.unit);
+      const at = takePlace(shares.map((share) => path[Math.round((path.length - 1) * share)]), taken, 20 * this.unit);
       if (!at) continue;
       this.disc(at, 9 * this.unit, ink('--page'), { filled: 1, width: 0 });
       this.disc(at, 9 * this.unit, colourOf(slot));
       this.text(letterOf(slot), at, ink('--ink'));
     }
+    this.letters = taken.slice(this.words.length);
   }
 
   goal(place, row, { lit = false, selected = false, radius = 0.009 } = {}) {

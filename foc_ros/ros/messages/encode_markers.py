@@ -22,7 +22,7 @@ from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 
 from .plane import lift
-from .ranking import describe_candidate, find_drawn_curve, order_candidates
+from .ranking import MOST_LETTERS, describe_candidate, find_drawn_curve, order_candidates
 from .types import MessageTypes, make_header
 
 CYLINDER, LINE_STRIP, TEXT, TRIANGLES = 3, 4, 9, 11
@@ -39,8 +39,8 @@ ELLIPSE_STYLES = {MOTOR: (0.3, 2 * THICKNESS), TOTAL: (0.12, THICKNESS)}
 LEGEND = 'ellipses of one standard deviation\ninner: motor noise, which eta is about\nouter: total uncertainty'
 LABELLED = 0.05
 """Least likelihood of a path with a label and ellipses: those of unlikely ones would cover those of the others."""
-MOST_LETTERS, LINE_LETTERS = 60, 28
-"""Length of a class in words up to which a label has them, as names of many obstacles would cover the scene; length of a line."""
+LINE_LETTERS = 28
+"""Length of a line of a label."""
 
 Colour = tuple[float, float, float, float]
 GREY: Colour = (0.48, 0.48, 0.48, 0.5)
@@ -101,8 +101,7 @@ class _MarkerEncoder:
         width = 0.002 + 0.004 * likelihood
         yield self.encode('path', index, LINE_STRIP, colour, (width, 0, 0), points=points)
         if _is_labelled(outcome):
-            words = describe_candidate(outcome, len(self._prediction.goal_positions))
-            words = outcome.label if len(words) > MOST_LETTERS else words
+            words = describe_candidate(outcome, len(self._prediction.goal_positions), MOST_LETTERS)
             text = f'{share}, {words}{notes}'.replace(' of ', '\0of\0')  # no line parts a side from its obstacle
             lines = textwrap.wrap(text, LINE_LETTERS, break_long_words=False, break_on_hyphens=False)
             place = points[round((0.45 + 0.12 * (index % 3)) * (len(points) - 1))]  # labels of neighbours stand apart

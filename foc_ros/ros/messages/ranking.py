@@ -19,6 +19,8 @@ MAX_NUMBER = 1e30
 """Largest number that is published; a larger one is an error of the solver, or infinite as a float32."""
 MAX_RATIO = 1e9
 """Largest cost ratio, also that to a candidate without cost."""
+MOST_LETTERS = 60
+"""Most letters of a class beside a picture: the words of one with many obstacles would leave no room for it."""
 
 
 @lru_cache(maxsize=1)
@@ -47,9 +49,10 @@ def compute_cost_ratios(outcomes: tuple[PredictedCandidate, ...]) -> list[float]
     return [1.0 if cost <= least else min(cost / least, MAX_RATIO) if least > 0.0 else MAX_RATIO for cost in costs]
 
 
-def describe_candidate(outcome: PredictedCandidate, goals: int) -> str:
-    """Return the class of a candidate in words, with its goal if there are several goals."""
-    return outcome.description if goals > 1 else describe_class(outcome.candidate.sides)
+def describe_candidate(outcome: PredictedCandidate, goals: int, most: int | None = None) -> str:
+    """Return the class of a candidate in words, with its goal if there are several goals; most: letters to which they are cut."""
+    words = outcome.description if goals > 1 else describe_class(outcome.candidate.sides)
+    return words if most is None or len(words) <= most else f'{words[: most - 1]}…'
 
 
 def find_drawn_curve(outcome: PredictedCandidate) -> Array:
