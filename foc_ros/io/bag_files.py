@@ -25,7 +25,7 @@ from zlib import crc32
 
 from mcap.exceptions import EndOfFile
 from mcap.records import Channel as ChannelRecord
-from mcap.records import Message, Schema, Statistics
+from mcap.records import Footer, Message, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import parse_qos
@@ -113,12 +113,11 @@ class McapFile:
     """An MCAP file, read by the library mcap; a stack closes it.
 
     It is read from begin to end once before its messages are, which compares the checksums of the chunks and of the data section.
-    So no optional record is needed, and the copies of channels and schemas in the summary section, of which the library compares
-    no checksum, do not count. A file without its footer, whose recorder was killed, is read up to its last whole chunk.
+    So no optional record is needed. A file without its footer, whose recorder was killed, is read up to its last whole chunk.
 
     Attributes, also of :class:`SqliteFile`: channels; message_count, also of messages without a channel; times_ns, of the first
     and the last message; loss, why messages that the recorder received are missing, empty if the file is whole; doubt, why they
-    may be missing where nothing states their number.
+    may be missing where nothing states their number; is_counted, whether the file itself states how many messages it has.
     """
 
     doubt = ''
@@ -137,12 +136,14 @@ class McapFile:
                     self._is_in_order &= last_ns <= record.log_time
                     first_ns, last_ns = min(first_ns, record.log_time), max(last_ns, record.log_time)
                 case Schema():
-                    schemas.setdefault(record.id, record)
+                    schemas[record.id] = record
                 case ChannelRecord():
-                    records.setdefault(record.id, record)
+                    records[record.id] = record
                 case Statistics():
                     stated = record.message_count
-        self.message_count, self.times_ns = counts.total(), (first_ns, last_ns)
+                case Footer():
+                    self._check_summary(record)
+        self.message_count, self.times_ns, self.is_counted = counts.total(), (first_ns, last_ns), stated is not None
         if stated not in (None, self.message_count):
             raise RecordingError(f'damaged or cut short: {self.message_count} of its {stated} messages can be read')
         self.channels = []
@@ -167,19 +168,32 @@ class McapFile:
             if not self.loss:
                 raise
 
+    def _check_summary(self, footer: Footer) -> None:
+        """Raise RecordingError if the summary section differs from its checksum, which the library does not compare."""
+        end = self._stream.tell()  # of the footer
+        self._stream.seek(footer.summary_start or end + len(MAGIC) - FOOTER_BYTES)
+        if footer.summary_crc not in (0, crc32(self._stream.read(end - self._stream.tell() - 4))):
+            raise RecordingError('damaged: the summary section differs from its checksum')
+        self._stream.seek(end)
+
 
 def add_checksums(file: Path) -> None:
-    """Write the checksums of the data into an MCAP file without compression (https://mcap.dev/spec): rosbags writes none."""
-    chunk, data_end, head = 0x06, 0x0F, struct.Struct('<BQ')
+    """Write the checksums into an MCAP file without compression (https://mcap.dev/spec): rosbags writes none. Raises OSError."""
+    chunk, data_end, footer, head = 0x06, 0x0F, 0x02, struct.Struct('<BQ')
     with file.open('r+b') as stream, mmap(stream.fileno(), 0) as content, memoryview(content) as data:
-        start, code = len(MAGIC), 0
-        while code != data_end:
+        start, summary, code = len(MAGIC), 0, 0
+        while code != footer:
             code, length = head.unpack_from(data, start)
             inside, end = start + head.size, start + head.size + length
-            if code == chunk:
-                struct.pack_into('<I', data, inside + 24, crc32(data[inside + 40 : end]))
-            elif code == data_end:
-                struct.pack_into('<I', data, inside, crc32(data[:start]))
+            places = {  # where the checksum of a record is, and of what
+                chunk: (inside + 24, inside + 40, end),
+                data_end: (inside, 0, start),
+                footer: (end - 4, summary, end - 4),
+            }
+            if code in places:
+                place, begin, stop = places[code]
+                struct.pack_into('<I', data, place, crc32(data[begin:stop]))
+            summary = end if code == data_end else summary
             start = end
 
 
@@ -188,6 +202,8 @@ class SqliteFile:
 
     With the log of a recorder that was killed it is read from a copy: SQLite would otherwise write into the recording.
     """
+
+    is_counted = False
 
     def __init__(self, path: Path, stack: ExitStack) -> None:
         path = path.resolve()  # the logs are beside the file itself, not beside a link to it

@@ -9,6 +9,7 @@ read all the same is a :class:`FocWarning`.
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -107,11 +108,12 @@ class BagReader:
                 warn(f'{self.path}: {path.name}: {file.doubt}')
         words = f'states {stated} messages, and the files hold {self.message_count}'
         if missing:
-            self._report_loss(f'{missing}; it {words}')
-        elif stated is not None and stated < self.message_count:
-            warn(f'{self.path}: metadata.yaml is wrong: it {words}')
-        elif stated not in (None, self.message_count):
-            self._report_loss(f'metadata.yaml {words}')
+            self._report_loss(missing if stated is None else f'{missing}; it {words}')
+        elif stated is not None and stated != self.message_count:
+            if stated < self.message_count or all(file.is_counted for file in self._files):
+                warn(f'{self.path}: metadata.yaml is wrong: it {words}')
+            else:
+                self._report_loss(f'metadata.yaml {words}')
         self._assign_topics()
 
     def _assign_topics(self) -> None:
@@ -245,7 +247,7 @@ def _list_files(folder: Path) -> tuple[list[Path], int | None, str]:
             found.setdefault(_strip_compression(path.name), path)
     names, count = _read_metadata(folder / 'metadata.yaml', found)
     if count is None:
-        return list(found.values()), None, ''
+        return list(found.values()), None, _find_gap(found)
     if others := [name for name in found if name not in names]:
         warn(f'{folder}: {", ".join(others)}, which metadata.yaml does not name, is not read')
     missing = ', '.join(name for name in names if name not in found)
@@ -270,6 +272,16 @@ def _read_metadata(file: Path, found: Collection[str]) -> tuple[list[str], int |
         warn(f'{file}: not the metadata of this bag, and not used ({type(error).__name__}: {reason})')
         return [], None
     return names, count
+
+
+def _find_gap(names: Collection[str]) -> str:
+    """Return in words which file lacks among those of a recorder, which numbers the parts of a recording from 0."""
+    parts = [part for name in names if (part := re.fullmatch(r'(.*_)(\d+)(\.\w+)', name))]
+    numbers, stems = {int(part[2]) for part in parts}, {(part[1], part[3]) for part in parts}
+    missing = next((number for number in range(max(numbers, default=0)) if number not in numbers), None)
+    if missing is None or len(numbers) < max(2, len(names)) or len(stems) > 1:
+        return ''
+    return f'{parts[0][1]}{missing}{parts[0][3]} is missing, by the numbers of the other files'
 
 
 @contextmanager
