@@ -45,7 +45,7 @@ CLOSE, CLOSE_FOR_NOW = 3e-5, 1e-3
 """Relative excess over the wanted safety factor that is aimed at. With the first number, a step that misses its aim by rounding
 meets the wanted factor. The second one holds where a later prediction goes on: a step may then miss by the error of its QP, and
 is not repeated for that."""
-UNLIKELY, SMALL_PART = 4.0, 0.04
+UNLIKELY, SMALL_PART = 4.0, 0.1
 """A class can wait for the next prediction if it stays less likely than the best one to its goal by more than the first number,
 as a logarithm, with all that its QP promises. At a guess QPs promise too little: there it waits only if that is less than the
 second number as a part of what it is behind."""
