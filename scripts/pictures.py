@@ -296,7 +296,7 @@ def contacts() -> Figure:
     centre: Any = TOUCHED.centre
     blue, orange = get_class_style(0)[0], get_class_style(1)[0]
     fine = interpolate_position(solution.mean, solution.dt, solution.dt * np.linspace(0.0, STEPS, 20 * STEPS + 1))
-    contact = interpolate_position(solution.mean, solution.dt, np.array(solution.dt * time))
+    contact = interpolate_position(solution.mean, solution.dt, np.array([solution.dt * time]))[0]
     outward = 0.008 * (contact - centre) / np.linalg.norm(contact - centre)
     with open_figure(9.0, 3.6) as figure:
         touch, curves = figure.subplots(1, 2)

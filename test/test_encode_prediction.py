@@ -189,7 +189,7 @@ def test_a_label_has_short_lines_and_parts_no_side_from_its_obstacle():
     assert text == '60 %, left of cup0, cup1,\ncup2, cup3'
     many = replace(long, candidate=replace(long.candidate, sides=4 * sides))
     (text,) = [each.text for each in made('markers', prediction(many)).markers if each.ns == 'label']
-    assert text == '60 %, left of cup0, cup1,\ncup2, cup3, cup0, cup1,\ncup2, cup3, cup…', 'words, also of a class that is long'
+    assert text == '60 %, left of cup0, cup1,\ncup2, cup3, cup0, cup1,\ncup2, cup3, c...', 'words, also of a class that is long'
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xz', 'yz'])

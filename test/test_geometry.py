@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from homotopy_scenes import make_polygon
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,8 +21,13 @@ FINE = 20_001
 
 
 def random_polygon(generator):
-    """Return the vertices of a random shape, with its centre elsewhere than at zero."""
-    return make_polygon(generator)[0] + generator.uniform(-0.1, 0.1, 2)
+    """Return one vertex, two, a box at any angle, or the hull of some points, with its centre elsewhere than at zero."""
+    kind = generator.integers(4)
+    if kind < 2:
+        return generator.uniform(-0.1, 0.1, (1 + kind, 2))
+    if kind == 2:
+        return make_box_polygon(generator.uniform(0.01, 0.2, 2), generator.uniform(-4, 4)) + generator.uniform(-0.02, 0.02, 2)
+    return make_hull_polygon(generator.uniform(-0.1, 0.1, (generator.integers(3, 9), 2)))[1]
 
 
 def locate(polygon, points, spare=3):

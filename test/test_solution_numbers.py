@@ -18,7 +18,7 @@ from scipy.interpolate import CubicHermiteSpline
 from foc_ros.core.config import FocConfig
 from foc_ros.core.obstacle_table import Edges, make_obstacles
 from foc_ros.core.obstacles.geometry import find_offset
-from foc_ros.core.obstacles.risk import RiskBound, compute_safety_factor
+from foc_ros.core.obstacles.risk import RiskBound, compute_safety_factor, eta_of_k, size_moments
 from foc_ros.core.obstacles.shapes import Box, Capsule, Circle, Hull, Shape, collect_obstacles
 from foc_ros.core.ocp import gradients
 from foc_ros.core.ocp.margin import Contacts, Margins
@@ -181,6 +181,24 @@ def test_what_bounds_and_events_cost_in_standard_deviations():
     np.testing.assert_allclose(wanted, [3.0, np.sqrt(1499.0), 1.281552, 3.208707], rtol=1e-6)
     assert RiskBound('gaussian').find_safety_factor(0.3) == 0.0, 'the mean keeps out of a circle whatever eta is'
     assert RiskBound('cantelli', 150).find_probability(2.0) == 0.0, 'a sum of risks above one says nothing'
+
+
+def test_the_safety_factor_is_that_of_samples_for_correlated_axes_and_uncertain_centres():
+    generator = np.random.default_rng(5)
+    samples = 400_000
+    covariance = np.array([[4e-4, 1.5e-4], [1.5e-4, 2e-4]])
+    centre_covariance = np.array([[1e-4, -5e-5], [-5e-5, 9e-5]])
+    obstacle = make_obstacles([[0.1, 0.05]], [0.03], [0.004], centre_covariance=centre_covariance)
+    d = np.array([0.06, -0.03])
+    distance = np.hypot(*d)
+    along = d @ (covariance + centre_covariance) @ d / distance**2
+    k = float(compute_safety_factor(distance, along, *size_moments(obstacle))[0])
+    position = d + generator.multivariate_normal(np.zeros(2), covariance, samples)
+    centre = generator.multivariate_normal(np.zeros(2), centre_covariance, samples)
+    radius = generator.normal(0.03, 0.004, samples)
+    C = radius**2 - d @ d - 2 * (position - centre - d) @ d
+    assert k == pytest.approx(-C.mean() / C.std(), rel=0.01)
+    assert np.mean(C <= 0) >= eta_of_k(k)
 
 
 N, GOAL, K = 24, (0.3, 0.02), 2.0

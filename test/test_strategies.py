@@ -146,6 +146,23 @@ def test_a_movement_at_another_pace_begins_as_the_earlier_one_from_where_the_han
     np.testing.assert_allclose(start.control.reshape(2, 40).T, before.control[10:] / slower**3, rtol=1e-9, atol=1e-9)
 
 
+def test_earlier_solutions_are_taken_up_together_as_each_alone():
+    goals, durations = [(0.3, 0.0), (0.25, 0.08), (0.3, -0.1)], [1.0, 0.8, 1.2]
+    problems = [
+        reach(make_obstacles([[0.15, 0.0]], 0.03, 0.001), goal=goal, duration=t) for goal, t in zip(goals, durations, strict=True)
+    ]
+    before = [solved(each, bowed((0, 0), goal, 50, 0.05), 'optimal') for each, goal in zip(problems, goals, strict=True)]
+    before[1] = replace(before[1], multipliers=())
+    at_end = [(name, 50.0, value) for name, _, value in before[0].multipliers]
+    before[2] = replace(before[2], multipliers=(*before[2].multipliers, *at_end))
+    later = [replace(each, initial_mean=solution.mean[7]) for each, solution in zip(problems, before, strict=True)]
+    for one, solution, problem in zip(warm_start(before, later), before, later, strict=True):
+        (alone,) = warm_start([solution], [problem])
+        np.testing.assert_allclose(one.control, alone.control, rtol=1e-9, atol=1e-9)
+        np.testing.assert_array_equal(one.forces.time, alone.forces.time)
+    assert 50.0 in warm_start(before, later)[2].forces.time, 'a contact at the goal stays'
+
+
 @EVERY
 @pytest.mark.parametrize('steps', [1, 2, 5])
 def test_however_few_the_steps_there_is_an_answer(strategy, steps):

@@ -20,6 +20,7 @@ from .obstacles.clearance import is_free, measure_clearance
 from .obstacles.risk import centre_trajectories
 from .ocp.problem import Problem, group_by_response
 from .ocp.solve import solve_problems
+from .ocp.solver import MOST_ITERATIONS
 from .ocp.start import Start, cold_start, warm_start
 from .prediction import PredictedCandidate
 from .solution import Candidate, Solution, Status, label_class
@@ -67,7 +68,7 @@ def solve_candidates(
 def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier: Sequence[Solution | None]) -> list[Start]:
     """Return the earlier solution of each candidate as its start, or its guess where that passes an obstacle on another side.
 
-    Where the earlier solution was not settled, the start has both.
+    Where the earlier solution ran out of time or iterations, the start has both; one that was postponed goes on.
     """
     starts = [cold_start(each.guess) for each in candidates]
     for rows in group_by_response(problems):
@@ -79,7 +80,7 @@ def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier
     for each, start, solution, found in zip(candidates, starts, earlier, sides, strict=True):
         if not each.contains(found):
             chosen.append(cold_start(each.guess))
-        elif solution is not None and solution.status is Status.DEADLINE:
+        elif solution is not None and (solution.status is Status.DEADLINE or solution.qp_solves >= MOST_ITERATIONS):
             chosen.append(replace(start, guess=each.guess))
         else:
             chosen.append(start)

@@ -67,7 +67,10 @@ def interpolate_linear(values: Array, at: Array) -> Array:
 
 
 def interpolate_position(mean: Array, dt: Array | float, times: Array) -> Array:
-    """Return the mean positions (..., m, 2) [m] at times (..., m) [s] from states (..., N + 1, n) at steps of dt (...) [s]."""
+    """Return the mean positions (..., m, 2) [m] at times (..., m) [s] from states (..., N + 1, n) at steps of dt (...) [s].
+
+    All leading axes are the same.
+    """
     dt = np.asarray(dt)[..., None]
     step, share = locate(times / dt, mean.shape[-2] - 1)
     known = np.concatenate((mean[..., :2], dt[..., None] * mean[..., 2:4]), axis=-1)

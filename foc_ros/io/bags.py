@@ -268,8 +268,8 @@ def _read_metadata(file: Path, found: Collection[str]) -> tuple[list[str], int |
         if not set(names) & set(found):
             raise ValueError(f'it names {", ".join(names)}, and here is {", ".join(found)}')
     except Exception as error:  # whatever stands in it
-        reason = ' '.join(str(error).split())
-        warn(f'{file}: not the metadata of this bag, and not used ({type(error).__name__}: {reason})')
+        kind = '' if isinstance(error, ValueError) else f'{type(error).__name__}: '
+        warn(f'{file}: not the metadata of this bag, and not used ({kind}{" ".join(str(error).split())})')
         return [], None
     return names, count
 

@@ -130,8 +130,10 @@ class Jobs:
         self.operator = folder / OPERATOR
         self._note_fitted(not losses)
         fitted = {**answer['parameters'], **answer['chosen']}
-        rows = [(name, show_value(each['given']), show_value(each['value'])) for name, each in fitted.items()]
-        changed = [row for row in rows if row[1] != row[2]]
+        shown = [
+            (name, each['given'], each['value']) for name, each in fitted.items() if str(each['given']) != str(each['value'])
+        ]
+        changed = [(name, show_value(given), show_value(value)) for name, given, value in shown]
         self._say('result', columns=('parameter', 'before', 'after'), rows=changed)
         text = 'Predictions now use your parameters.'
         if losses:

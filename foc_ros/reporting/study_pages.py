@@ -140,7 +140,9 @@ def _find_look(predictor: str, all_predictors: Iterable[str]) -> dict[str, Any]:
     if predictor in ours:
         return {'color': 'black', 'linestyle': ours[predictor], 'linewidth': 2.0, 'marker': '.'}
     number = [each for each in all_predictors if each not in (*ours, UNIFORM)].index(predictor)
-    return {'color': '0.5', 'linewidth': 1.0, 'marker': 'osD^vP*X<>'[number % 10], 'markersize': 5.0}
+    signs = 'osD^vP*X<>'
+    style = ('-', '--', ':')[number // len(signs) % 3]
+    return {'color': '0.5', 'linestyle': style, 'linewidth': 1.0, 'marker': signs[number % len(signs)], 'markersize': 5.0}
 
 
 def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:

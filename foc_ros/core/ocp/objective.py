@@ -82,14 +82,10 @@ class Objective:
         costs = [known[id(each)] for each in problems]
         self.weights = np.stack([each.weights for each in costs]) + lam[:, None] * np.stack([each.variance for each in costs])
         self.fixed = np.array([each.fixed for each in costs])
-        self.goal_rows, self.goal_targets = (
-            pad_rows([each.goal_rows for each in costs]),
-            pad_rows([each.goal_targets for each in costs]),
-        )
-        self.soft_rows, self.soft_targets = (
-            pad_rows([each.soft_rows for each in costs]),
-            pad_rows([each.soft_targets for each in costs]),
-        )
+        self.goal_rows = pad_rows([each.goal_rows for each in costs])
+        self.goal_targets = pad_rows([each.goal_targets for each in costs])
+        self.soft_rows = pad_rows([each.soft_rows for each in costs])
+        self.soft_targets = pad_rows([each.soft_targets for each in costs])
         self.soft_weights = pad_rows([each.soft_weights for each in costs])
         self.beta = np.array([each.preference.beta for each in problems])
         # by this the losses of problems with different steps differ from those of costs in m^2/s^5

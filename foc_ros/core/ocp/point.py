@@ -30,7 +30,7 @@ TIGHTNESS, HELD_OFF = (1e-4, 1e-2, 1.0, 1e2, 1e4), 0.5
 """How tightly a guess is followed: as the first of these with which the path stays in its class, and farther from the polygons
 than this part of the radii. Tightly followed, a guess takes an effort, and so has a variance, that makes margins meaningless."""
 UNSETTLED_EFFORT = 3.0
-"""Effort relative to that of following the guess. An unsettled solution with more is no start: it needs more iterations."""
+"""Effort relative to that of following the guess. A solution that ran out of time with more is no start: it takes more QPs."""
 
 
 @dataclass
@@ -133,7 +133,7 @@ def solve_at(
 def _begin(margins: Margins, problems: Sequence[Problem], starts: Sequence[Start]) -> tuple[Array, list[Start], Array]:
     """Return the controls (b, 2N) at which the search begins, with their starts, and the swept angles (b, m) of the classes.
 
-    The search begins at the guess where there is no earlier solution, or one that was not settled and needs much more effort.
+    The search begins at the guess where there is no earlier solution, or one that ran out of time with much more effort.
     """
     angles, chosen = margins.sweep_steps(np.stack([each.path for each in starts])), list(starts)
     control, most = np.zeros((len(starts), 2 * margins.steps)), np.full(len(starts), np.inf)

@@ -34,13 +34,12 @@ LARGEST_RATE, GENTLE_RATE = 1e3, 5.0
 """Worth of a unit of safety in logarithms of cost where the wanted safety is a condition, and the one with which the search
 begins where it is larger: at a guess, margins tell little of what they cost."""
 ROUGH_GAIN = 1e-3
-"""Gain, as a logarithm of cost, at which the search with the gentle worth ends, and by which the last step of a later prediction
-may miss what its QP foretold."""
+"""Gain, as a logarithm of cost, at which the search with the gentle worth ends."""
 SMALL_GAIN, SMALL_FACTOR = 2e-8, 1e-9
 """Gain that a QP promises below which a problem is solved, and relative difference of a safety factor that is rounding."""
-LAST_GAIN = 1e-4
+LAST_GAIN, LAST_MISS = 1e-4, 1e-3
 """Gain, as a logarithm of cost, that may remain when a problem counts as solved. A step that fails although its QP promised less
-fails by rounding."""
+fails by rounding. In a later prediction, the last step may miss by the second number what its QP foretold."""
 CLOSE, CLOSE_FOR_NOW = 3e-5, 1e-3
 """Relative excess over the wanted safety factor that is aimed at. With the first number, a step that misses its aim by rounding
 meets the wanted factor. The second one holds where a later prediction goes on: a step may then miss by the error of its QP, and
@@ -196,7 +195,7 @@ class Solver:
             missed = np.abs(now.at.loss[rows] - at.loss - plan.fall[place])
             is_free = plan.k[place] < self.wanted_k[rows] * (1.0 - FREE)
             is_exact = is_free | now.is_exact[rows]
-            is_small = np.where(is_exact, plan.gain[place] < LAST_GAIN, missed < ROUGH_GAIN)
+            is_small = np.where(is_exact, plan.gain[place] < LAST_GAIN, missed < LAST_MISS)
             is_met = is_free | (at.factor >= self.objective.wanted_k[rows])
             is_last = is_good & is_small & is_met & self.margins.between
             now.is_done[rows[is_last]] = now.is_settled[rows[is_last]] = True

@@ -48,7 +48,7 @@ class Start:
 
     path (N + 1, 2): positions at steps 0..N, which tell the homotopy class [m]. A start from an earlier solution also has its
     stacked control (2N,), its contacts, its safety factor and its lambda; control and lam are None for a guess. guess (N + 1, 2):
-    where the search may begin instead of an earlier solution that was not settled.
+    where the search may begin instead of an earlier solution that ran out of time.
     """
 
     path: Array
@@ -69,29 +69,31 @@ def warm_start(previous: Sequence[Solution], problems: Sequence[Problem]) -> lis
 
     A movement at r times its pace has the same path. Its velocity is r times as large, its jerk r^3 times, and a force about r^2
     times. The least change of this control leads the hand to the places where the earlier solution touched obstacles. All
-    solutions have the same number of steps, and all problems the same response to the control.
+    solutions have the same number of steps and states, and all problems the same response to the control.
     """
     if not previous:
         return []
     steps = problems[0].horizon.steps
     dt, mean = np.array([each.dt for each in previous]), np.stack([each.mean for each in previous])
-    gain, step_s = (np.array([getattr(each.horizon, read) for each in problems]) for read in ('gain', 'dt'))
+    gain, step_s = np.array([each.horizon.gain for each in problems]), np.array([each.horizon.dt for each in problems])
+    extent = np.array([each.extent for each in problems])
     begin = _find_hand(mean, dt, problems)
     stride = (mean.shape[1] - 1 - begin) / steps
     path, control = resample(mean[..., :2], np.stack([each.control for each in previous]), begin, stride, steps)
     control *= ((stride * dt / step_s) ** (mean.shape[2] // 2))[:, None]
-    cost = np.maximum([each.effort for each in previous], np.finfo(float).tiny)
+    cost = np.maximum([each.effort for each in previous], (JITTER * extent / gain) ** 2)
+    tables = [{name: index for index, name in enumerate(each.obstacles.ids)} for each in problems]
     kept = [
-        (row, problem.obstacles.ids.index(identity), shifted, multiplier / cost[row])
-        for row, (solution, problem) in enumerate(zip(previous, problems, strict=True))
+        (row, table[identity], shifted, multiplier / cost[row])
+        for row, (solution, table) in enumerate(zip(previous, tables, strict=True))
         for identity, time, multiplier in solution.multipliers
-        if identity in problem.obstacles.ids and 1 <= (shifted := (time - begin[row]) / stride[row]) <= steps
+        if identity in table and (shifted := steps - (mean.shape[1] - 1 - time) / stride[row]) >= 1.0
     ]
-    table = np.array(kept, dtype=float).reshape(-1, 4)
-    where, obstacle, (time, multiplier) = table[:, 0].astype(np.intp), table[:, 1].astype(np.intp), table[:, 2:].T
+    where, obstacle, time, multiplier = np.array(kept, dtype=float).reshape(-1, 4).T
+    where, obstacle = where.astype(np.intp), obstacle.astype(np.intp)
     moments_s = (begin[where] + stride[where] * time) * dt[where]
     places = interpolate_position(mean[where], dt[where], moments_s[:, None])[:, 0]
-    weight = (HELD * np.array([each.extent for each in problems])) ** 2 / cost
+    weight = (HELD * extent) ** 2 / cost
     control = follow(problems, where, time, places, weight / gain**2, control * gain[:, None]) / gain[:, None]
     forces = [Forces(*(each[where == row] for each in (obstacle, time, multiplier))) for row in range(len(problems))]
     begun = zip(path, control, forces, previous, strict=True)
@@ -124,6 +126,8 @@ def resample(path: Array, control: Array, begin: Array, stride: Array, steps: in
         Positions (b, N + 1, 2) [m] and controls (b, N, 2).
     begin, stride
         Where the rest begins, and the length of its steps, (b,) [steps].
+    steps
+        Number of the new steps.
     """
     at = np.minimum(begin[:, None] + stride[:, None] * np.arange(steps + 1), control.shape[1])
     # the mean over each new step: the integral of the control, which is linear within the old steps

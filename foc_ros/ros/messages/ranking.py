@@ -52,7 +52,7 @@ def compute_cost_ratios(outcomes: tuple[PredictedCandidate, ...]) -> list[float]
 def describe_candidate(outcome: PredictedCandidate, goals: int, most: int | None = None) -> str:
     """Return the class of a candidate in words, with its goal if there are several goals; most: letters to which they are cut."""
     words = outcome.description if goals > 1 else describe_class(outcome.candidate.sides)
-    return words if most is None or len(words) <= most else f'{words[: most - 1]}…'
+    return words if most is None or len(words) <= most else f'{words[: most - 3]}...'
 
 
 def find_drawn_curve(outcome: PredictedCandidate) -> Array:
