@@ -306,3 +306,16 @@ def test_the_most_likely_class_of_a_symmetric_obstacle_does_not_flicker(strategy
         assert {each.label for each in prediction.solved_candidates} == {'goal0:+0', 'goal0:-0'}
         seen.append(prediction.most_likely)
     assert sum(one != other for one, other in pairwise(seen)) <= 1
+
+
+def test_a_class_that_was_postponed_goes_on_from_where_it_was():
+    boxes = [((0.12, 0.04), (0.05, 0.03), 0.3), ((0.14, -0.05), (0.04, 0.04), 0.0), ((0.23, 0.0), (0.06, 0.02), -0.4)]
+    boxes.append(((0.25, 0.09), (0.03, 0.05), 0.1))
+    values = {'homotopy.max_candidates': 6, 'duration.model': 'fixed', 'duration.fixed_s': 1.0, 'foc.steps': 50, 'budget_s': 0.0}
+    predictor = foc_ros.Predictor(Config().with_values(values))
+    predictor.set_obstacles([foc_ros.Box(centre, size, yaw, radius_stddev=0.001) for centre, size, yaw in boxes])
+    predictor.set_goals([(0.36, 0.04), (0.36, -0.04)])
+    predictions = [predictor.update(0.02 * tick, (2e-4 * tick, 0.0)) for tick in range(8)]
+    assert sum(each.status is Status.ESTIMATED for prediction in predictions for each in prediction) > 8
+    assert max(each.solution.qp_solves for each in predictions[0]) > 6
+    assert max(each.solution.qp_solves for prediction in predictions[2:] for each in prediction) <= 3
