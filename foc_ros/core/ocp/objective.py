@@ -29,13 +29,11 @@ FLOOR, LEAST_FLOOR = 20.0, 300.0
 class Cost(NamedTuple):
     """The cost and the goal of one problem, for a control in units of `Horizon.gain`.
 
-    weights (2N,): of the squared control at lambda 0; variance (2N,): what lambda adds; fixed: part of the cost; goal_rows (e,
-    2N) of unit length and goal_targets (e,): what the goal fixes; soft_rows (s, 2N), soft_targets and soft_weights (s,): what it
-    weighs.
+    weights (2N,): of the squared control at lambda 0; fixed: part of the cost; goal_rows (e, 2N) of unit length and goal_targets
+    (e,): what the goal fixes; soft_rows (s, 2N), soft_targets and soft_weights (s,): what it weighs.
     """
 
     weights: Array
-    variance: Array
     fixed: float
     goal_rows: Array
     goal_targets: Array
@@ -52,7 +50,6 @@ def tabulate_cost(problem: Problem) -> Cost:
     is_soft = softness > 0.0
     return Cost(
         1.0 + problem.weighted_variance,
-        problem.summed_variance,
         fixed,
         *problem.fixed_goal,
         rows[is_soft] / gain,
@@ -80,7 +77,9 @@ class Objective:
         # candidates with one goal share their problem
         known = {key: tabulate_cost(each) for key, each in {id(each): each for each in problems}.items()}
         costs = [known[id(each)] for each in problems]
-        self.weights = np.stack([each.weights for each in costs]) + lam[:, None] * np.stack([each.variance for each in costs])
+        self.weights = np.stack([each.weights for each in costs])
+        if lam.any():
+            self.weights += lam[:, None] * np.stack([each.summed_variance for each in problems])
         self.fixed = np.array([each.fixed for each in costs])
         self.goal_rows = pad_rows([each.goal_rows for each in costs])
         self.goal_targets = pad_rows([each.goal_targets for each in costs])
