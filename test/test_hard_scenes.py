@@ -184,13 +184,14 @@ def test_the_shares_of_unknown_classes_and_of_another_goal_are_published_and_rea
 def test_a_class_that_the_search_misses_keeps_its_answer_for_a_moment():
     one = replace_values(SHARE_CONFIG, {'homotopy.max_candidates': 1})
     whole, tracks = predict(SHARE_CONFIG, HAND, ROW, GOALS, NO_TRACKS)
+    lost = {each.label for each in whole.solved_candidates} - {whole.most_likely}
     ages = []
     for tick in range(1, 13):
         prediction, tracks = predict(one, replace(HAND, stamp_ns=20_000_000 * tick), ROW, GOALS, tracks)
-        ages.append({each.label: each.age_s for each in prediction.candidates if each.age_s})
+        ages.append({each.label: each.age_s for each in prediction.candidates if each.label in lost})
         assert total(prediction) == pytest.approx(1.0)
         assert all(np.hypot(*each.mean[0, :2]) < 1e-9 for each in prediction.candidates)
-    lost = {each.label for each in whole.candidates} - {whole.most_likely}
+    assert len(lost) == 2
     for tick, found in enumerate(ages, 1):
         assert found == ({label: pytest.approx(0.02 * tick) for label in lost} if tick <= 10 else {})
 

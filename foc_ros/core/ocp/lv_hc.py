@@ -126,7 +126,7 @@ def choose_sample(wanted_k: float, is_hard: bool, first_s: float, end: float) ->
 
 def _may_improve(after: Sample, samples: list[Sample]) -> bool:
     """Return whether the effort alone is not yet a larger loss than the least so far; samples: in the order of s."""
-    return after.loss - after.result.gain <= min(each.loss for each in samples) + FURTHER_LOSS
+    return after.loss <= min(each.loss for each in samples) + FURTHER_LOSS
 
 
 def _find_root(wanted_k: float, low: Sample, high: Sample) -> Generator[float, Sample, Sample]:

@@ -68,8 +68,6 @@ class StrategyResult:
         The (tau, lambda) of each contact for which it would be there, None where these are tau and lam.
     aims_at_eta
         Whether a control with less than the wanted eta is no solution.
-    gain
-        By how much the loss would fall at least, if there were more time: 0 for a solution.
     """
 
     status: Status
@@ -83,7 +81,6 @@ class StrategyResult:
     minimum: tuple[float, int, float] | None = None
     weights: tuple[tuple[float, float], ...] | None = None
     aims_at_eta: bool = True
-    gain: float = 0.0
 
 
 class Strategy(Protocol):
@@ -104,10 +101,9 @@ def collect(point: Point, row: int, status: Status, message: str, **rest: object
     now, solver = point.now, point.solver
     mine = (now.contacts.problem == row) & (now.multipliers > 0.0)
     forces = Forces(now.contacts.obstacle[mine], now.contacts.time[mine], now.multipliers[mine])
-    gain = 0.0 if now.is_settled[row] else float(min(now.gain[row], np.finfo(float).max))
     control = now.control[row] / solver.gain[row]
     rest.setdefault('qp_solves', int(now.iterations[row]))
-    return StrategyResult(status, message, control, forces, gain=gain, **rest)  # type: ignore[arg-type]
+    return StrategyResult(status, message, control, forces, **rest)  # type: ignore[arg-type]
 
 
 def solve_optimal(
