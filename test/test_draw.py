@@ -120,7 +120,7 @@ def test_classes_stand_in_the_legend_in_words_also_those_past_many_obstacles():
     second = replace(second, candidate=replace(second.candidate, sides=many))
     text = legend_of(axes_of(replace(made, candidates=(first, second, *rest))))
     assert f'{first.candidate.goal_name or "goal0"}: right of 0, 3, 6, left of 1, 2, 4, 5, 7, 8' in text
-    assert 'goal0: right of obstacle0, obstacle3, obstacle6, obst...' in text
+    assert 'goal0: right of obstacle0, obstacle3, obstacle6, obstacle...' in text
     assert not any(each.label in text for each in made.candidates)
 
 
