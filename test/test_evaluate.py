@@ -19,7 +19,7 @@ from foc_ros.analysis.evaluation.report import find_label_mismatches
 from foc_ros.analysis.evaluation.scores import leave_goals_out
 from foc_ros.analysis.recordings import find_recordings
 from foc_ros.cli.main import main
-from foc_ros.core.errors import InputError, RecordingError
+from foc_ros.core.errors import FocWarning, InputError, RecordingError
 from foc_ros.ros.parameters import load_parameter_file
 
 ASIDE = {'left': 0.06, 'right': -0.06, 'left too': 0.05}
@@ -243,6 +243,12 @@ def test_a_wrong_table_is_named(folder, text, words):
     (folder / 'scenes.csv').write_text(text)
     with pytest.raises(RecordingError, match=re.escape(words)):
         find_recordings(folder)
+
+
+def test_bags_beside_tables_are_left_out_with_a_warning(folder):
+    (folder / 'session.mcap').write_bytes(b'')
+    with pytest.warns(FocWarning, match=r'session\.mcap: left out, because .* recordings\.csv'):
+        assert list(find_recordings(folder)) == ['a', 'b']
 
 
 @pytest.fixture

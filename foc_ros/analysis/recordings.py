@@ -110,19 +110,25 @@ Recording = BagRecording | TableRecording | BrokenRecording
 def find_recordings(data: Path) -> dict[str, Recording]:
     """Return the recordings of a folder of tables or of bags, or a bag, by name; RecordingError where it is none of these."""
     if (data / RECORDINGS).exists():
+        for bag in _find_bags(data):
+            warn(f'{bag}: left out, because the recordings of this folder are those of {RECORDINGS}')
         return dict(read_tables(data))
     if data.is_file() or ((data / 'metadata.yaml').exists() and any(map(is_bag_file, data.iterdir()))):
         check_bag(data)
         bags = [data.resolve()]
     elif data.is_dir():
-        visible = [path for path in sorted(data.iterdir()) if not path.name.startswith('.')]
-        # a directory with bag files but without metadata counts, so that it is reported as broken
-        bags = [path for path in visible if any(map(is_bag_file, path.iterdir() if path.is_dir() else [path]))]
+        bags = _find_bags(data)
     else:
         raise RecordingError(f'{data}: no such file or directory')
     if not bags:
         raise RecordingError(f'{data}: expected bags, or {RECORDINGS} with {GOALS} or {SCENES}, got neither')
     return {path.name: BagRecording(path.name, path) for path in _leave_out_copies(bags)}
+
+
+def _find_bags(folder: Path) -> list[Path]:
+    """Return the bags in a folder; a directory with bag files but without metadata counts, so that it is reported as broken."""
+    visible = [path for path in sorted(folder.iterdir()) if not path.name.startswith('.')]
+    return [path for path in visible if any(map(is_bag_file, path.iterdir() if path.is_dir() else [path]))]
 
 
 def _leave_out_copies(bags: Iterable[Path]) -> Iterator[Path]:
