@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from string import ascii_uppercase
 from typing import Any
@@ -24,7 +25,7 @@ from foc_ros.core.obstacles.geometry import find_holders, find_limits, trace_obs
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, write_whole
-from foc_ros.ros.messages.ranking import MOST_LETTERS, describe_candidate, find_drawn_curve
+from foc_ros.ros.messages.ranking import MOST_LETTERS, MOST_NAME_LETTERS, cut, describe_candidate, find_drawn_curve
 
 from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghosts
 
@@ -105,8 +106,8 @@ def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = 
     name = describe_candidate(candidate, goals, MOST_LETTERS)
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
-    found = 'estimated' if candidate.is_estimated else 'compromised'
-    words = '' if candidate.is_solved else f'; {found}: eta {candidate.eta:.3f}'
+    found = 'estimated: eta about' if candidate.is_estimated else 'compromised: eta'
+    words = '' if candidate.is_solved else f'; {found} {candidate.eta:.3f}'
     return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
 
 
@@ -163,8 +164,10 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
     for number, goal in enumerate(goals):
         look = {'marker': '*', 'markersize': 12, 'color': 'black', 'markerfacecolor': 'white', 'linestyle': ''}
         axes.plot(*goal, zorder=5, label='goal', **look)
-        name = names[number] if names else f'goal{number}'
-        axes.annotate(name, goal, xytext=(6, 6), textcoords='offset points', fontsize=8, zorder=6)
+        name = cut(names[number], MOST_NAME_LETTERS) if names else f'goal{number}'
+        side = -1 if len(name) > MOST_NAME_LETTERS / 2 and 2.0 * goal[0] > bounds[0] + bounds[1] else 1  # where it has room
+        look = {'xytext': (6 * side, 6), 'textcoords': 'offset points', 'ha': 'left' if side > 0 else 'right'}
+        axes.annotate(name, goal, fontsize=8, zorder=6, **look)
     axes.set(xlim=bounds[:2], ylim=bounds[2:], xlabel='x [m]', ylabel='y [m]')
     axes.set_aspect('equal')
 
@@ -173,9 +176,10 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
     """Draw the candidates of a snapshot, the most likely on top; slots: by label, a candidate without one has no letter.
 
     Motor noise is filled, and left out of candidates so unlikely that it would cover the others; only the most likely candidate
-    has its total uncertainty, too. The legend has one line for all below NOTED, and the others in the order of their group
-    identities.
+    has its total uncertainty, too. Moving obstacles are outlined where they are later. The legend has one line for all below
+    NOTED, and the others in the order of their group identities.
     """
+    _draw_later_obstacles(axes, snapshot)
     goals, entered = len(snapshot.goal_positions), set[str]()
     order = {each.label: f'candidate {row:04d}' for row, each in enumerate(snapshot.candidates)}
     views = [(each, *ghost) for each, ghost in zip(snapshot, describe_ghosts(snapshot), strict=True)]
@@ -189,9 +193,13 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
         if not is_noted:
             style |= {'linewidth': 0.7, 'alpha': 0.7}  # thinner than the hand later
         if is_first or each.likelihood >= LIKELY:
-            _draw_ellipses(axes, each, style['color'], is_total=is_first)
+            total = f'all uncertainty of path {get_letter(slot)}' if is_first else ''
+            _draw_ellipses(axes, each, style['color'], total)
         label = describe_in_legend(each, goals, get_letter(slot)) if is_noted else more
         axes.plot(*find_drawn_curve(each).T, zorder=3, label=label, gid=order[each.label] if is_noted else None, **style)
+    if paths and round(100 * (snapshot.unknown + snapshot.other)):
+        words = f'   {100 * (snapshot.unknown + snapshot.other):3.0f} %  another class, or another goal'
+        axes.plot([], [], linestyle='', label=words, gid='candidate ~')  # the last one
     for number, (each, reason, place) in enumerate(view for view in reversed(views) if view[1]):
         is_noted, curve = not each.has_likelihood or each.likelihood >= NOTED, find_drawn_curve(each)
         label = describe_in_legend(each, goals, get_letter(slots.get(each.label) if is_noted else None), reason)
@@ -219,26 +227,40 @@ def draw_letters(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -> N
             draw_tag(axes, places[np.argmax(room)], get_letter(slot), get_candidate_style(slot, each.likelihood)['color'])
 
 
-def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, is_total: bool) -> None:
-    """Draw the ellipses along one path: filled for motor noise, dashed for the total uncertainty where it is asked for."""
+def _draw_later_obstacles(axes: Any, snapshot: Prediction) -> None:
+    """Draw the outlines of moving obstacles at the thirds of the most likely path."""
+    for time_s in snapshot.candidates[0].times[-1] * np.array([1.0, 2.0, 3.0]) / 3.0 if len(snapshot) else ():
+        later = replace(snapshot.obstacles, centre=snapshot.obstacles.centre + time_s * snapshot.obstacles.velocity)
+        for row in np.flatnonzero(later.velocity.any(axis=1)):
+            look = {'fill': False, 'edgecolor': '0.35', 'linewidth': 1.0, 'linestyle': '--', 'zorder': 1.1}
+            axes.add_patch(make_obstacle_patch(later, row, 0.0, **look, label='moving obstacle, until the hand arrives'))
+
+
+def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, total: str) -> None:
+    """Draw the ellipses along one path: filled for motor noise, dashed for the total uncertainty; total: its words, if any.
+
+    One that is longer than three quarters of the axes would hide the picture, and is left out.
+    """
     look: dict[str, Any] = {'facecolor': to_rgba(colour, 0.3), 'edgecolor': to_rgba(colour, 0.8)}
     looks = [(candidate.motor_covariance, look | {'label': 'motor noise, one standard deviation'})]
-    if is_total and candidate.solution.motor_covariance is not None:
-        look = {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': 'all uncertainty of the most likely path'}
+    if total and candidate.solution.motor_covariance is not None:
+        look = {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': total}
         looks.append((candidate.covariance, look))
-    path = candidate.solution.path
+    path, longest = candidate.solution.path, 0.75 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
     for row in np.unique(np.linspace(0, len(path) - 1, ELLIPSES_PER_CANDIDATE + 1).astype(int))[1:]:
         for covariance, look in looks:
             ellipse = make_stddev_ellipse(path[row], covariance[row, :2, :2])
-            ellipse.set(linewidth=0.8, zorder=2, **look)
-            axes.add_patch(ellipse)
+            if ellipse.width <= longest:
+                ellipse.set(linewidth=0.8, zorder=2, **look)
+                axes.add_patch(ellipse)
 
 
 def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: Span) -> None:
     """Draw the measured hand within a span [ns]: black before now, pale after it, a dot at its position now."""
     past, future = hand.between(span[0], now_ns), hand.between(now_ns, span[1])
     axes.plot(*hand.positions[future].T, color='0.55', linewidth=1.4, zorder=4, label='hand later, not known yet')
-    axes.plot(*hand.positions[past].T, color='black', linewidth=2.0, zorder=4, label='hand before')
+    if len(hand.positions[past]) > 1:
+        axes.plot(*hand.positions[past].T, color='black', linewidth=2.0, zorder=4, label='hand before')
     draw_hand_now(axes, hand.positions[past][-1:])
 
 

@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from foc_ros.core.obstacles.geometry import find_holders
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
@@ -41,8 +42,17 @@ def draw_snapshot(axes: Any, snapshot: Prediction, bounds: Bounds, hand: Array |
     draw.draw_candidates(axes, snapshot, slots)
     if hand is not None and len(hand):
         draw.draw_hand_now(axes, hand)
-    draw_legend(axes, None if shown else 'no candidate could be solved', is_alone)
+    draw_legend(axes, _describe_trouble(snapshot), is_alone)
     draw.draw_letters(axes, snapshot, slots)
+
+
+def _describe_trouble(snapshot: Prediction) -> str | None:
+    """Return what a reader has to know before all else: that nothing could be solved, or where the hand is now."""
+    if not snapshot.candidates_with_likelihood:
+        return 'no candidate could be solved'
+    held = find_holders(snapshot.candidates[0].solution.path[:1], snapshot.blocking_obstacles)[0]
+    inside = [name for name, is_held in zip(snapshot.blocking_obstacles.ids, held.tolist(), strict=True) if is_held]
+    return f'the hand is inside obstacle {", ".join(inside)}' if inside else None
 
 
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
@@ -139,7 +149,7 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     below.axis('off')
     look: dict[str, Any] = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
     font, handles = {'family': 'monospace', 'size': size_pt}, [named[label] for label in candidates]
-    upper = below.add_artist(below.legend(handles, texts, title=title, loc='upper left', prop=font, **look))
+    upper = below.add_artist(below.legend(handles, texts, title=title, title_fontsize=size_pt, loc='upper left', prop=font, **look))
     down = ScaledTranslation(0.0, -upper.get_window_extent().height / figure.dpi - 0.08, figure.dpi_scale_trans)
     look |= {'loc': 'upper left', 'bbox_to_anchor': (0.0, 1.0), 'bbox_transform': below.transAxes + down}
     handles, font = [named[label] for label in signs], {'size': size_pt}

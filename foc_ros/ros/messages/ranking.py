@@ -12,15 +12,15 @@ import numpy as np
 from foc_ros.core.errors import FocError
 from foc_ros.core.plant.response import compute_curve
 from foc_ros.core.prediction import PredictedCandidate, Prediction
-from foc_ros.core.solution import describe_class
+from foc_ros.core.solution import describe_class, name_goal
 from foc_ros.core.types import Array
 
 MAX_NUMBER = 1e30
 """Largest number that is published; a larger one is an error of the solver, or infinite as a float32."""
 MAX_RATIO = 1e9
 """Largest cost ratio, also that to a candidate without cost."""
-MOST_LETTERS = 60
-"""Most letters of a class beside a picture: the words of one with many obstacles would leave no room for it."""
+MOST_LETTERS, MOST_NAME_LETTERS = 60, 20
+"""Most letters of a class beside a picture, and of the name of its goal: longer words would leave no room for the picture."""
 
 
 @lru_cache(maxsize=1)
@@ -51,8 +51,17 @@ def compute_cost_ratios(outcomes: tuple[PredictedCandidate, ...]) -> list[float]
 
 def describe_candidate(outcome: PredictedCandidate, goals: int, most: int | None = None) -> str:
     """Return the class of a candidate in words, with its goal if there are several goals; most: letters to which they are cut."""
-    words = outcome.description if goals > 1 else describe_class(outcome.candidate.sides)
-    return words if most is None or len(words) <= most else f'{words[: most - 3]}...'
+    candidate = outcome.candidate
+    goal = candidate.goal_name or name_goal(candidate.goal)
+    if most is not None:
+        goal = cut(goal, MOST_NAME_LETTERS)
+    words = describe_class(candidate.sides, goal if goals > 1 else '')
+    return words if most is None else cut(words, most)
+
+
+def cut(words: str, most: int) -> str:
+    """Return words of at most so many letters: longer ones end with dots."""
+    return words if len(words) <= most else f'{words[: most - 3]}...'
 
 
 def find_drawn_curve(outcome: PredictedCandidate) -> Array:
