@@ -60,6 +60,14 @@ def test_what_a_table_of_log_likelihoods_determines(log_likelihood, values, expe
     assert found.undetermined == undetermined
 
 
+def test_a_value_whose_given_one_lies_within_its_interval_is_not_determined():
+    """One recording alone asks for another value, by much, and the others by chance for the given one."""
+    settings = tuple({BETA: beta} for beta in VALUES)
+    values = np.array([-100.0 * np.abs(VALUES - 6.0), *3 * [-10.0 * np.abs(VALUES - 2.0)]])
+    found = SettingTable(values, settings).estimate({BETA: 2.0}, 'how')[0]
+    assert not found.estimates and 'interval' in found.undetermined[BETA]
+
+
 def test_where_only_a_sum_is_determined_one_part_is_kept_and_the_other_follows():
     found = _estimate(lambda beta, weaving: -10.0 * (beta + weaving - 7.0) ** 2)
     (name,), (kept,) = found.estimates, found.undetermined

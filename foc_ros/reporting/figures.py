@@ -148,8 +148,8 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     below.set(gid=name)
     below.axis('off')
     look: dict[str, Any] = {'borderaxespad': 0.0, 'borderpad': 0.0, 'labelspacing': 0.25, 'handlelength': 2.0, 'frameon': False}
-    font, handles = {'family': 'monospace', 'size': size_pt}, [named[label] for label in candidates]
-    upper = below.add_artist(below.legend(handles, texts, title=title, title_fontsize=size_pt, loc='upper left', prop=font, **look))
+    words = {'title': title, 'title_fontsize': size_pt, 'prop': {'family': 'monospace', 'size': size_pt}}
+    upper = below.add_artist(below.legend([named[label] for label in candidates], texts, loc='upper left', **words, **look))
     down = ScaledTranslation(0.0, -upper.get_window_extent().height / figure.dpi - 0.08, figure.dpi_scale_trans)
     look |= {'loc': 'upper left', 'bbox_to_anchor': (0.0, 1.0), 'bbox_transform': below.transAxes + down}
     handles, font = [named[label] for label in signs], {'size': size_pt}

@@ -132,7 +132,8 @@ class SettingTable:
         """
         left, undetermined = self, dict[str, str]()
         while True:
-            found = [(*left._examine(name, value), name) for name, value in given.items() if name not in undetermined]
+            drawn = left._draw_best()
+            found = [(*left._examine(name, value, drawn), name) for name, value in given.items() if name not in undetermined]
             doubted = min((each for each in found if each[1]), default=None)
             if doubted is None:
                 return left, undetermined
@@ -140,7 +141,15 @@ class SettingTable:
             columns = [column for column, each in enumerate(left.settings) if each[name] == given[name]]
             left = SettingTable(left.values[:, columns], tuple(left.settings[column] for column in columns))
 
-    def _examine(self, name: str, given: float) -> tuple[float, str]:
+    def _draw_best(self) -> list[Setting]:
+        """Return the settings that are best in resamples of the recordings, none where none is left."""
+        if not self.settings:
+            return []
+        values = np.nan_to_num(self.values)
+        drawn = resample(lambda rows: int(values[rows].sum(axis=0).argmax()), len(values))
+        return [self.settings[each] for each in drawn.astype(int).tolist()]
+
+    def _examine(self, name: str, given: float, drawn: Sequence[Setting]) -> tuple[float, str]:
         """Return how much the profile of a parameter varies [nat], and why it is undetermined, empty if it is determined."""
         profile: dict[float, float] = {}
         for setting, total in zip(self.settings, np.nansum(self.values, axis=0).tolist(), strict=True):
@@ -155,6 +164,10 @@ class SettingTable:
             why = f'{best:.3g}, the end of the values tried, explains the recordings best'
         elif best != given and profile[best] - profile.get(given, -math.inf) < FLAT_NAT:
             why = f'it explains the recordings within {FLAT_NAT:g} nat of the best value tried, {best:.3g}'
+        elif best != given:
+            low, high = np.percentile([each[name] for each in drawn], CENTRAL).tolist()
+            if low <= given <= high:
+                why = f'it lies within the interval of the best value tried, {best:.3g}: {low:.3g} to {high:.3g}'
         return variation, why
 
     def estimate(self, given: Setting, how: str) -> tuple[Findings, SettingTable]:
@@ -163,9 +176,8 @@ class SettingTable:
         found = Findings(undetermined=undetermined)
         if len(undetermined) == len(given):  # which may be among none of the settings
             return found, left
-        values, best = np.nan_to_num(left.values), left.best
-        drawn = resample(lambda rows: int(values[rows].sum(axis=0).argmax()), len(values)).astype(int)
+        best, drawn = left.best, left._draw_best()
         for name in [each for each in given if each not in undetermined]:
-            resampled = [left.settings[each][name] for each in drawn]
+            resampled = [each[name] for each in drawn]
             found.estimates[name] = Estimate.from_resamples(clip_to_bounds(name, best[name]), resampled, how)
         return found, left
