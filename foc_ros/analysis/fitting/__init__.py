@@ -132,7 +132,7 @@ class SettingTable:
         """
         left, undetermined = self, dict[str, str]()
         while True:
-            drawn = left._draw_best()
+            drawn = left.draw_best()
             found = [(*left._examine(name, value, drawn), name) for name, value in given.items() if name not in undetermined]
             doubted = min((each for each in found if each[1]), default=None)
             if doubted is None:
@@ -141,7 +141,7 @@ class SettingTable:
             columns = [column for column, each in enumerate(left.settings) if each[name] == given[name]]
             left = SettingTable(left.values[:, columns], tuple(left.settings[column] for column in columns))
 
-    def _draw_best(self) -> list[Setting]:
+    def draw_best(self) -> list[Setting]:
         """Return the settings that are best in resamples of the recordings, none where none is left."""
         if not self.settings:
             return []
@@ -176,7 +176,7 @@ class SettingTable:
         found = Findings(undetermined=undetermined)
         if len(undetermined) == len(given):  # which may be among none of the settings
             return found, left
-        best, drawn = left.best, left._draw_best()
+        best, drawn = left.best, left.draw_best()
         for name in [each for each in given if each not in undetermined]:
             resampled = [each[name] for each in drawn]
             found.estimates[name] = Estimate.from_resamples(clip_to_bounds(name, best[name]), resampled, how)
