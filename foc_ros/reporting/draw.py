@@ -197,8 +197,9 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
             _draw_ellipses(axes, each, style['color'], total)
         label = describe_in_legend(each, goals, get_letter(slot)) if is_noted else more
         axes.plot(*find_drawn_curve(each).T, zorder=3, label=label, gid=order[each.label] if is_noted else None, **style)
-    if paths and round(100 * (snapshot.unknown + snapshot.other)):
-        words = f'   {100 * (snapshot.unknown + snapshot.other):3.0f} %  another class, or another goal'
+    elsewhere = f'{100.0 * (snapshot.unknown + snapshot.other):3.0f}'
+    if paths and elsewhere != '  0':
+        words = f'   {elsewhere} %  another class, or another goal'
         axes.plot([], [], linestyle='', label=words, gid='candidate ~')  # the last one
     for number, (each, reason, place) in enumerate(view for view in reversed(views) if view[1]):
         is_noted, curve = not each.has_likelihood or each.likelihood >= NOTED, find_drawn_curve(each)
@@ -231,7 +232,7 @@ def _draw_later_obstacles(axes: Any, snapshot: Prediction) -> None:
     """Draw the outlines of moving obstacles at the thirds of the most likely path."""
     for time_s in snapshot.candidates[0].times[-1] * np.array([1.0, 2.0, 3.0]) / 3.0 if len(snapshot) else ():
         later = replace(snapshot.obstacles, centre=snapshot.obstacles.centre + time_s * snapshot.obstacles.velocity)
-        for row in np.flatnonzero(later.velocity.any(axis=1)):
+        for row in np.flatnonzero(later.velocity.any(axis=1)).tolist():
             look = {'fill': False, 'edgecolor': '0.35', 'linewidth': 1.0, 'linestyle': '--', 'zorder': 1.1}
             axes.add_patch(make_obstacle_patch(later, row, 0.0, **look, label='moving obstacle, until the hand arrives'))
 
