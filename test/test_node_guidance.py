@@ -4,6 +4,8 @@
 
 import dataclasses
 import itertools
+import os
+import threading
 import time
 from typing import Any
 
@@ -222,7 +224,7 @@ def test_neither_a_slow_prediction_nor_an_error_stops_guidance(ros, monkeypatch)
 def test_a_hand_that_restarts_elsewhere_takes_nothing_from_the_tank_and_is_not_guided_by_what_was_predicted_before(seconds):
     config = Config().with_values({'guidance.enabled': True, 'guidance.clearance': 0.0})
     published: list[GuidanceOutput] = []
-    loop = GuidanceLoop(config, lambda output, _: published.append(output))
+    loop = GuidanceLoop(config, lambda output, _: published.append(output), lambda _: None, lambda _: None)
     loop.set_released(False)
     state, now_s = None, 100.0
 
@@ -250,7 +252,7 @@ def test_a_hand_that_restarts_elsewhere_takes_nothing_from_the_tank_and_is_not_g
 
 def test_the_state_is_told_without_a_force_and_the_clutch_fills_the_tank():
     config = Config().with_values({'guidance.enabled': True})
-    loop = GuidanceLoop(config, lambda *_: None)
+    loop = GuidanceLoop(config, lambda *_: None, lambda _: None, lambda _: None)
 
     def tell(now_s):
         loop.update(now_s)
@@ -273,8 +275,51 @@ def test_the_state_is_told_without_a_force_and_the_clutch_fills_the_tank():
     assert told[-1]['tank_J'] == '0.5000'
 
 
+PRIORITY_CONFIG = Config().with_values({'guidance.enabled': True, 'guidance.realtime_priority': 7})
+
+
+def make_loop(warn=lambda _: None):
+    return GuidanceLoop(PRIORITY_CONFIG, lambda *_: None, lambda _: None, warn)
+
+
+@pytest.mark.parametrize('error', [PermissionError(1, 'Operation not permitted'), AttributeError('not on this system')])
+def test_a_priority_that_is_not_permitted_is_told_once(monkeypatch, error):
+    def refuse(*_):
+        raise error
+
+    monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    told: list[str] = []
+    loop = make_loop(told.append)
+    for each in (0, 50, 50, 60):
+        loop._set_priority(each)
+    assert loop._priority == 0
+    assert len(told) == 1
+    assert all(word in told[0] for word in ('50', 'not permitted', 'rtprio', 'guidance.realtime_priority'))
+
+
+def test_the_thread_of_guidance_has_it_while_guidance_is_enabled(monkeypatch):
+    asked: list[tuple[str, int]] = []
+    monkeypatch.setattr(
+        os, 'sched_setscheduler', lambda _, __, to: asked.append((threading.current_thread().name, to.sched_priority))
+    )
+    loop = make_loop()
+
+    def wait_for(*priorities):
+        until(lambda: asked == [('guidance', each) for each in priorities], 'the priorities', 10.0)
+
+    loop.start()
+    try:
+        wait_for(7)
+        loop.reconfigure(Config())
+        wait_for(7, 0)
+        loop.reconfigure(PRIORITY_CONFIG)
+        wait_for(7, 0, 7)
+    finally:
+        loop.stop()
+
+
 def test_a_late_update_leaves_the_processor_to_others(monkeypatch):
-    """The thread sleeps between updates that take longer than their period."""
+    """The thread has a priority before all others, so that it must sleep between updates that take longer than their period."""
     updates: list[tuple[float, float]] = []
 
     def update_slowly(_, now_s):
@@ -282,10 +327,9 @@ def test_a_late_update_leaves_the_processor_to_others(monkeypatch):
         updates.append((now_s, time.monotonic()))
 
     monkeypatch.setattr(GuidanceLoop, 'update', update_slowly)
-    config = Config().with_values({'guidance.enabled': True})
-    loop = GuidanceLoop(config, lambda *_: None)
+    loop = make_loop()
     loop.start()
     until(lambda: len(updates) >= 5, 'five updates', 10.0)
     loop.stop()
     pauses = [began - ended for (_, ended), (began, _) in itertools.pairwise(updates)]
-    assert min(pauses) > 0.09 / config.guidance.rate_hz
+    assert min(pauses) > 0.09 / PRIORITY_CONFIG.guidance.rate_hz

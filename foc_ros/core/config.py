@@ -202,6 +202,9 @@ class GuidanceConfig(Group):
 
     enabled: bool = param(False, 'whether the node publishes guidance; without it the node is a predictor only')
     rate_hz: float = param(200.0, 'updates of guidance per second, independent of the predictions', 'Hz', 1.0, 1000.0)
+    realtime_priority: int = param(
+        50, 'priority of the thread of guidance under SCHED_FIFO, while it is enabled and if permitted; 0: ordinary', '', 0, 99
+    )
     mode: str = param(
         'path',
         'path: no force along the path, the operator sets the pace; trajectory: also along it',

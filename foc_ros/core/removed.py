@@ -33,7 +33,6 @@ REMOVED = {
     'guidance.precision_low': 'it is 100 1/m^2',
     'guidance.precision_high': 'it is 2500 1/m^2',
     'guidance.position_stddev': 'it is 2 mm',
-    'guidance.realtime_priority': 'the thread of guidance has an ordinary priority',
     'guidance.sharpness': 'a force has the size of its expected benefit',
     'guidance.yield_acceleration': 'the acceleration of the hand is evidence of what the operator wants',
 }

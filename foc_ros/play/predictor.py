@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from logging import getLogger
 from queue import SimpleQueue
 from threading import Thread
 from time import monotonic
@@ -55,7 +56,7 @@ class Predictor:
         self._ended_s = 0.0
         self._error = ''
         self._recent: deque[Prediction] = deque(maxlen=REMEMBERED)
-        self._guidance = GuidanceLoop(config, lambda *outcome: receive(outcome), self._note_error)
+        self._guidance = GuidanceLoop(config, lambda *outcome: receive(outcome), self._note_error, getLogger(__name__).warning)
         self._thread = Thread(target=self._run, name='prediction', daemon=True)
 
     def start(self) -> None:

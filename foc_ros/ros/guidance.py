@@ -3,12 +3,14 @@
 """Guidance of the node: updates at `guidance.rate_hz` by the steady clock in a thread of their own, and their topics.
 
 The executor tells the thread what is new by replacing one record; the thread reads it at each update. So neither waits for the
-other. The loop needs no ROS; `play` uses it too.
+other. While guidance is enabled, the thread has the priority `guidance.realtime_priority`, if that is permitted. The loop needs
+no ROS; `play` uses it too.
 """
 
 from __future__ import annotations
 
 import math
+import os
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -66,7 +68,7 @@ class GuidanceLoop:
 
     Attributes: newest; output, the last one; sample_header, that of the last one that was published. Called in the thread:
     publish, with each output and its header; report, with an exception of an update, after which guidance begins anew with a
-    force of zero.
+    force of zero; warn, with a text if it may not have its priority.
     """
 
     def __init__(
@@ -74,11 +76,14 @@ class GuidanceLoop:
         config: Config,
         publish: Callable[[GuidanceOutput, SampleHeader], object],
         report: Callable[[Exception], None] = lambda _: None,
+        warn: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.newest = Newest(config)
         self.output: GuidanceOutput | None = None
         self.sample_header: SampleHeader | None = None
-        self._publish, self._report = publish, report
+        self._publish, self._report, self._warn = publish, report, warn
+        self._priority = self._wanted_priority = 0
+        self._has_warned = False
         self._state, self._zeros = GuidanceState(), ZEROS
         self._hand: FilterState | None = None  # of the last update
         self._end_s, self._enabled = math.inf, threading.Event()
@@ -143,6 +148,7 @@ class GuidanceLoop:
             'authority': f'{output.authority:.3f}',
             'tank_J': f'{output.tank:.4f}',
             'force_N': f'{float((output.force @ output.force) ** 0.5):.3f}',
+            'realtime_priority': str(self._priority),
         }
 
     def update(self, now_s: float) -> None:
@@ -172,9 +178,11 @@ class GuidanceLoop:
         while self._end_s == math.inf or (self._zeros < ZEROS and monotonic() < self._end_s):
             sleep(max(due_s - monotonic(), 0.0))
             if self._zeros >= ZEROS and not self._enabled.is_set():
+                self._set_priority(0)
                 self._enabled.wait()
                 self._state = GuidanceState()
                 continue
+            self._set_priority(self.newest.config.guidance.realtime_priority)
             try:
                 self.update(monotonic())
             except Exception as error:
@@ -183,6 +191,21 @@ class GuidanceLoop:
             period_s = 1.0 / self.newest.config.guidance.rate_hz
             due_s = max(due_s + period_s, monotonic() + 0.1 * period_s)  # it must not keep a processor for itself
 
+    def _set_priority(self, priority: int) -> None:
+        """Give this thread a priority of SCHED_FIFO, 0 for an ordinary one; threads that it starts have an ordinary one."""
+        if priority == self._wanted_priority:
+            return
+        self._wanted_priority = priority
+        try:
+            policy = (os.SCHED_FIFO if priority else os.SCHED_OTHER) | os.SCHED_RESET_ON_FORK
+            os.sched_setscheduler(0, policy, os.sched_param(priority))
+            self._priority = priority
+        except (OSError, AttributeError) as error:  # Python has these on Linux only
+            if not self._has_warned:
+                remedy = 'allow it with `rtprio` in /etc/security/limits.d, or set guidance.realtime_priority to 0'
+                self._warn(f'the real-time priority {priority} of guidance is not permitted ({error}): {remedy}')
+                self._has_warned = True
+
 
 class GuidanceTopics:
     """Publishes guidance for a node while `loop` runs, which has to be told what is new; publishers: of the node, by topic."""
@@ -190,7 +213,7 @@ class GuidanceTopics:
     def __init__(self, node: Node, publishers: Mapping[str, Any], config: Config, report: Callable[[Exception], None]) -> None:
         self._node, self._publishers = node, publishers
         self._thread_types = RclpyTypes()  # messages of the thread of guidance; no other thread uses them
-        self.loop = GuidanceLoop(config, self._publish_output, report)
+        self.loop = GuidanceLoop(config, self._publish_output, report, node.get_logger().warning)
 
     def list_kinds(self) -> dict[str, str]:
         """Return the types of the outputs, by the names of their topics."""
