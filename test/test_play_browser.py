@@ -4,6 +4,7 @@
 
 import math
 import re
+import signal
 import time
 from pathlib import Path
 
@@ -344,7 +345,14 @@ def test_a_finger_moves_the_hand_and_what_it_drags_changes_the_prediction_and_is
 def test_the_page_says_that_the_server_is_gone_and_recovers(browser, tmp_path):
     with play(tmp_path) as started:
         visit(browser, started)
+        started.process.send_signal(signal.SIGSTOP)
+        silent = "document.getElementById('status').innerText.startsWith('no answer from the server for ')"
+        wait_for(browser, silent, 'the server is silent', 5)
+        assert browser.execute_script("return document.getElementById('status').className") == 'status failing'
+        started.process.send_signal(signal.SIGCONT)
+        wait_for(browser, "document.getElementById('status').className !== 'status failing'", 'the server answers again', 20)
         port = started.url.rpartition(':')[2]
+    assert 'Traceback' not in started.output
     wait_for(browser, "document.getElementById('status').innerText === 'The server is gone; trying again.'", 'the message')
     assert browser.execute_script('return play.view.candidates.length') == 0
     with play(tmp_path, '--port', port):

@@ -51,6 +51,7 @@ let predictedMs = 0;
 const OLD_MS = 1000; // after which a prediction is not shown any more
 const LATE_MS = 150; // median time from an input to the drawn prediction above which the status line is not green
 let measuredMs = 0; // when this time was measured last
+let heardMs = 0; // when the last message of the server came
 const REFUSED_MS = 6000; // for which the status line says that something was refused
 let task = { phase: 'none' };
 let job = null;
@@ -214,6 +215,7 @@ function showJob() {
 function connect() {
   socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/socket`);
   socket.addEventListener('message', ({ data }) => {
+    heardMs = performance.now();
     const message = JSON.parse(data);
     handlers[message.type](message);
   });
@@ -291,6 +293,8 @@ function frame(time) {
   moveHand(time, FRAME_MS);
   sendScene();
   if (time - predictedMs > OLD_MS) view.candidates = [];
+  const silentS = Math.floor((time - heardMs) / 1000); // the server tells its state twice a second
+  if (silentS > 0 && socket.readyState === WebSocket.OPEN) showStatus('failing', `no answer from the server for ${silentS} s`);
   [view.scene, view.selected] = [arranging.scene, arranging.selected];
   draw(time);
   measure(time);
