@@ -195,6 +195,26 @@ def test_letters_of_equal_paths_stand_apart_and_only_those_that_have_room(page):
         assert (np.diff(np.sort(np.array(letters)[:, 0])) > 18.0 * unit).all()  # wider than a letter
 
 
+FORCES = """
+const [force, done] = [document.querySelector('#signs span:nth-child(3) path'), arguments[0]];
+const probe = document.body.appendChild(document.createElement('i'));
+play.scene.line = (points, colour, width) => {
+  if (width <= 1) return;
+  probe.style.color = colour;
+  delete play.scene.line;
+  done([[getComputedStyle(force).stroke, getComputedStyle(force).strokeWidth], [getComputedStyle(probe).color, `${width}px`]]);
+};
+play.view.hand.setForce([1, 0], 1e9);
+"""
+"""Colour and width of the force of guidance, in the help and as it is drawn."""
+
+
+def test_help_shows_the_force_of_guidance_as_it_is_drawn(page):
+    click(page, 'theme')
+    in_help, drawn = page.execute_async_script(FORCES)
+    assert in_help == drawn
+
+
 def test_everything_can_be_done_by_keys_and_survives_a_reload(page, tmp_path):
     """Move the hand, arrange the scene, switch guidance, record, do a task, write a report and download it, without a pointer."""
     page.execute_cdp_cmd('Browser.setDownloadBehavior', {'behavior': 'allow', 'downloadPath': str(tmp_path)})
@@ -267,12 +287,24 @@ PLACES = """return arguments[0].map((name) => document.getElementById(name).getB
     .map(({ top, bottom }) => [top, bottom])"""
 
 
+STAYS = """
+const tops = () => ['scene', 'score'].map((name) => byId(name).getBoundingClientRect().top);
+const before = tops();
+byId('status').textContent = 'words '.repeat(60);
+byId('ways').tBodies[0].replaceChildren();
+return [before, tops()];
+"""
+"""Where the scene is, and what is below the bars, before and after a change of the status and of the bars."""
+
+
 @pytest.mark.parametrize('size', [(1280, 720), (1366, 650)])
 def test_the_scene_and_its_buttons_are_on_one_screen(browser, library, size):
     visit(browser, library, *size)
     click(browser, 'arrange')
     for top, bottom in browser.execute_script(PLACES, ['scene', 'buttons', 'editing']):
         assert 0.0 <= top < bottom <= size[1]
+    before, after = browser.execute_script(STAYS)
+    assert before == after
     browser.get('about:blank')
 
 
@@ -282,6 +314,8 @@ def test_the_page_fits_on_a_phone(browser, library, dark):
     for top, bottom in browser.execute_script(PLACES, ['scene', 'buttons']):
         assert 0.0 <= top < bottom <= PHONE[1], 'scene and buttons are on one screen'
     assert browser.execute_script("return document.querySelector('details').open") is False, 'help is folded'
+    before, after = browser.execute_script(STAYS)
+    assert before == after
     colour = 'return getComputedStyle(document.body).backgroundColor'
     before = browser.execute_script(colour)
     assert before == ('rgb(20, 24, 28)' if dark else 'rgb(255, 255, 255)')

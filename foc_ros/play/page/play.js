@@ -91,7 +91,7 @@ function draw(now) {
   if (!view.hidden) scene.candidates(view.candidates);
   const { position, target, force } = hand;
   if (!view.hidden) { // the distance between pointer and hand tells whether there is guidance
-    if (Math.hypot(...force) > 0.01) scene.line([position, position.map((value, axis) => value + METRES_PER_NEWTON * force[axis])], ink('--ink'), 4);
+    if (Math.hypot(...force) > 0.01) scene.line([position, position.map((value, axis) => value + METRES_PER_NEWTON * force[axis])], ink(FORCE.ink), FORCE.width);
     scene.line([target, position], ink('--soft'), 1);
     scene.disc(target, 0.6 * HAND_RADIUS, ink('--soft'), { width: 1 });
   }
@@ -244,7 +244,7 @@ function showWays() {
   const others = known.filter((each) => each.likelihood < NOTED);
   const rest = others.reduce((sum, each) => sum + each.likelihood, 0);
   if (others.length) rows.push({ slot: null, likelihood: rest, words: `${others.length} more, each below 1 %`, ghost: '' });
-  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal than those shown']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
+  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
   const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost, compromised }) => [slot, Math.round(100 * likelihood), words, ghost, compromised]));
   if (key === shownWays) return;
   shownWays = key;

@@ -6,6 +6,7 @@
 const FULL = 2 * Math.PI;
 const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9'];
 const LIT = '#E69F00';
+const FORCE = { ink: '--ink', width: 4 };
 const letterOf = (slot) => (slot === null || slot === undefined ? '' : String.fromCharCode(65 + slot));
 const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot % COLOURS.length]);
 const percent = (share) => (share === null ? '' : share < 0.0005 ? '< 0.1 %' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
@@ -241,7 +242,7 @@ function makeSigns({ slot, likelihood, ghost, compromised }) {
 const SIGNS = {
   hand: ['<circle cx="14" cy="7" r="4" fill="var(--ink)"/>', 'hand'],
   pointer: ['<circle cx="14" cy="7" r="4" fill="none" stroke="var(--soft)"/>', 'your pointer, which the hand follows; guidance pulls it away'],
-  force: ['<path d="M4 7H24" stroke="#009E73" stroke-width="4"/>', 'force of guidance'],
+  force: [`<path d="M4 7H24" stroke="var(${FORCE.ink})" stroke-width="${FORCE.width}"/>`, 'force of guidance'],
   past: ['<path d="M2 7H26" stroke="var(--ink)" stroke-width="3"/>', 'hand before'],
   later: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="1.5"/>', 'hand later, which was not known to the prediction'],
   path: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="4"/>', 'predicted path, the thicker the more likely'],
