@@ -376,7 +376,7 @@ def test_a_finger_moves_the_hand_and_what_it_drags_changes_the_prediction_and_is
     browser.get('about:blank')
 
 
-def test_the_page_says_that_the_server_is_gone_and_recovers(browser, tmp_path):
+def test_the_page_says_that_the_server_is_gone_and_recovers_as_the_page_of_another_one(browser, tmp_path):
     with play(tmp_path) as started:
         visit(browser, started)
         started.process.send_signal(signal.SIGSTOP)
@@ -385,11 +385,27 @@ def test_the_page_says_that_the_server_is_gone_and_recovers(browser, tmp_path):
         assert browser.execute_script("return document.getElementById('status').className") == 'status failing'
         started.process.send_signal(signal.SIGCONT)
         wait_for(browser, "document.getElementById('status').className !== 'status failing'", 'the server answers again', 20)
+        click(browser, 'begin')
+        wait_for(browser, "play.view.phase !== 'none'", 'a task', 20)
+        click(browser, 'begin')
+        wait_for(browser, "document.getElementById('score').innerText === 'No trial was finished.'", 'a score', 20)
+        wait_for(browser, "document.getElementById('session').innerText.startsWith('Recorded to ')", 'a recording', 20)
         port = started.url.rpartition(':')[2]
     assert 'Traceback' not in started.output
     wait_for(browser, "document.getElementById('status').innerText === 'The server is gone; trying again.'", 'the message')
     assert browser.execute_script('return play.view.candidates.length') == 0
-    with play(tmp_path, '--port', port):
+    with play(tmp_path, '--port', port) as other:
         wait_for(browser, 'play.view.candidates.length > 0', 'predictions after a new start of the server')
         wait_for(browser, "document.getElementById('status').className === 'status well'", 'the message is gone')
+        assert [text_of(browser, name) for name in ('score', 'session')] == ['', 'Tasks and recordings are kept in bags.']
+        first = browser.current_window_handle
+        browser.switch_to.new_window('tab')
+        browser.get(other.url)
+        browser.switch_to.window(first)
+        replaced = "document.getElementById('status').innerText.startsWith('Another page has taken over.')"
+        wait_for(browser, replaced, 'the new page', 20)
+        controls = "[...document.querySelectorAll('main :is(button, input, select)')]"
+        assert browser.execute_script(f'return {controls}.every((each) => each.disabled)')
+        browser.close()
+        browser.switch_to.window(browser.window_handles[0])
         browser.get('about:blank')

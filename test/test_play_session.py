@@ -265,6 +265,8 @@ def test_predictions_are_shown_and_recorded_beside_the_inputs(page):
     shown = page.last('prediction')
     shares = [shown['other'], *(each['likelihood'] or 0.0 for each in shown['candidates'])]
     assert sum(shares) == pytest.approx(1.0, abs=2e-3)
+    for each in shown['candidates']:
+        assert (each['slot'] is None) is ((each['likelihood'] or 0.0) < 0.01), 'unlikely paths take no colour'
     low_x, high_x, low_y, high_y = BOUNDS
     for each in shown['candidates']:
         path = np.cumsum([each['x'], each['y']], axis=1).T * LENGTH

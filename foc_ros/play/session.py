@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from itertools import zip_longest
 from pathlib import Path
 from time import monotonic, time_ns
 from typing import Any
@@ -17,7 +16,7 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND
-from foc_ros.reporting.views import Slots
+from foc_ros.reporting.views import NOTED, Slots
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import load_parameter_file
@@ -281,9 +280,9 @@ class Session:
         if self._tasks is not None and prediction.most_likely is not None:
             self._tasks.note_most_likely(stamp_ns * 1e-9, prediction.candidates[0].way)
         if hand is not None and not self._is_blind:
-            slots = self._slots.assign([each.way for each in prediction.candidates_with_likelihood])
-            # those without a likelihood, which are last, have no slot
-            candidates = [each | {'slot': slot} for each, slot in zip_longest(view.candidates, slots)]
+            ways = [each['way'] for each in view.candidates if (each['likelihood'] or 0.0) >= NOTED]
+            slots = dict(zip(ways, self._slots.assign(ways), strict=True))  # unlikely ones would take the colours of others
+            candidates = [each | {'slot': slots.get(each['way'])} for each in view.candidates]
             shares = {'unknown': round(prediction.unknown, 4), 'other': round(prediction.other, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)
             state = self.predictor.check()

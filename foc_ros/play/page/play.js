@@ -124,11 +124,13 @@ const handlers = {
     for (const each of [hand, arranging]) each.configure(message);
     scene.fit(message.bounds);
     failure = '';
+    for (const name of ['score', 'result']) byId(name).replaceChildren(); // those of this server follow
   },
   replaced() {
     isReplaced = true;
     socket.close();
     view.candidates = [];
+    for (const each of document.querySelectorAll('main :is(button, input, select)')) each.disabled = true;
     fail('Another page has taken over. Load this page again to take it back.');
   },
   scene({ obstacles, goals }) {
@@ -142,7 +144,8 @@ const handlers = {
     nameRecordButton();
     for (const name of ['report', 'fit', 'compare']) byId(name).disabled = message.recording || !message.session;
     byId('compare').disabled ||= !message.fitted;
-    if (message.session) byId('session').textContent = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
+    const place = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
+    byId('session').textContent = message.session ? place : 'Tasks and recordings are kept in bags.';
     byId('download').hidden = !message.report;
   },
   status({ level, text }) {
@@ -201,6 +204,13 @@ function nameRecordButton() {
   byId('record').textContent = byId('record').dataset.on === 'true' && task.phase === 'none' ? 'end recording' : 'record';
 }
 
+// Shows no job: none runs, or what becomes of it is not told.
+function endJob() {
+  job = null;
+  for (const name of ['cancel', 'progress']) byId(name).hidden = true;
+  byId('job').textContent = '';
+}
+
 // Says what a job does, and for how long; a share of a whole in its words, such as `20 of 60`, moves the bar.
 function showJob() {
   if (!job) return;
@@ -220,6 +230,7 @@ function connect() {
     handlers[message.type](message);
   });
   socket.addEventListener('close', () => {
+    endJob();
     if (isReplaced) return;
     view.candidates = [];
     fail('The server is gone; trying again.');
