@@ -222,10 +222,13 @@ def test_everything_can_be_done_by_keys_and_survives_a_reload(page, tmp_path):
     move_by_keys(page, (0.05, -0.03))
     press_keys(page, 'e')
     wait_for(page, "!document.getElementById('editing').hidden", 'the buttons for arranging')
-    press_keys(page, 'c', *(3 * [DOWN]))
+    press_keys(page, 'c')
     wait_for(page, 'play.view.scene.obstacles.length === 4 && play.view.selected === play.view.scene.obstacles[3]', 'a circle')
-    added = page.execute_script('return play.view.scene.obstacles[3]')
-    assert (added['x'], added['y']) == pytest.approx((0.16, 0.045), abs=1e-6)  # in the middle of the scene, and then down
+    added = page.execute_script('return structuredClone(play.view.scene.obstacles[3])')
+    others = page.execute_script('return [...play.view.scene.obstacles.slice(0, 3), ...play.view.scene.goals]')
+    assert min(math.hypot(added['x'] - each['x'], added['y'] - each['y']) for each in others) >= 0.05
+    press_keys(page, *(3 * [DOWN]))
+    wait_for(page, f'Math.abs(play.view.scene.obstacles[3].y - {added["y"] - 0.015}) < 1e-6', 'the circle below')
     press_keys(page, DELETE, 'g', RIGHT)
     wait_for(
         page, 'play.view.scene.obstacles.length === 3 && play.view.scene.goals.length === 4', 'a goal in place of the circle'
@@ -285,6 +288,16 @@ PHONE = 360, 640
 
 PLACES = """return arguments[0].map((name) => document.getElementById(name).getBoundingClientRect())
     .map(({ top, bottom }) => [top, bottom])"""
+
+
+def test_an_object_too_many_is_refused_and_new_ones_lie_apart(page):
+    click(page, 'arrange')
+    page.execute_script("for (let count = 0; count < 6; count += 1) byId('add-goal').click();")
+    words = "document.getElementById('status').innerText.startsWith('refused: goals: expected at most 8')"
+    wait_for(page, words, 'the reason', 5)
+    places = np.array(page.execute_script('return play.view.scene.goals.map(({ x, y }) => [x, y])'))
+    assert len(places) == 8
+    assert min(math.dist(one, other) for row, one in enumerate(places) for other in places[:row]) > 0.04
 
 
 STAYS = """

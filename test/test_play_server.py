@@ -251,6 +251,15 @@ def test_stamps_follow_the_quickest_message_and_never_step_back():
     assert clock.stamp(1140.0, 100 * second + 60_000_000) == 100 * second + 50_000_000
 
 
+@pytest.mark.parametrize('count', [2, 3, 12])
+def test_trials_with_and_without_guidance_and_their_goals_occur_about_equally_often(count):
+    for seed in range(5):
+        trials = Tasks(parse(TASKS | {'trials': count, 'seed': seed}), FIRST_SCENE).trials
+        assert abs(sum(1 if each.is_guided else -1 for each in trials)) == count % 2
+        if count == 12:
+            assert len({(each.goal, each.is_guided) for each in trials}) == 6
+
+
 def test_a_trial_is_scored():
     """The hand moves along x at 0.1 m/s through a circle, and the way of number 7 is the most likely one from x = 0.1 m on."""
     scene = parse(SCENE | {'obstacles': [CIRCLE | {'x': 0.15}]})

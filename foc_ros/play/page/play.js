@@ -24,7 +24,7 @@ const scene = new Scene(canvas);
 const toScene = (event) => scene.toScene(event);
 const hand = new Hand(canvas, toScene, (time) => moveHand(time, EVENT_MS));
 let isSceneChanged = false;
-const arranging = new Arranging(canvas, toScene, () => { isSceneChanged = true; });
+const arranging = new Arranging(canvas, toScene, () => { isSceneChanged = true; }, (text) => refuse(text));
 const view = { unknown: 0, other: 0, scene: arranging.scene, selected: null, goal: null, phase: 'none', candidates: [], hand, hidden: false, touchedMs: -Infinity };
 // What the page measures: frames per second, the time from an input to the drawn prediction that was made from it [ms], which is the
 // median and of nine in ten, and how many predictions were drawn.
@@ -72,6 +72,11 @@ function showStatus(level, text) {
 function fail(text) {
   failure = text;
   showStatus('well', text);
+}
+
+function refuse(text) {
+  fail(`refused: ${text}`);
+  setTimeout(() => { failure = ''; }, REFUSED_MS);
 }
 
 // Returns the corners of an obstacle from its centre, none for a circle.
@@ -194,8 +199,7 @@ const handlers = {
   },
   error({ text }) {
     byId('job').textContent = `refused: ${text}`;
-    fail(`refused: ${text}`);
-    setTimeout(() => { failure = ''; }, REFUSED_MS);
+    refuse(text);
   },
 };
 
@@ -217,7 +221,7 @@ function showJob() {
   const seconds = Math.floor((performance.now() - job.begunMs) / 1000);
   const text = `${job.name}: ${job.text}, for ${seconds} s;${job.name === 'report' ? '' : ' this takes some minutes, and'} you can go on playing`;
   if (byId('job').textContent !== text) byId('job').textContent = text;
-  const [, done, whole] = job.text.match(/(\d+) of (\d+)/) || [];
+  const [, done, whole] = job.text.match(/(\d+) of (\d+)$/) || [];
   if (whole) [byId('progress').max, byId('progress').value] = [Number(whole), Number(done)];
   else byId('progress').removeAttribute('value');
 }
@@ -344,6 +348,6 @@ byId('begin').addEventListener('click', () => {
 for (const name of ['report', 'fit', 'compare']) byId(name).addEventListener('click', () => send({ type: 'job', name }));
 byId('cancel').addEventListener('click', () => send({ type: 'cancel' }));
 addEventListener('resize', () => settings && scene.resize());
-writeLegend(byId('signs'), ['hand', 'pointer', 'force', 'path', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal']);
+writeLegend(byId('signs'), ['hand', 'pointer', 'force', 'path', 'unlikely', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal', 'lit']);
 connect();
 requestAnimationFrame(frame);
