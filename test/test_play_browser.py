@@ -4,6 +4,7 @@
 
 import math
 import re
+import signal
 import time
 from pathlib import Path
 
@@ -194,6 +195,26 @@ def test_letters_of_equal_paths_stand_apart_and_only_those_that_have_room(page):
         assert (np.diff(np.sort(np.array(letters)[:, 0])) > 18.0 * unit).all()  # wider than a letter
 
 
+FORCES = """
+const [force, done] = [document.querySelector('#signs span:nth-child(3) path'), arguments[0]];
+const probe = document.body.appendChild(document.createElement('i'));
+play.scene.line = (points, colour, width) => {
+  if (width <= 1) return;
+  probe.style.color = colour;
+  delete play.scene.line;
+  done([[getComputedStyle(force).stroke, getComputedStyle(force).strokeWidth], [getComputedStyle(probe).color, `${width}px`]]);
+};
+play.view.hand.setForce([1, 0], 1e9);
+"""
+"""Colour and width of the force of guidance, in the help and as it is drawn."""
+
+
+def test_help_shows_the_force_of_guidance_as_it_is_drawn(page):
+    click(page, 'theme')
+    in_help, drawn = page.execute_async_script(FORCES)
+    assert in_help == drawn
+
+
 def test_everything_can_be_done_by_keys_and_survives_a_reload(page, tmp_path):
     """Move the hand, arrange the scene, switch guidance, record, do a task, write a report and download it, without a pointer."""
     page.execute_cdp_cmd('Browser.setDownloadBehavior', {'behavior': 'allow', 'downloadPath': str(tmp_path)})
@@ -201,10 +222,13 @@ def test_everything_can_be_done_by_keys_and_survives_a_reload(page, tmp_path):
     move_by_keys(page, (0.05, -0.03))
     press_keys(page, 'e')
     wait_for(page, "!document.getElementById('editing').hidden", 'the buttons for arranging')
-    press_keys(page, 'c', *(3 * [DOWN]))
+    press_keys(page, 'c')
     wait_for(page, 'play.view.scene.obstacles.length === 4 && play.view.selected === play.view.scene.obstacles[3]', 'a circle')
-    added = page.execute_script('return play.view.scene.obstacles[3]')
-    assert (added['x'], added['y']) == pytest.approx((0.16, 0.045), abs=1e-6)  # in the middle of the scene, and then down
+    added = page.execute_script('return structuredClone(play.view.scene.obstacles[3])')
+    others = page.execute_script('return [...play.view.scene.obstacles.slice(0, 3), ...play.view.scene.goals]')
+    assert min(math.hypot(added['x'] - each['x'], added['y'] - each['y']) for each in others) >= 0.05
+    press_keys(page, *(3 * [DOWN]))
+    wait_for(page, f'Math.abs(play.view.scene.obstacles[3].y - {added["y"] - 0.015}) < 1e-6', 'the circle below')
     press_keys(page, DELETE, 'g', RIGHT)
     wait_for(
         page, 'play.view.scene.obstacles.length === 3 && play.view.scene.goals.length === 4', 'a goal in place of the circle'
@@ -266,12 +290,34 @@ PLACES = """return arguments[0].map((name) => document.getElementById(name).getB
     .map(({ top, bottom }) => [top, bottom])"""
 
 
+def test_an_object_too_many_is_refused_and_new_ones_lie_apart(page):
+    click(page, 'arrange')
+    page.execute_script("for (let count = 0; count < 6; count += 1) byId('add-goal').click();")
+    words = "document.getElementById('status').innerText.startsWith('refused: goals: expected at most 8')"
+    wait_for(page, words, 'the reason', 5)
+    places = np.array(page.execute_script('return play.view.scene.goals.map(({ x, y }) => [x, y])'))
+    assert len(places) == 8
+    assert min(math.dist(one, other) for row, one in enumerate(places) for other in places[:row]) > 0.04
+
+
+STAYS = """
+const tops = () => ['scene', 'score'].map((name) => byId(name).getBoundingClientRect().top);
+const before = tops();
+byId('status').textContent = 'words '.repeat(60);
+byId('ways').tBodies[0].replaceChildren();
+return [before, tops()];
+"""
+"""Where the scene is, and what is below the bars, before and after a change of the status and of the bars."""
+
+
 @pytest.mark.parametrize('size', [(1280, 720), (1366, 650)])
 def test_the_scene_and_its_buttons_are_on_one_screen(browser, library, size):
     visit(browser, library, *size)
     click(browser, 'arrange')
     for top, bottom in browser.execute_script(PLACES, ['scene', 'buttons', 'editing']):
         assert 0.0 <= top < bottom <= size[1]
+    before, after = browser.execute_script(STAYS)
+    assert before == after
     browser.get('about:blank')
 
 
@@ -281,6 +327,8 @@ def test_the_page_fits_on_a_phone(browser, library, dark):
     for top, bottom in browser.execute_script(PLACES, ['scene', 'buttons']):
         assert 0.0 <= top < bottom <= PHONE[1], 'scene and buttons are on one screen'
     assert browser.execute_script("return document.querySelector('details').open") is False, 'help is folded'
+    before, after = browser.execute_script(STAYS)
+    assert before == after
     colour = 'return getComputedStyle(document.body).backgroundColor'
     before = browser.execute_script(colour)
     assert before == ('rgb(20, 24, 28)' if dark else 'rgb(255, 255, 255)')
@@ -341,13 +389,36 @@ def test_a_finger_moves_the_hand_and_what_it_drags_changes_the_prediction_and_is
     browser.get('about:blank')
 
 
-def test_the_page_says_that_the_server_is_gone_and_recovers(browser, tmp_path):
+def test_the_page_says_that_the_server_is_gone_and_recovers_as_the_page_of_another_one(browser, tmp_path):
     with play(tmp_path) as started:
         visit(browser, started)
+        started.process.send_signal(signal.SIGSTOP)
+        silent = "document.getElementById('status').innerText.startsWith('no answer from the server for ')"
+        wait_for(browser, silent, 'the server is silent', 5)
+        assert browser.execute_script("return document.getElementById('status').className") == 'status failing'
+        started.process.send_signal(signal.SIGCONT)
+        wait_for(browser, "document.getElementById('status').className !== 'status failing'", 'the server answers again', 20)
+        click(browser, 'begin')
+        wait_for(browser, "play.view.phase !== 'none'", 'a task', 20)
+        click(browser, 'begin')
+        wait_for(browser, "document.getElementById('score').innerText === 'No trial was finished.'", 'a score', 20)
+        wait_for(browser, "document.getElementById('session').innerText.startsWith('Recorded to ')", 'a recording', 20)
         port = started.url.rpartition(':')[2]
+    assert 'Traceback' not in started.output
     wait_for(browser, "document.getElementById('status').innerText === 'The server is gone; trying again.'", 'the message')
     assert browser.execute_script('return play.view.candidates.length') == 0
-    with play(tmp_path, '--port', port):
+    with play(tmp_path, '--port', port) as other:
         wait_for(browser, 'play.view.candidates.length > 0', 'predictions after a new start of the server')
         wait_for(browser, "document.getElementById('status').className === 'status well'", 'the message is gone')
+        assert [text_of(browser, name) for name in ('score', 'session')] == ['', 'Tasks and recordings are kept in bags.']
+        first = browser.current_window_handle
+        browser.switch_to.new_window('tab')
+        browser.get(other.url)
+        browser.switch_to.window(first)
+        replaced = "document.getElementById('status').innerText.startsWith('Another page has taken over.')"
+        wait_for(browser, replaced, 'the new page', 20)
+        controls = "[...document.querySelectorAll('main :is(button, input, select)')]"
+        assert browser.execute_script(f'return {controls}.every((each) => each.disabled)')
+        browser.close()
+        browser.switch_to.window(browser.window_handles[0])
         browser.get('about:blank')

@@ -30,6 +30,7 @@ from tornado.websocket import websocket_connect
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
+from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.solution import Status
 from foc_ros.play.address import open_sockets
@@ -250,6 +251,15 @@ def test_stamps_follow_the_quickest_message_and_never_step_back():
     assert clock.stamp(1140.0, 100 * second + 60_000_000) == 100 * second + 50_000_000
 
 
+@pytest.mark.parametrize('count', [2, 3, 12])
+def test_trials_with_and_without_guidance_and_their_goals_occur_about_equally_often(count):
+    for seed in range(5):
+        trials = Tasks(parse(TASKS | {'trials': count, 'seed': seed}), FIRST_SCENE).trials
+        assert abs(sum(1 if each.is_guided else -1 for each in trials)) == count % 2
+        if count == 12:
+            assert len({(each.goal, each.is_guided) for each in trials}) == 6
+
+
 def test_a_trial_is_scored():
     """The hand moves along x at 0.1 m/s through a circle, and the way of number 7 is the most likely one from x = 0.1 m on."""
     scene = parse(SCENE | {'obstacles': [CIRCLE | {'x': 0.15}]})
@@ -323,12 +333,15 @@ def test_the_state_is_well_only_while_predictions_succeed():
         for role, message in FIRST_SCENE.encode(TYPES, NOW_NS).items():
             predictor.send(role, message)
         predictor.send('hand_pose', encode_hand_pose(TYPES, NOW_NS, 'play', (0.0, 0.0, 0.0)))
-        until(lambda: predictor.check() == State('well', 'predicting'), 'predictions', 20)
+        until(lambda: predictor._recent, 'a prediction', 20)
+        assert predictor.check() == State('well', 'predicting')
         made = prediction(START_NS, np.zeros(2))
         lost = replace(made, candidates=made.candidates[-1:])
         held = replace(made, candidates=tuple(replace(each, age_s=0.1) for each in made.candidates[:3]))
         cut = replace(made.candidates[0], solution=replace(made.candidates[0].solution, status=Status.DEADLINE))
-        late = replace(made, candidates=(cut, *made.candidates[1:]))
+        late = replace(made, candidates=(made.candidates[0], replace(cut, way=1), *made.candidates[2:]))
+        unfinished = replace(made, candidates=(cut, *made.candidates[1:]))
+        inside = replace(made, obstacles=make_obstacles(made.candidates[0].mean[:1, :2], 0.01))
         for recent, level, words in (
             ([made], 'well', 'predicting'),
             ([made, lost], 'failing', 'no path to any goal can be found'),
@@ -336,10 +349,16 @@ def test_the_state_is_well_only_while_predictions_succeed():
             ([held] * 10 + [made] * 10, 'well', 'predicting'),
             ([late] * 11 + [made] * 9, 'waiting', 'predicting, but this computer is busy'),
             ([late] * 10 + [made] * 10, 'well', 'predicting'),
+            ([made, unfinished], 'waiting', 'predicting, but this computer is busy'),
+            ([unfinished, made], 'well', 'predicting'),
+            ([late, inside], 'waiting', 'predicting, but the hand is inside obstacle 0'),
         ):
             predictor._recent.clear()
             predictor._recent.extend(recent)
             assert predictor.check().level == level and predictor.check().text.startswith(words)
+        predictor._recent.append(unfinished)
+        predictor.configure(Config(budget_s=0.002))
+        until(lambda: 'predicting, but budget_s is 0.002 s: ' in predictor.check().text, 'the cause', 20)
         predictor._note_error(ValueError('x'))
         assert predictor.check() == State('failing', 'internal error: x')
     finally:

@@ -26,6 +26,7 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError
 from foc_ros.io.bags import BagReader
 from foc_ros.play import jobs, recording
+from foc_ros.play.predictor import State
 from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START, view_prediction
 from foc_ros.play.session import Session
 from foc_ros.reporting.encode import LENGTH
@@ -257,11 +258,15 @@ def test_predictions_are_shown_and_recorded_beside_the_inputs(page):
     page.send({'type': 'record', 'on': True})
     page.move(START, 60)
     made = make_predictor(Config(budget_s=0.0), FIRST_SCENE.points, FIRST_SCENE.tabulate()).update(0.0, START)
+    page.session.predictor.state = State('waiting', 'unfinished')
     page.session._receive(view_prediction(replace(made, stamp_ns=page.session._hands[-1][0])))
+    assert page.last('status')['text'] == 'unfinished', 'the page is told at once'
     page.send({'type': 'record', 'on': False})
     shown = page.last('prediction')
     shares = [shown['other'], *(each['likelihood'] or 0.0 for each in shown['candidates'])]
     assert sum(shares) == pytest.approx(1.0, abs=2e-3)
+    for each in shown['candidates']:
+        assert (each['slot'] is None) is ((each['likelihood'] or 0.0) < 0.01), 'unlikely paths take no colour'
     low_x, high_x, low_y, high_y = BOUNDS
     for each in shown['candidates']:
         path = np.cumsum([each['x'], each['y']], axis=1).T * LENGTH

@@ -172,6 +172,13 @@ def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_abs
     assert slots.assign([3])[0] in range(12)
 
 
+def test_a_class_that_comes_back_has_its_letter_only_if_its_colour_is_free():
+    slots = Slots()
+    assert slots.assign([0, 1]) == [0, 1]
+    assert slots.assign([2, 3, 4, 5, 6, 7]) == [2, 3, 4, 5, 6, 7]
+    assert slots.assign([6, 0, 1]) == [6, 8, 1]
+
+
 def test_a_page_that_cannot_be_written_to_its_end_leaves_the_earlier_one(tmp_path):
     resource = pytest.importorskip('resource')
     write_page(tmp_path, 'x.html', 'first', [], (), None)

@@ -16,9 +16,11 @@ from typing import Any, Literal
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.guidance.guide import GuidanceOutput
+from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
 from foc_ros.core.prediction import Prediction
+from foc_ros.core.solution import Status
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND
 from foc_ros.reporting.views import is_late
@@ -41,6 +43,13 @@ class State:
 
     level: Literal['well', 'waiting', 'failing']
     text: str
+
+
+def find_entered(prediction: Prediction) -> str:
+    """Return the name of the obstacle that the hand of a prediction with a path is inside, '' if there is none."""
+    obstacles = prediction.blocking_obstacles
+    distances = measure_offsets(prediction.candidates[0].mean[:1, :2], obstacles)[1][0] - obstacles.radius
+    return obstacles.ids[int(distances.argmin())] if distances.min(initial=0.0) < 0.0 else ''
 
 
 class Predictor:
@@ -82,7 +91,8 @@ class Predictor:
 
     def check(self) -> State:
         """Return the state; an internal error ends a prediction, and not the thread."""
-        recent, reason = list(self._recent), self._intake.pipeline.not_ready_reason()
+        recent, pipeline = list(self._recent), self._intake.pipeline
+        reason, budget_s = pipeline.not_ready_reason(), pipeline.config.budget_s
         if not self._thread.is_alive():
             return State('failing', 'predictions have ended: start `foc_ros play` again')
         if self._error:
@@ -93,10 +103,12 @@ class Predictor:
             return State('failing', 'no path to any goal can be found')
         found = [each.candidates_with_likelihood for each in recent]
         if sum(bool(paths) and all(path.age_s for path in paths) for paths in found) > 0.5 * REMEMBERED:  # no path is new
-            return State('failing', 'this computer is too busy for new paths: those from before are shown; end other programs')
-        if sum(map(is_late, recent)) > 0.5 * REMEMBERED:
-            words = 'some dotted paths are not finished, and their likelihoods are estimates'
-            return State('waiting', f'predicting, but this computer is busy: {words}')
+            return State('failing', 'this computer is too busy: paths from before are shown; end other programs')
+        if recent and (entered := find_entered(recent[-1])):
+            return State('waiting', f'predicting, but the hand is inside obstacle {entered}')
+        if recent and (recent[-1].candidates[0].status is Status.DEADLINE or sum(map(is_late, recent)) > 0.5 * REMEMBERED):
+            cause = f'budget_s is {budget_s:g} s' if 0.0 < budget_s < Config().budget_s else 'this computer is busy'
+            return State('waiting', f'predicting, but {cause}: some dotted paths are unfinished')
         return State('well', 'predicting')
 
     def _run(self) -> None:
@@ -127,10 +139,11 @@ class Predictor:
         self._ended_s = monotonic()
         if prediction is not None:
             self._error = ''
-            self._recent.append(prediction)
             self._guidance.note_prediction(prediction, received_s)
             # encoded in this thread: if the thread of the page did it during the next prediction, each would delay the other
-            self._receive(view_prediction(prediction))
+            view = view_prediction(prediction)
+            self._recent.append(view.prediction)
+            self._receive(view)
 
     def _note_error(self, error: Exception) -> None:
         self._error = f'internal error: {error}'

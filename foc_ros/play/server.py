@@ -79,7 +79,7 @@ class _SocketHandler(_Handler, WebSocketHandler):
     def send(self, message: dict[str, Any]) -> None:
         try:
             sent = asyncio.ensure_future(self.write_message(json.dumps(message, allow_nan=False)))
-            sent.add_done_callback(lambda done: done.exception())  # a page may leave before it has received everything
+            sent.add_done_callback(lambda done: done.cancelled() or done.exception())  # a page may leave early
         except WebSocketClosedError:
             self.session.close_page(self.send)
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from itertools import zip_longest
 from pathlib import Path
 from time import monotonic, time_ns
 from typing import Any
@@ -17,14 +16,14 @@ from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.io.bags import TYPESTORE
 from foc_ros.io.topics import CLOUD, GOALS, HAND
-from foc_ros.reporting.views import Slots
+from foc_ros.reporting.views import NOTED, Slots
 from foc_ros.ros.messages.encode_inputs import encode_hand_pose
 from foc_ros.ros.messages.types import RosbagsTypes
 from foc_ros.ros.parameters import load_parameter_file
 
 from . import messages, scene, tasks
 from .jobs import Jobs
-from .predictor import Predictor, Receive
+from .predictor import Predictor, Receive, State
 from .recording import Recording
 
 OWN_VALUES = {'plane': 'xy', 'frame_id': ''}
@@ -54,7 +53,7 @@ class Session:
         self._hands: deque[tuple[int, messages.HandMessage]] = deque(maxlen=256)
         self._tasks: tasks.Tasks | None = None
         self._guided_before = self._is_guided
-        self._force_s = 0.0
+        self._force_s, self._level = 0.0, ''
 
     @property
     def report(self) -> Path | None:
@@ -140,8 +139,7 @@ class Session:
     def tick(self) -> None:
         """Repeat the scene, which grows too old otherwise, and tell the page the state of the predictor; twice a second."""
         self._send_scene()
-        state = self.predictor.check()
-        self._say('status', level=state.level, text=state.text)
+        self._tell_status(self.predictor.check())
 
     def _move_hand(self, message: messages.HandMessage) -> None:
         stamp_ns = self._clock.stamp(message.t, time_ns())
@@ -282,11 +280,14 @@ class Session:
         if self._tasks is not None and prediction.most_likely is not None:
             self._tasks.note_most_likely(stamp_ns * 1e-9, prediction.candidates[0].way)
         if hand is not None and not self._is_blind:
-            slots = self._slots.assign([each.way for each in prediction.candidates_with_likelihood])
-            # those without a likelihood, which are last, have no slot
-            candidates = [each | {'slot': slot} for each, slot in zip_longest(view.candidates, slots)]
+            ways = [each['way'] for each in view.candidates if (each['likelihood'] or 0.0) >= NOTED]
+            slots = dict(zip(ways, self._slots.assign(ways), strict=True))  # unlikely ones would take the colours of others
+            candidates = [each | {'slot': slots.get(each['way'])} for each in view.candidates]
             shares = {'unknown': round(prediction.unknown, 4), 'other': round(prediction.other, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)
+            state = self.predictor.check()
+            if state.level != 'well' == self._level:  # at once: the page must not be green meanwhile
+                self._tell_status(state)
         self._record(lambda recording: recording.add_prediction(prediction))  # afterwards: the page does not wait for it
 
     # what the page is told
@@ -303,6 +304,10 @@ class Session:
             self._page(message)
         if kind == 'job':
             self._tell_state()
+
+    def _tell_status(self, state: State) -> None:
+        self._level = state.level
+        self._say('status', level=state.level, text=state.text)
 
     def _say_scene(self) -> None:
         self._say('scene', **self._scene.model_dump())

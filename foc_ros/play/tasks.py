@@ -89,12 +89,13 @@ class Tasks:
     def __init__(self, settings: TasksMessage, scene: PlayScene) -> None:
         self.settings, random = settings, np.random.default_rng(settings.seed)
         guided = {'mixed': (False, True), 'with': (True,), 'without': (False,)}[settings.assistance]
-        kinds = [(goal, is_guided) for goal in range(len(scene.goals)) for is_guided in guided]
         self.trials: list[Trial] = []  # in which goals, and trials with and without guidance, occur about equally often
         while len(self.trials) < settings.trials:
-            for row in random.permutation(len(kinds)).tolist():
-                shown_scene = make_random_scene(random, scene.goals) if settings.shuffled else scene
-                self.trials.append(Trial(shown_scene, *kinds[row]))
+            orders = [random.permutation(len(scene.goals)).tolist() for _ in guided]
+            for goals in zip(*orders, strict=True):
+                for kind in random.permutation(len(guided)).tolist():
+                    shown_scene = make_random_scene(random, scene.goals) if settings.shuffled else scene
+                    self.trials.append(Trial(shown_scene, goals[kind], guided[kind]))
         del self.trials[settings.trials :]
         self.number, self.phase = 0, Phase.RETURN
         self.scores: list[TrialMovement] = []

@@ -238,7 +238,7 @@ class CandidateTracks:
 
 
 class Slots:
-    """Gives each class a slot of letter and colour, which it keeps also over an absence, unless another class needs it."""
+    """Gives each class a slot of letter and colour, kept over an absence unless a present class has slot or colour."""
 
     def __init__(self) -> None:
         self._owners: dict[int, int] = {}
@@ -246,15 +246,16 @@ class Slots:
         self._turn = 0
 
     def assign(self, ways: Sequence[int]) -> list[int | None]:
-        """Return the slots of the present classes, by their numbers: of another colour and long free if possible, or None."""
+        """Return the slots of classes, by their numbers, most likely first: of a colour of its own if there is one, or None."""
         self._turn += 1
-        slots = {way: slot for slot, way in self._owners.items() if way in ways}
+        slots = {way: slot for slot, way in self._owners.items() if way in ways and self._used[slot] == self._turn - 1}
         for way in ways:
             colours = {slot % COLOURS for slot in slots.values()}
             free = [slot for slot in range(SLOTS) if slot not in slots.values()]
             if way not in slots and free:
-                slots[way] = min(free, key=lambda slot: (slot % COLOURS in colours, self._used[slot], slot))
-                self._owners[slots[way]] = way
+                own = self._owners.get
+                slots[way] = min(free, key=lambda slot: (slot % COLOURS in colours, own(slot) != way, self._used[slot], slot))
+                self._owners = {slot: owner for slot, owner in self._owners.items() if owner != way} | {slots[way]: way}
         for slot in slots.values():
             self._used[slot] = self._turn
         return [slots.get(way) for way in ways]

@@ -6,16 +6,18 @@ const TURN = Math.PI / 12;
 const GROW = 1.15;
 const SIZES = [0.004, 0.2];
 const REACH = 0.012;
+// Distances of the middle of a new object from others [m], of which the first that is possible counts.
+const ROOMS = [0.05, 0.03, 0.01];
 
 const round = (value) => Math.round(value * 1e5) / 1e5;
 
 export class Arranging {
-  // changed: called after every change of the scene.
-  constructor(canvas, toScene, changed) {
+  // changed: called after every change of the scene; refused: called with the reason for which one is impossible.
+  constructor(canvas, toScene, changed, refused) {
     this.scene = { obstacles: [], goals: [] };
     this.selected = null;
     this.enabled = false;
-    this.changed = changed;
+    [this.changed, this.refused] = [changed, refused];
     this.canvas = canvas;
     this.grip = null;
     canvas.addEventListener('pointerdown', (event) => {
@@ -60,8 +62,8 @@ export class Arranging {
     return actions[key.length === 1 ? key.toLowerCase() : key];
   }
 
-  // Returns the object at a point: the nearest goal or obstacle that contains it, or nearly does.
-  find(at) {
+  // Returns the object at a point: the nearest goal or obstacle that contains it, or nearly does, within a distance [m].
+  find(at, reach = REACH) {
     const distance = (each) => {
       const [x, y] = [at[0] - each.x, at[1] - each.y];
       if (each.kind !== 'box') return Math.hypot(x, y) - (each.radius || 0);
@@ -69,28 +71,33 @@ export class Arranging {
       const [u, v] = [Math.abs(x * c + y * s) - each.size_x / 2, Math.abs(-x * s + y * c) - each.size_y / 2];
       return u > 0 && v > 0 ? Math.hypot(u, v) : Math.max(u, v);
     };
-    const found = [...this.scene.goals, ...this.scene.obstacles].map((each) => [distance(each), each]).filter(([far]) => far < REACH);
+    const found = [...this.scene.goals, ...this.scene.obstacles].map((each) => [distance(each), each]).filter(([far]) => far < reach);
     return found.length ? found.reduce((best, each) => (each[0] < best[0] ? each : best))[1] : null;
   }
 
-  addObstacle(obstacle) {
-    if (this.scene.obstacles.length < this.most.obstacles) this.add(this.scene.obstacles, obstacle);
+  addCircle() { this.add('obstacles', { kind: 'circle', ...this.findRoom(), radius: 0.02 }); }
+
+  addBox() { this.add('obstacles', { kind: 'box', ...this.findRoom(), size_x: 0.05, size_y: 0.02, yaw: 0 }); }
+
+  addGoal() { this.add('goals', this.findRoom()); }
+
+  // Returns the place with room for a new object, or else with some room, that is the nearest to the middle.
+  findRoom() {
+    const [low, high, bottom, top] = this.bounds;
+    const places = [];
+    for (let x = low + ROOMS[0]; x < high - ROOMS[0]; x += STEP) for (let y = bottom + ROOMS[0]; y < top - ROOMS[0]; y += STEP) places.push([x, y]);
+    const distance = ([x, y]) => Math.hypot(x - (low + high) / 2, y - (bottom + top) / 2);
+    places.sort((a, b) => distance(a) - distance(b));
+    const [x, y] = ROOMS.map((room) => places.find((at) => !this.find(at, room))).find((at) => at) || places[0];
+    return { x: round(x), y: round(y) };
   }
 
-  addCircle() { this.addObstacle({ kind: 'circle', ...this.middle(), radius: 0.02 }); }
-
-  addBox() { this.addObstacle({ kind: 'box', ...this.middle(), size_x: 0.05, size_y: 0.02, yaw: 0 }); }
-
-  addGoal() { if (this.scene.goals.length < this.most.goals) this.add(this.scene.goals, this.middle()); }
-
-  // A new object appears in the middle, a little beside the one before.
-  middle() {
-    const number = this.scene.obstacles.length + this.scene.goals.length;
-    return { x: round((this.bounds[0] + this.bounds[1]) / 2), y: round(0.02 * ((number % 7) - 3)) };
-  }
-
-  add(list, object) {
-    list.push(object);
+  add(name, object) {
+    if (this.scene[name].length >= this.most[name]) {
+      this.refused(`${name}: expected at most ${this.most[name]}`);
+      return;
+    }
+    this.scene[name].push(object);
     this.selected = object;
     this.changed();
   }
@@ -98,7 +105,10 @@ export class Arranging {
   remove() {
     if (!this.selected) return;
     const isGoal = this.scene.goals.includes(this.selected);
-    if (isGoal && this.scene.goals.length === 1) return; // nothing is predicted without a goal
+    if (isGoal && this.scene.goals.length === 1) {
+      this.refused('goals: expected at least 1');
+      return;
+    }
     const name = isGoal ? 'goals' : 'obstacles';
     this.scene[name] = this.scene[name].filter((each) => each !== this.selected);
     this.selected = null;

@@ -24,7 +24,7 @@ const scene = new Scene(canvas);
 const toScene = (event) => scene.toScene(event);
 const hand = new Hand(canvas, toScene, (time) => moveHand(time, EVENT_MS));
 let isSceneChanged = false;
-const arranging = new Arranging(canvas, toScene, () => { isSceneChanged = true; });
+const arranging = new Arranging(canvas, toScene, () => { isSceneChanged = true; }, (text) => refuse(text));
 const view = { unknown: 0, other: 0, scene: arranging.scene, selected: null, goal: null, phase: 'none', candidates: [], hand, hidden: false, touchedMs: -Infinity };
 // What the page measures: frames per second, the time from an input to the drawn prediction that was made from it [ms], which is the
 // median and of nine in ten, and how many predictions were drawn.
@@ -51,6 +51,7 @@ let predictedMs = 0;
 const OLD_MS = 1000; // after which a prediction is not shown any more
 const LATE_MS = 150; // median time from an input to the drawn prediction above which the status line is not green
 let measuredMs = 0; // when this time was measured last
+let heardMs = 0; // when the last message of the server came
 const REFUSED_MS = 6000; // for which the status line says that something was refused
 let task = { phase: 'none' };
 let job = null;
@@ -73,6 +74,11 @@ function fail(text) {
   showStatus('well', text);
 }
 
+function refuse(text) {
+  fail(`refused: ${text}`);
+  setTimeout(() => { failure = ''; }, REFUSED_MS);
+}
+
 // Returns the corners of an obstacle from its centre, none for a circle.
 function cornersOf({ kind, size_x: length, size_y: width, yaw }) {
   if (kind !== 'box') return [];
@@ -90,7 +96,7 @@ function draw(now) {
   if (!view.hidden) scene.candidates(view.candidates);
   const { position, target, force } = hand;
   if (!view.hidden) { // the distance between pointer and hand tells whether there is guidance
-    if (Math.hypot(...force) > 0.01) scene.line([position, position.map((value, axis) => value + METRES_PER_NEWTON * force[axis])], ink('--ink'), 4);
+    if (Math.hypot(...force) > 0.01) scene.line([position, position.map((value, axis) => value + METRES_PER_NEWTON * force[axis])], ink(FORCE.ink), FORCE.width);
     scene.line([target, position], ink('--soft'), 1);
     scene.disc(target, 0.6 * HAND_RADIUS, ink('--soft'), { width: 1 });
   }
@@ -123,11 +129,13 @@ const handlers = {
     for (const each of [hand, arranging]) each.configure(message);
     scene.fit(message.bounds);
     failure = '';
+    for (const name of ['score', 'result']) byId(name).replaceChildren(); // those of this server follow
   },
   replaced() {
     isReplaced = true;
     socket.close();
     view.candidates = [];
+    for (const each of document.querySelectorAll('main :is(button, input, select)')) each.disabled = true;
     fail('Another page has taken over. Load this page again to take it back.');
   },
   scene({ obstacles, goals }) {
@@ -141,7 +149,8 @@ const handlers = {
     nameRecordButton();
     for (const name of ['report', 'fit', 'compare']) byId(name).disabled = message.recording || !message.session;
     byId('compare').disabled ||= !message.fitted;
-    if (message.session) byId('session').textContent = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
+    const place = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
+    byId('session').textContent = message.session ? place : 'Tasks and recordings are kept in bags.';
     byId('download').hidden = !message.report;
   },
   status({ level, text }) {
@@ -190,8 +199,7 @@ const handlers = {
   },
   error({ text }) {
     byId('job').textContent = `refused: ${text}`;
-    fail(`refused: ${text}`);
-    setTimeout(() => { failure = ''; }, REFUSED_MS);
+    refuse(text);
   },
 };
 
@@ -200,13 +208,20 @@ function nameRecordButton() {
   byId('record').textContent = byId('record').dataset.on === 'true' && task.phase === 'none' ? 'end recording' : 'record';
 }
 
+// Shows no job: none runs, or what becomes of it is not told.
+function endJob() {
+  job = null;
+  for (const name of ['cancel', 'progress']) byId(name).hidden = true;
+  byId('job').textContent = '';
+}
+
 // Says what a job does, and for how long; a share of a whole in its words, such as `20 of 60`, moves the bar.
 function showJob() {
   if (!job) return;
   const seconds = Math.floor((performance.now() - job.begunMs) / 1000);
   const text = `${job.name}: ${job.text}, for ${seconds} s;${job.name === 'report' ? '' : ' this takes some minutes, and'} you can go on playing`;
   if (byId('job').textContent !== text) byId('job').textContent = text;
-  const [, done, whole] = job.text.match(/(\d+) of (\d+)/) || [];
+  const [, done, whole] = job.text.match(/(\d+) of (\d+)$/) || [];
   if (whole) [byId('progress').max, byId('progress').value] = [Number(whole), Number(done)];
   else byId('progress').removeAttribute('value');
 }
@@ -214,10 +229,12 @@ function showJob() {
 function connect() {
   socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/socket`);
   socket.addEventListener('message', ({ data }) => {
+    heardMs = performance.now();
     const message = JSON.parse(data);
     handlers[message.type](message);
   });
   socket.addEventListener('close', () => {
+    endJob();
     if (isReplaced) return;
     view.candidates = [];
     fail('The server is gone; trying again.');
@@ -242,7 +259,7 @@ function showWays() {
   const others = known.filter((each) => each.likelihood < NOTED);
   const rest = others.reduce((sum, each) => sum + each.likelihood, 0);
   if (others.length) rows.push({ slot: null, likelihood: rest, words: `${others.length} more, each below 1 %`, ghost: '' });
-  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal than those shown']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
+  for (const [likelihood, words] of [[view.unknown, 'no likelihood is known'], [view.other, 'another goal']]) if (rows.length && likelihood >= 0.005) rows.push({ slot: null, likelihood, words, ghost: '' });
   const key = JSON.stringify(rows.map(({ slot, likelihood, words, ghost, compromised }) => [slot, Math.round(100 * likelihood), words, ghost, compromised]));
   if (key === shownWays) return;
   shownWays = key;
@@ -291,6 +308,8 @@ function frame(time) {
   moveHand(time, FRAME_MS);
   sendScene();
   if (time - predictedMs > OLD_MS) view.candidates = [];
+  const silentS = Math.floor((time - heardMs) / 1000); // the server tells its state twice a second
+  if (silentS > 0 && socket.readyState === WebSocket.OPEN) showStatus('failing', `no answer from the server for ${silentS} s`);
   [view.scene, view.selected] = [arranging.scene, arranging.selected];
   draw(time);
   measure(time);
@@ -329,6 +348,6 @@ byId('begin').addEventListener('click', () => {
 for (const name of ['report', 'fit', 'compare']) byId(name).addEventListener('click', () => send({ type: 'job', name }));
 byId('cancel').addEventListener('click', () => send({ type: 'cancel' }));
 addEventListener('resize', () => settings && scene.resize());
-writeLegend(byId('signs'), ['hand', 'pointer', 'force', 'path', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal']);
+writeLegend(byId('signs'), ['hand', 'pointer', 'force', 'path', 'unlikely', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal', 'lit']);
 connect();
 requestAnimationFrame(frame);

@@ -6,6 +6,7 @@
 const FULL = 2 * Math.PI;
 const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9'];
 const LIT = '#E69F00';
+const FORCE = { ink: '--ink', width: 4 };
 const letterOf = (slot) => (slot === null || slot === undefined ? '' : String.fromCharCode(65 + slot));
 const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot % COLOURS.length]);
 const percent = (share) => (share === null ? '' : share < 0.0005 ? '< 0.1 %' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
@@ -241,16 +242,18 @@ function makeSigns({ slot, likelihood, ghost, compromised }) {
 const SIGNS = {
   hand: ['<circle cx="14" cy="7" r="4" fill="var(--ink)"/>', 'hand'],
   pointer: ['<circle cx="14" cy="7" r="4" fill="none" stroke="var(--soft)"/>', 'your pointer, which the hand follows; guidance pulls it away'],
-  force: ['<path d="M4 7H24" stroke="#009E73" stroke-width="4"/>', 'force of guidance'],
+  force: [`<path d="M4 7H24" stroke="var(${FORCE.ink})" stroke-width="${FORCE.width}"/>`, 'force of guidance'],
   past: ['<path d="M2 7H26" stroke="var(--ink)" stroke-width="3"/>', 'hand before'],
   later: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="1.5"/>', 'hand later, which was not known to the prediction'],
   path: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="4"/>', 'predicted path, the thicker the more likely'],
+  unlikely: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="0.8"/>', 'thin and grey, without a letter: less likely than 1 %'],
   compromised: ['<path d="M2 7H26" stroke="#0072B2" stroke-width="3" stroke-dasharray="3 4"/>', 'dotted: not known to avoid the obstacles as surely as wanted'],
   ghost: ['<path d="M2 7H26" stroke="var(--soft)" stroke-width="7" opacity=".3"/>', 'pale: no proper prediction, for the reason beside it'],
   motor: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="#0072B2" fill-opacity=".3" stroke="#0072B2"/>', 'motor noise, which η is about: one standard deviation; of finished paths with at least 5 %'],
   total: ['<ellipse cx="14" cy="7" rx="11" ry="5" fill="none" stroke="#0072B2" stroke-dasharray="4 3"/>', 'all uncertainty of the most likely path, likewise'],
   obstacle: ['<circle cx="14" cy="7" r="6.5" fill="var(--ring)"/><circle cx="14" cy="7" r="5" fill="var(--disc)" stroke="var(--soft)"/>', 'obstacle; ring: standard deviation of its radius'],
-  goal: ['<circle cx="14" cy="7" r="6" fill="none" stroke="var(--ink)"/>', 'goal'],
+  goal: ['<circle cx="14" cy="7" r="6" fill="none" stroke="var(--ink)"/><text x="14" y="10.5" font-size="9" text-anchor="middle" fill="var(--ink)">☆</text>', 'goal'],
+  lit: [`<circle cx="14" cy="7" r="6" fill="${LIT}" fill-opacity=".5" stroke="${LIT}"/><text x="14" y="10.5" font-size="9" text-anchor="middle" fill="var(--ink)">★</text>`, 'goal to reach'],
 };
 function writeLegend(box, names) {
   box.innerHTML = names.map((name) => `<span><svg viewBox="0 0 28 14" aria-hidden="true">${SIGNS[name][0]}</svg> ${SIGNS[name][1]}</span>`).join('');
