@@ -138,7 +138,7 @@ class Predictor:
     >>> predictor.set_obstacles([foc_ros.Circle((0.15, 0.01), radius=0.03, name='cup')])
     >>> prediction = predictor.update(t=0.0, position=(0.0, 0.0))
     >>> prediction
-    <Prediction t=0 s, 2 candidates, most likely goal0:-cup (0.64)>
+    <Prediction t=0 s, 2 candidates, most likely goal0: right of cup (0.64)>
     >>> [candidate.label for candidate in prediction.candidates]
     ['goal0:-cup', 'goal0:+cup']
     """

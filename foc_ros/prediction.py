@@ -39,7 +39,7 @@ class Prediction(core_prediction.Prediction):
     notes : dict
         Counts of events such as merged classes and culled obstacles.
 
-    `len` and iteration are those of the candidates.
+    `len`, iteration, indices and slices are those of the candidates.
     """
 
     def to_dict(self) -> dict[str, Any]:

@@ -177,6 +177,9 @@ def test_a_goal_of_which_nothing_is_known_is_not_unlikely():
 def test_a_prediction_is_the_sequence_of_its_candidates(predicted):
     assert list(predicted) == list(predicted.candidates)
     assert len(predicted) == len(predicted.candidates) == 4
+    assert predicted[0] is predicted.candidates[0] and predicted[-2:] == predicted.candidates[-2:]
+    best = next(each for each in predicted if each.label == predicted.most_likely)
+    assert repr(predicted).endswith(f', most likely {best.description} ({best.likelihood:.2f})>'), 'words name the goal'
     nothing = prediction()
     assert len(nothing) == 0 and nothing, 'a prediction without candidates is one all the same'
     first = predicted.candidates[0]

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -239,6 +239,16 @@ class Prediction(Record):
         """Count the candidates."""
         return len(self.candidates)
 
+    @overload
+    def __getitem__(self, place: int) -> PredictedCandidate: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> tuple[PredictedCandidate, ...]: ...
+
+    def __getitem__(self, place: int | slice) -> PredictedCandidate | tuple[PredictedCandidate, ...]:
+        """Return the candidate at a place, or those of a slice."""
+        return self.candidates[place]
+
     def __iter__(self) -> Iterator[PredictedCandidate]:
         """Yield the candidates in their order."""
         return iter(self.candidates)
@@ -249,10 +259,9 @@ class Prediction(Record):
 
     def __repr__(self) -> str:
         """Say time, number of candidates and the most likely one."""
-        likelihoods = {each.label: each.likelihood for each in self.candidates}
-        best = 'none solved' if self.most_likely is None else f'most likely {self.most_likely}'
-        share = f' ({likelihoods[self.most_likely]:.2f})' if self.most_likely in likelihoods else ''
-        return f'<Prediction t={self.t:g} s, {len(self.candidates)} candidates, {best}{share}>'
+        found = [each for each in self.candidates if each.label == self.most_likely]
+        best = f'most likely {found[0].description} ({found[0].likelihood:.2f})' if found else 'none solved'
+        return f'<Prediction t={self.t:g} s, {len(self.candidates)} candidates, {best}>'
 
     @property
     def t(self) -> float:
