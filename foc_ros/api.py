@@ -21,6 +21,7 @@ from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
+from foc_ros.core.scene import list_missing_objects
 from foc_ros.core.solution import Goal
 from foc_ros.core.support import check_config, check_number, check_vector, collect_goals, find_shape
 from foc_ros.core.types import NANOSECONDS, HandSample, SampleStatus
@@ -158,6 +159,7 @@ class Predictor:
         self._pipeline = Pipeline(self.config, tuple(source), is_timed=False)
         self._obstacles: Obstacles | None = make_obstacles()
         self._goal_names: tuple[str, ...] = ()
+        self._missing: set[object] = set()
 
     def __repr__(self) -> str:
         """Count goals and obstacles."""
@@ -180,6 +182,7 @@ class Predictor:
         goals : array_like of shape (g, 2) or (g, 3), or iterable of Goal and positions
             Positions [m], at least one, in the plane or also with the height over it. Labels number them in this order. If they
             have heights, the height of the hand is predicted. One goal needs no list: three numbers are a position with a height.
+            An update issues `FocWarning` if the object of a `Goal` is no obstacle.
             `SceneError` is raised for anything else, for heights of some goals only, and for a name that occurs twice.
         """
         table = collect_goals('goals', goals)
@@ -244,8 +247,17 @@ class Predictor:
             raise FocError(str(pipeline.last_refusal))
         if pipeline.library_doubt and pipeline.library_doubt != doubt:
             warn(f'{self._library}: {pipeline.library_doubt}')
+        self._warn_of_missing_objects(prediction.obstacles)
         named = prediction.with_goal_names(self._goal_names) if self._goal_names else prediction
         return Prediction(**vars(named))
+
+    def _warn_of_missing_objects(self, obstacles: Obstacles) -> None:
+        """Warn of the object of a goal that is no obstacle, unless it was none at the last update, too."""
+        missing = list_missing_objects(self._pipeline.scene.goal_objects, obstacles)
+        before, self._missing = self._missing, {each.got for each in missing}
+        for each in missing:
+            if each.got not in before:
+                warn(str(each))
 
     def reset(self) -> None:
         """Forget the movement and the operator; keep goals and obstacles, where they are. The next update may have any time."""

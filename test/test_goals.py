@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals that are obstacles, that nobody announced, and that were reached before."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -96,10 +97,14 @@ def test_a_goal_whose_object_is_missing_is_noted_by_predictors_and_refused_elsew
         foc_ros.Predictor(),
     )
     predictor.set_goals(goal)
-    for name, missing in (('cup', 1), ('jug', 0)):
+    words = "goals[0].object: expected the id of an obstacle (cup), got 'jug'"
+    for t, (name, missing, told) in enumerate((('cup', 1, [words]), ('cup', 1, []), ('jug', 0, []), ('cup', 1, [words]))):
         predictor.set_obstacles(replace(cup, name=name))
-        assert predictor.update(float(missing == 0), (0.0, 0.0)).notes.get('object_missing', 0) == missing
-    with pytest.raises(foc_ros.InputError, match=r"^goals\[0\]\.object: expected the id of an obstacle, got 'jug'"):
+        with warnings.catch_warnings(record=True) as issued:
+            warnings.simplefilter('always')
+            assert predictor.update(float(t), (0.0, 0.0)).notes.get('object_missing', 0) == missing
+        assert [str(each.message) for each in issued] == told, 'once for each change'
+    with pytest.raises(foc_ros.InputError, match=r"^goals\[0\]\.object: expected the id of an obstacle \(cup\), got 'jug'"):
         foc_ros.solve((0.0, 0.0), goal, cup)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from textwrap import shorten
 
 import numpy as np
 
@@ -143,6 +144,15 @@ class ReachingScene(Record):
             found = f'{start.tolist()}, {max(round(distances[row], 9), 0.0):.4g} m from its {core}'
             words = f'a point outside obstacle {obstacles.ids[row]}, of radius {obstacles.radius[row]:g} m'
             raise SceneError('start', words, found)
-        for row, name in enumerate(self.goal_objects):
-            if name is not None and name not in obstacles.ids:
-                raise SceneError(f'goals[{row}].object', 'the id of an obstacle', repr(name))
+        for error in list_missing_objects(self.goal_objects, obstacles):
+            raise error
+
+
+def list_missing_objects(goal_objects: Sequence[str | None], obstacles: Obstacles) -> list[SceneError]:
+    """Return an error for the object of each goal that is no obstacle, with the ids of those that are."""
+    known = shorten(', '.join(obstacles.ids) or 'there is none', 200, placeholder=' ...')
+    return [
+        SceneError(f'goals[{row}].object', f'the id of an obstacle ({known})', repr(name))
+        for row, name in enumerate(goal_objects)
+        if name is not None and name not in obstacles.ids
+    ]
