@@ -15,6 +15,16 @@ if TYPE_CHECKING:
     from foc_ros.analysis.evaluation import register_baseline as register_baseline
     from foc_ros.api import *  # noqa: F403
     from foc_ros.core.config import Config as Config
+    from foc_ros.core.config import CovarianceConfig as CovarianceConfig
+    from foc_ros.core.config import DurationConfig as DurationConfig
+    from foc_ros.core.config import EstimatorConfig as EstimatorConfig
+    from foc_ros.core.config import ExperienceConfig as ExperienceConfig
+    from foc_ros.core.config import FocConfig as FocConfig
+    from foc_ros.core.config import FramesConfig as FramesConfig
+    from foc_ros.core.config import GuidanceConfig as GuidanceConfig
+    from foc_ros.core.config import HomotopyConfig as HomotopyConfig
+    from foc_ros.core.config import LikelihoodConfig as LikelihoodConfig
+    from foc_ros.core.config import SceneConfig as SceneConfig
     from foc_ros.core.errors import FocError as FocError
     from foc_ros.core.errors import FocWarning as FocWarning
     from foc_ros.core.errors import InputError as InputError
@@ -49,7 +59,10 @@ _MODULES = {
     'extending': ('compute_eta get_strategy register_likelihood_rule register_plant register_qp_backend register_strategy'),
     'solving': 'Solution monte_carlo plot_candidates solve solve_classes',
     'analysis.evaluation': 'register_baseline',
-    'core.config': 'Config',
+    'core.config': (
+        'Config CovarianceConfig DurationConfig EstimatorConfig ExperienceConfig FocConfig FramesConfig GuidanceConfig '
+        'HomotopyConfig LikelihoodConfig SceneConfig'
+    ),
     'core.plant.models': 'PlantModel',
     'core.plant.plants': 'Plant',
     'core.errors': 'FocError FocWarning InputError MessageError ParameterError RecordingError SceneError',

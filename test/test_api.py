@@ -20,8 +20,7 @@ import foc_ros.core.config
 import foc_ros.core.obstacles.shapes
 import foc_ros.extending
 import foc_ros.solving
-from foc_ros import Circle, Goal
-from foc_ros.core.config import Config, FocConfig
+from foc_ros import Circle, Config, FocConfig, Goal
 from foc_ros.core.interpolation import interpolate_covariance
 from foc_ros.core.solution import Status
 
@@ -284,6 +283,15 @@ NO_SCENES = [
         (lambda: Circle((0, 0), center=(0, 0), radius=0.1), r'obstacle\.center: expected one centre, got two'),
         (lambda: foc_ros.Predictor().set_obstacles(None), 'obstacles: expected a list of Circle'),
         (lambda: foc_ros.Predictor().set_goals(Goal((0, 0), name='')), r"goal\.name: expected a text that is not empty, got ''"),
+        (lambda: Goal((0, 0), nam='bowl'), r"goal\.nam: expected an argument of Goal \(did you mean name\?\), got 'bowl'"),
+        (
+            lambda: foc_ros.Box((0, 0), (1, 1), angle=0.3),
+            r'obstacle\.angle: expected an argument of Box: centre, size, yaw, .*0\.3',
+        ),
+        (lambda: foc_ros.Capsule((0, 0), (1, 1), radios=0.3), r'obstacle\.radios: .* \(did you mean radius\?\)'),
+        (lambda: Config(eta=0.9), r'^eta: expected a known parameter \(did you mean foc\.eta\?\), got 0\.9'),
+        (lambda: Config(beta=2.0), r'^beta: .* \(did you mean likelihood\.beta\?\)'),
+        (lambda: FocConfig(etaa=0.9), r'^foc\.etaa: expected a known parameter \(did you mean foc\.eta\?\), got 0\.9'),
         (lambda: Goal((0, 0), object=' '), r'goal\.object: expected a text that is not empty'),
         (lambda: Goal((0, 0, 0, 0)), r'goal\.position: expected two numbers \[m\] in the task plane, or three with the height'),
         (lambda: foc_ros.Predictor().set_goals([(0, 0), (0, 0, 1)]), 'goals: expected a height for all goals or for none'),

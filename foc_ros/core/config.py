@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, cast
 
-from .errors import ParameterError, join_errors
+from .errors import ParameterError, guard_keywords, join_errors
 from .parameter import Group, Parameter, check_fields, check_value, param
 from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
 from .removed import find_parameter
@@ -345,3 +345,18 @@ def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     if errors:
         raise join_errors(errors)
     return config
+
+
+def _explain_keywords(group: type) -> None:
+    """Let the constructor of a group, or of `Config`, answer a keyword that is no parameter as `replace_values` does."""
+    prefix = group.__name__.removesuffix('Config').lower()
+
+    def refuse(name: str, value: object) -> None:
+        find_parameter(f'{prefix}.{name}'.lstrip('.'), value, {each.name: each for each in list_parameters()})
+
+    guard_keywords(group, refuse)
+
+
+_KINDS: list[type] = [Config, *Group.__subclasses__()]
+for _kind in _KINDS:
+    _explain_keywords(_kind)

@@ -11,7 +11,9 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import fields
 from difflib import get_close_matches
+from functools import wraps
 from typing import Any, TypeVar
 
 _LONGEST = 200
@@ -101,6 +103,7 @@ def print_warnings(program: str) -> Iterator[None]:
 
 E = TypeVar('E', bound=FocError)
 T = TypeVar('T')
+C = TypeVar('C', bound=type)
 
 
 def collect(errors: list[FocError], read: Callable[..., T], *arguments: Any) -> T | None:
@@ -141,3 +144,34 @@ def suggest(name: object, known: Iterable[str], similarity: float = 0.6) -> str:
     """
     similar = get_close_matches(str(name)[:_LONGEST], known, 1, similarity)
     return f' (did you mean {similar[0]}?)' if similar else ''
+
+
+def guard_keywords(kind: C, refuse: Callable[[str, object], object]) -> C:
+    """Let the constructor of a dataclass pass a keyword that is none of its fields to a function, which raises an error."""
+    changed: Any = kind
+    create, known = changed.__init__, {each.name for each in fields(changed)}
+
+    @wraps(create)
+    def create_guarded(self: object, *args: Any, **values: Any) -> None:
+        for name in values:
+            if name not in known:
+                refuse(name, values[name])
+        create(self, *args, **values)
+
+    changed.__init__ = create_guarded
+    return kind
+
+
+def explain_keywords(field: str) -> Callable[[C], C]:
+    """Return a decorator of a dataclass: for a keyword that is none of its fields SceneError names a similar one, or all."""
+
+    def explain(kind: C) -> C:
+        known = [each.name for each in fields(kind)]
+
+        def refuse(name: str, value: object) -> None:
+            hint = suggest(name, known) or f': {", ".join(known)}'
+            raise SceneError(f'{field}.{name}', f'an argument of {kind.__name__}{hint}', repr(value))
+
+        return guard_keywords(kind, refuse)
+
+    return explain

@@ -46,5 +46,6 @@ def find_parameter(name: str, value: object, known: Mapping[str, Parameter]) -> 
     if name in REMOVED:
         raise ParameterError(name, f'no value, because it was removed: {REMOVED[name]}', repr(value))
     groups = {each.partition('.')[0] for each in known if '.' in each}
-    expected = 'a group of parameters' if name in groups else f'a known parameter{suggest(name, (*known, *groups))}'
+    hint = suggest(name, [each for each in known if each.endswith(f'.{name}')], 0.0) or suggest(name, (*known, *groups))
+    expected = 'a group of parameters' if name in groups else f'a known parameter{hint}'
     raise ParameterError(name, expected, repr(value))

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from foc_ros.core.types import Array, Record, as_readonly
 
-from .errors import SceneError
+from .errors import SceneError, explain_keywords
 
 LEFT, RIGHT = 1, -1
 """Side on which a path passes an obstacle, seen in the direction of travel."""
@@ -27,6 +27,7 @@ def agrees(one: Signature, other: Signature) -> bool:
     return one <= other or other <= one
 
 
+@explain_keywords('goal')
 @dataclass(frozen=True, eq=False, repr=False)
 class Goal(Record):
     """A position to which the hand may be going.

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from foc_ros.core.errors import SceneError
+from foc_ros.core.errors import SceneError, explain_keywords
 from foc_ros.core.obstacle_table import UNKNOWN_HEIGHTS, Obstacles, make_obstacles
 from foc_ros.core.support import check_array, check_number, check_vector
 from foc_ros.core.types import Array
@@ -84,6 +84,7 @@ class Shape:
 
 
 @accept_center
+@explain_keywords('obstacle')
 @dataclass(frozen=True, repr=False)
 class Circle(Shape):
     """A circular obstacle in the task plane.
@@ -131,6 +132,7 @@ class Circle(Shape):
 
 
 @accept_center
+@explain_keywords('obstacle')
 @dataclass(frozen=True, repr=False)
 class Box(Shape):
     """A rectangular obstacle in the task plane, with corners that are sharp or rounded; a wall is a long thin box.
@@ -215,6 +217,7 @@ class _HullOfPoints(Shape):
         return make_hull_polygon(self._list_points())[1]
 
 
+@explain_keywords('obstacle')
 @dataclass(frozen=True, repr=False)
 class Capsule(_HullOfPoints):
     """All points within a radius of a line, such as a tool or an arm.
@@ -265,6 +268,7 @@ class Capsule(_HullOfPoints):
         return np.array([self.start, self.end])
 
 
+@explain_keywords('obstacle')
 @dataclass(frozen=True, repr=False)
 class Hull(_HullOfPoints):
     """The convex hull of some points, with corners that are sharp or rounded.
