@@ -244,8 +244,9 @@ def noise() -> Figure:
 
 
 def draw_example(name: str) -> Figure:
-    """Return the figure of a file in examples/."""
-    figure: Figure = run_path(str(ROOT / 'examples' / f'plot_{name}.py'))['figure']
+    """Return the figure of a file in examples/, in the common style."""
+    with mpl.rc_context(draw.STYLE):
+        figure: Figure = run_path(str(ROOT / 'examples' / f'plot_{name}.py'))['figure']
     return figure
 
 
