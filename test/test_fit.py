@@ -3,14 +3,17 @@
 """`fit` from the command line: it turns recordings into a parameter file that the node accepts."""
 
 import json
+import re
 
 import pytest
 from bag_helpers import write_bag
 from evaluation_samples import use_few_predictions, write_fit_tables
 
+from foc_ros.analysis.fitting import STAGES
 from foc_ros.analysis.fitting import fit as fitting
 from foc_ros.cli.main import main
 from foc_ros.core.config import Config, flatten, replace_values
+from foc_ros.io import terminal
 from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
 
 QUICK = {'foc.steps': 10, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.3}
@@ -19,6 +22,7 @@ QUICK = {'foc.steps': 10, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.
 @pytest.fixture(autouse=True)
 def _few(monkeypatch):
     use_few_predictions(monkeypatch)
+    monkeypatch.setattr(terminal, 'QUIET_S', 0.0)
 
 
 def _fit(folder, capsys, *arguments, **parameters):
@@ -28,11 +32,13 @@ def _fit(folder, capsys, *arguments, **parameters):
     code = main(['fit', str(folder), '--output', str(output), *options])
     printed = capsys.readouterr()
     assert code == (2 if 'bad: ' in printed.err else 0), printed.err
-    return json.loads(printed.out), load_parameter_file(output)
+    return json.loads(printed.out) | {'progress': printed.err}, load_parameter_file(output)
 
 
 def test_everything_is_fitted_and_written_for_the_node(tmp_path, capsys):
     answer, config = _fit(write_fit_tables(tmp_path / 'data'), capsys)
+    stages = re.findall(r'^stage (\d) of 8, (\w+)', answer['progress'], re.MULTILINE)
+    assert list(dict.fromkeys(stages)) == [(str(number), name) for number, name in enumerate(STAGES, 1)]
     assert answer['recordings'] == 6 and answer['failed'] == {}
     values = flatten(config)
     fitted = {'estimator.position_stddev', 'estimator.jerk_density', 'duration.fitts_a_s', 'duration.fitts_b_s'}
@@ -85,6 +91,11 @@ def test_two_recordings_do_not_determine_the_likelihood(tmp_path, capsys):
     answer['chosen'] = {'covariance.near': {'given': 1.5, 'value': '1.0'}}
     shown = {row[0]: row[1:3] for row in fitting.format_parameters(answer)}
     assert shown['likelihood.beta'] == (f'{given["likelihood.beta"]:.3g}', 'kept') and shown['covariance.near'] == ('1.5', '1.0')
+
+
+def test_a_coverage_that_falls_is_told():
+    (told,) = fitting.make_verdict({'comparison': {'inside_90': {'before': 0.853, 'after': 0.765}}})
+    assert told.startswith('Worse with the fitted parameters: positions in the region of 90 %') and '85.3 to 76.5' in told
 
 
 FIXED = {'foc.strategy': 'fixed', 'foc.tau': 1e-4}

@@ -178,7 +178,7 @@ class KnownReplays:
 
     def search(self, settings):
         self.settings = settings
-        found = race.search_settings('kind', settings, self)  # type: ignore[arg-type]
+        found = race.search_settings('movement', settings, self)  # type: ignore[arg-type]
         return replace_values(settings[0], found.values), found
 
     def score(self, settings, names, words):

@@ -103,7 +103,8 @@ Existing = ExistingPath
 _PARAMS_HELP = "The node's parameter file (default: every parameter has its default)."
 Params = Annotated[Config, _read(load_parameter_file, name='--params', metavar='YAML', show_default=False, help=_PARAMS_HELP)]
 Data = Annotated[
-    ExistingPath, Parameter(help='Folder of bags, or of recordings.csv, goals.csv and, where there are obstacles, obstacles.csv.')
+    ExistingPath,
+    Parameter(help='Folder of bags, or of recordings.csv with scenes.csv, or with goals.csv and, for obstacles, obstacles.csv.'),
 ]
 Json = Annotated[bool, Parameter(help='Print one JSON object.')]
 Remaps = Annotated[

@@ -56,7 +56,7 @@ def fit(data: Data, /, *, output: Path, allow: options.Allowed = (), study: Stud
         Parameter file to write.
     allow
         eta lets values of foc.eta below the given one be taken, with which obstacles are avoided with less certainty; with
-        positions, parameters are written even if predicted positions become worse.
+        positions, parameters are written even if predicted positions become worse by 5 % and 1 mm.
     """
     from foc_ros.analysis.recordings import find_recordings
     from foc_ros.ros.parameters import load_parameter_file, write_parameter_file

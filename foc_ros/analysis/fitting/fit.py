@@ -26,7 +26,7 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError
 
-from . import FEWEST, Findings, clip_to_bounds
+from . import FEWEST, Findings, clip_to_bounds, name_stage
 from .direct import fit_duration, fit_estimator, fit_fading, fit_wait
 from .one_replay import fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
@@ -42,14 +42,14 @@ COMPARISON_TITLES = {
     'error_m 0.5': ('error of positions 0.5 s ahead [mm]', 1e3, 1),
     'error_m 1': ('error of positions 1 s ahead [mm]', 1e3, 1),
     'nlpd': ('negative log-density of positions 0.5 s ahead [nat]', 1.0, 2),
-    'inside_90': ('positions in the region of 90 %, 0.5 s ahead [%]', 100.0, 1),
+    'inside_90': ('positions in the region of 90 %, 0.5 s ahead, also of hands at rest [%]', 100.0, 1),
 }
 """Words, factor and digits of each measure."""
 SCORE_TITLES = {
     'ways': 'log-likelihood of the class taken [nat]',
     'positions': 'log-density of true positions [nat]',
-    'inside_90': 'true positions in the 90 % ellipse of the most likely candidate at 0.5 s',
-    'inside_all_90': 'true positions in the 90 % region of all candidates at 0.5 s',
+    'inside_90': 'positions of moving hands in the 90 % ellipse of the most likely candidate at 0.5 s',
+    'inside_all_90': 'positions of moving hands in the 90 % region of all candidates at 0.5 s',
 }
 Rows = list[tuple[str, ...]]
 
@@ -75,7 +75,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     may_lower_eta: whether obstacles may be avoided with less certainty than the configuration wants.
     """
     fit = Fit(config=config)
-    hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), 'read')
+    hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), name_stage('read'))
     if not hands:
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
     fit.recordings, usable = len(hands), {each.name: recordings[each.name] for each in hands}
@@ -114,7 +114,7 @@ def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
     config = replace_values(fit.config, thinned)
-    observed, failed = collect(partial(observe, config=config, with_plans=True), list(recordings.items()), 'replay')
+    observed, failed = collect(partial(observe, config=config, with_plans=True), list(recordings.items()), name_stage('replay'))
     fit.failed.update(failed)
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
@@ -134,8 +134,9 @@ def compare_configs(
     thinned: parameters of these replays alone.
     """
     replays = []
-    for config, words in zip(configs, ('before', 'after'), strict=True):
-        observed, _ = collect(partial(observe, config=replace_values(config, thinned)), list(recordings.items()), words)
+    for config, stage in zip(configs, ('before', 'after'), strict=True):
+        predict = partial(observe, config=replace_values(config, thinned))
+        observed, _ = collect(predict, list(recordings.items()), name_stage(stage))
         replays.append({each.name: each for each in observed})
     common = [name for name in recordings if all(name in replay for replay in replays)]
     if not common:
@@ -249,7 +250,7 @@ def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...
         for score, values in answer['scores'].items()
         for setting, value in values.items()
     ]
-    yield 'Scores', ('score', 'setting', 'value'), scores
+    yield 'Scores of the likelihood and of the widening, all else being fitted', ('score', 'setting', 'value'), scores
 
 
 def make_sentences(answer: Mapping[str, Any]) -> list[str]:

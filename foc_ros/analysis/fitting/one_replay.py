@@ -25,7 +25,7 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, flatten, replace_values
 from foc_ros.core.types import Array
 
-from . import Findings, Setting, SettingTable, list_settings
+from . import Findings, Setting, SettingTable, list_settings, name_stage
 
 RULES = tuple(
     LikelihoodConfig(beta=beta, planning_horizon_s=horizon_s, lookahead_s=lookahead_s)
@@ -71,7 +71,9 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> F
     settings = (*ahead, *plain)
     rules = [replace_values(config, each).likelihood for each in settings]
     rule = Baseline('foc', partial(forecast_shares, power_rule_shares), tuple(rules))
-    rows = collect_all(partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], 'likelihood')
+    rows = collect_all(
+        partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], name_stage('likelihood')
+    )
     table = SettingTable(np.array(rows), settings)
     found, left = table.estimate(given, 'likelihood of the classes taken')
     missed = float(np.mean([question.truth not in question.given for each in questions for _, question in each]))
