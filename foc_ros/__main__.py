@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program `foc_ros`, also as `python -m foc_ros COMMAND`.
 
-An interrupt ends it with the exit code 130, as in a shell, even in an import. The node needs ROS and a numeric library or two;
-the other commands need more. What of it is missing is said in one sentence.
+An interrupt ends it with a line and the exit code 130, as in a shell, even in an import. The node needs ROS and a numeric library
+or two; the other commands need more. What of it is missing is said in one sentence.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from types import FrameType
 from typing import Any
@@ -28,7 +28,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with handle_interrupts():
             return _run(arguments)
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return _say_interrupted()
+
+
+def _say_interrupted() -> int:
+    """Print that the program was interrupted, below Python's streams, which may be in use, and return the exit code."""
+    with suppress(OSError):
+        os.write(2, b'foc_ros: stopped\n')
+    return INTERRUPTED
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -61,7 +68,7 @@ def handle_interrupts() -> Iterator[None]:
     def interrupt(_: int, frame: FrameType | None) -> None:
         while frame is not None:
             if frame.f_globals.get('__name__') == 'importlib._bootstrap':
-                os._exit(INTERRUPTED)
+                os._exit(_say_interrupted())
             frame = frame.f_back
         raise KeyboardInterrupt
 

@@ -200,13 +200,13 @@ WARNED = 'foc_ros end: /a/\\x1b[2J.mcap: not read\n'
         (InputError('start', 'two\n  numbers', 'one'), 2, 'foc_ros end: start: expected two numbers, got one\n'),
         (InputError('topic', 'a name', '/\x1b[31mhand'), 2, 'foc_ros end: topic: expected a name, got /\\x1b[31mhand\n'),
         (OSError(5, 'Input/output error', 'a'), 2, "foc_ros end: [Errno 5] Input/output error: 'a'\n"),
-        (KeyboardInterrupt(), 130, ''),
+        (KeyboardInterrupt(), 130, 'foc_ros: stopped\n'),
     ],
 )
-def test_exit_codes_and_what_is_told(ends, capsys, outcome, code, line):
+def test_exit_codes_and_what_is_told(ends, capfd, outcome, code, line):
     ends(outcome)
     assert run_program(['end']) == code
-    assert capsys.readouterr() == ('', line)
+    assert capfd.readouterr() == ('', line)
 
 
 LOUD = """

@@ -72,7 +72,7 @@ def test_an_import_is_left_at_once(tmp_path):
     command = [sys.executable, '-c', 'from foc_ros.__main__ import handle_interrupts\nwith handle_interrupts(): import endless']
     environment = os.environ | {'PYTHONPATH': f'{tmp_path}{os.pathsep}{ROOT}'}
     ended = subprocess.run(command, env=environment, capture_output=True, timeout=LIMIT_S, check=False)
-    assert (ended.returncode, ended.stderr) == (130, b'')
+    assert (ended.returncode, ended.stderr) == (130, b'foc_ros: stopped\n')
 
 
 @pytest.mark.parametrize('turn', [0, 6])
@@ -90,4 +90,4 @@ def test_a_command_is_interrupted_at_any_moment(turn):
             _, errors = process.communicate(timeout=LIMIT_S)
         finally:
             process.kill()
-    assert (process.returncode, errors) == (130, '')
+    assert (process.returncode, errors) == (130, 'foc_ros: stopped\n')
