@@ -1,3 +1,5 @@
+# SPDX-FileCopyrightText: 2026 the foc_ros developers
+# SPDX-License-Identifier: Apache-2.0
 # make setup [PYTHON=python3.12] [ROS=wheels|system]   create .venv with what demo and test need; repeated only after a change.
 #                  Linters, Sphinx and the peers of the benchmark are installed by the targets that use them
 # make check       lint, and the quick tests: three quarters of a minute on two cores
@@ -84,7 +86,7 @@ $(STAMP): setup.py setup.cfg pyproject.toml
 	@touch $@
 
 help:
-	@sed -n 's/^# //p; /^$$/q' Makefile
+	@sed -n '/SPDX/d; s/^# //p; /^$$/q' Makefile
 
 # mypy keeps one processor busy for as long as the tests do
 check: $(VENV)/.lint

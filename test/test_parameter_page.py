@@ -12,6 +12,7 @@ from foc_ros.ros.parameters import dump_parameter_file, load_parameter_file
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, FILE = ROOT / 'doc' / 'parameters.md', ROOT / 'config' / 'foc.yaml'
+LICENCE = '# SPDX-FileCopyrightText: 2026 the foc_ros developers\n# SPDX-License-Identifier: Apache-2.0\n'
 REMEDY = 'run: python test/test_parameter_page.py'
 
 HEAD = """# Parameters
@@ -66,7 +67,7 @@ def test_the_page_is_current():
 
 
 def test_the_parameter_file_is_current():
-    assert FILE.read_text('utf-8') == dump_parameter_file(Config()), REMEDY
+    assert FILE.read_text('utf-8') == LICENCE + dump_parameter_file(Config()), REMEDY
 
 
 @pytest.mark.parametrize('name', ['free_hand', 'thumb_stick'])
@@ -83,4 +84,4 @@ def test_every_parameter_is_read_somewhere():
 
 if __name__ == '__main__':
     PAGE.write_text(page(), encoding='utf-8')
-    FILE.write_text(dump_parameter_file(Config()), encoding='utf-8')
+    FILE.write_text(LICENCE + dump_parameter_file(Config()), encoding='utf-8')
