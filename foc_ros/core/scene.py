@@ -150,6 +150,8 @@ class ReachingScene(Record):
 
 def list_missing_objects(goal_objects: Sequence[str | None], obstacles: Obstacles) -> list[SceneError]:
     """Return an error for the object of each goal that is no obstacle, with the ids of those that are."""
+    if not any(goal_objects):
+        return []
     known = shorten(', '.join(obstacles.ids) or 'there is none', 200, placeholder=' ...')
     return [
         SceneError(f'goals[{row}].object', f'the id of an obstacle ({known})', repr(name))
