@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,15 @@ EVALUATION_WORDS = {
     'Negative log-density': 'how improbable the true position was. Less is better: both a wrong place and a wrong width count.',
     'inside': 'how often the true position is in the region that should hold this share of them. The share itself is best.',
     'held out': 'each recording is scored with the settings that fit the others best, so that none has been learnt by heart.',
+    'bootstrap': 'recordings are drawn again and again, some twice and some not at all; 95 % of the results are in the interval.',
+    'foc': 'this package with the given parameters; of all others but uniform, whatever can be set is held out.',
+    PLAIN: 'the same with one exponent for all choices, near and far.',
+    BOLTZMANN: 'each candidate has the probability exp(-b J), where J is its effort (maximum entropy).',
+    'constant velocity': 'the hand goes on straight ahead, as fast as now.',
+    'nearest gap': 'the gap straight ahead of the hand, or the nearest goal.',
+    'shortest path': 'the shortest of all candidates.',
+    'straight minimum jerk': 'a smooth straight movement to each goal, obstacles disregarded.',
+    'Singer Kalman': 'a Kalman filter for a target that manoeuvres, which knows no scene.',
     'best setting': 'the one that fits all recordings best.',
 }
 FIT_WORDS = {
@@ -88,11 +98,11 @@ def write_evaluation(
 ) -> None:
     """Write the page; answer: as of `evaluate --json`, of recordings. Raises InputError where that cannot be done."""
     counts = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
-    gain = 'mean log-likelihood of the true {} above a uniform guess.'
+    gain = 'mean log-likelihood of the true {} above uniform [nat], by tenths of the movement.'
     captions = {
-        PATH_CLASS: f'Homotopy class through the obstacles still ahead: {gain.format("class")}',
+        PATH_CLASS: f'Path past the obstacles still ahead: {gain.format("path")}',
         GOAL: f'Goal: {gain.format("goal")}',
-        GAP: 'Gap in the next row: how often the likeliest gap is the true one.',
+        GAP: 'Gap in the next row: how often the likeliest gap is the true one, by tenths of the distance from row to row.',
     }
     pictures = []
     for name, caption in captions.items():
@@ -100,12 +110,14 @@ def write_evaluation(
             reliability = f'{caption.partition(":")[0]}: how often the likeliest answer is true, over its probability, {counts}.'
             for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
                 pictures.append(make_chart((6.4, 4.6), words, draw, name, answer['questions'][name]))
+    named = [[caption for _, caption in pictures], *map(list, answer['questions'].values())]
+    all_predictors, *tables = explain_tables([('All predictors', (), named), *evaluation.make_tables(answer)], EVALUATION_WORDS)
     sections = [
         Section('In short', summarise_evaluation(answer)),
         *draw_example(recordings, config),
-        Section(pictures=pictures),
+        replace(all_predictors, pictures=pictures, rows=()),
         Section('Compared with simpler predictors', answer['verdict']),
-        *explain_tables(evaluation.make_tables(answer), EVALUATION_WORDS),
+        *tables,
     ]
     failed = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     warnings = [*warn_of_few(answer['recordings'], 'recordings'), *failed]
@@ -230,7 +242,7 @@ def write_simulation(
         if each.task
     ]
     sections = [
-        Section('In short', summarise_simulation(cells), measures),
+        Section('In short', summarise_simulation(cells), pictures=measures),
         *explain_tables(study.make_tables(cells), SIMULATION_WORDS),
         Section('Single trials', pictures=trials),
     ]

@@ -43,12 +43,12 @@ def render(template: str, **values: Any) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: sentences, pictures, and a table below notes that explain it, whichever of them it has."""
+    """A part of a page: sentences, notes that explain the pictures and the table below them, whichever of them it has."""
 
     heading: str = ''
     sentences: Sequence[str] = ()
-    pictures: Sequence[Picture] = ()
     notes: Sequence[str] = ()
+    pictures: Sequence[Picture] = ()
     columns: Sequence[str] = ()
     rows: Sequence[Sequence[str]] = ()
 
