@@ -40,7 +40,7 @@ NAT = 'the unit of a natural logarithm of a probability. 0.69 nat more mean twic
 EVALUATION_WORDS = {
     'nat': NAT,
     'above uniform': 'compared with a guess that finds all answers equally likely. 0 is no better than this; more is better.',
-    'tenths': 'the first column is about the beginning of the movement, when little is known, the last one about its end.',
+    'tenths': 'the first one is about the beginning of the movement, when little is known, the last one about its end.',
     'gain': 'the log-likelihood above uniform [nat], averaged over the whole movement.',
     'ECE': 'the expected calibration error: how far the stated probabilities are from the shares that come true. 0 is best.',
     'Brier': 'the mean squared error of the probabilities. 0 is best.',
