@@ -87,6 +87,7 @@ SIMULATION_WORDS = {
     'bootstrap interval': 'the mean would be in it in 95 of 100 such studies. Two rules whose intervals overlap may be alike.',
 }
 """What the words in headings, columns and rows of each page mean."""
+RULE_WORDS = {FOC: 'with guidance', NONE: 'without guidance'}
 
 
 def write_evaluation(
@@ -213,6 +214,8 @@ def write_fit(
 
 
 def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
+    from matplotlib.ticker import LogLocator
+
     colour, _ = get_class_style(0)
     for row, each in enumerate(drawn.values()):
         ends = [end / each['given'] for end in each['interval'] if end > 0.0]
@@ -221,9 +224,12 @@ def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
     axes.axvline(1.0, color='0.4', linewidth=1.0)
     axes.set_yticks(range(len(drawn)), list(drawn))
     axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
-    for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
-        set_format('{x:g}')
-    axes.tick_params(axis='x', which='minor', labelsize=7, rotation=90)
+    low, high = axes.get_xlim()
+    axes.set_xlim(min(low, 0.4), max(high, 2.5))  # so that there are three labels at least
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter('{x:g}')
+    axes.xaxis.set_minor_formatter('')
+    axes.tick_params(axis='x', labelsize=8, rotation=90)
 
 
 def write_simulation(
@@ -235,7 +241,7 @@ def write_simulation(
         make_chart((6.4, 4.2), f'{study.COLUMNS[name][0]}: {words}', _draw_measure, cells, name)
         for name in ('collision_rate', 'completion_s', 'opposing_impulse')
     ]
-    words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
+    words = 'Intended path dashed; arrows: force of guidance; crosses: within an obstacle.'
     trials = [
         make_chart((6.4, 4.2), f'Operator {each.operator}. {words}', _draw_trial, each.task, each.trials)
         for each in results
@@ -256,7 +262,7 @@ def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
     for operator in dict.fromkeys(cell['operator'] for cell in cells):
         by_rule, told = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}, []
-        for rule, words in ((FOC, 'with guidance'), (NONE, 'without guidance')):
+        for rule, words in RULE_WORDS.items():
             values = {name: by_rule[rule][name] for name in measures} if rule in by_rule else {}
             known = [measures[name].format(study.COLUMNS[name][1] * each) for name, each in values.items() if each is not None]
             if values:
@@ -275,7 +281,16 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
         means = factor * np.array([cell[name] for cell in drawn])
         bounds = factor * np.array([cell[f'{name}_interval'] for cell in drawn]).reshape(-1, 2)
         errors = np.maximum(np.abs(bounds.T - means), 0.0)
-        axes.errorbar(at, means, errors, fmt='o', markersize=4, capsize=2, color=get_class_style(number)[0], label=rule)
+        axes.errorbar(
+            at,
+            means,
+            errors,
+            fmt='o',
+            label=RULE_WORDS.get(rule, rule),
+            markersize=4,
+            capsize=2,
+            color=get_class_style(number)[0],
+        )
     axes.set_xticks(range(len(operators)), [name.replace('_', '\n') for name in operators])
     axes.set(ylabel=heading, xlim=(-0.5, len(operators) - 0.5))
     axes.set_ylim(bottom=0.0)
@@ -287,7 +302,7 @@ def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> Non
     axes.plot(*task.path[:, 0].T, color='black', linestyle='--', linewidth=1.0, label='intended')
     for number, (rule, trial) in enumerate(trials.items()):
         look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
-        axes.plot(*trial.position.T, label=rule, **look)
+        axes.plot(*trial.position.T, label=RULE_WORDS.get(rule, rule), **look)
         touching = trial.position[trial.measure_clearances(task) < 0.0]
         axes.plot(*touching.T, linestyle='', marker='x', markersize=4, color=look['color'])
         if rule == FOC:
