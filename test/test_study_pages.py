@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages of evaluations and fits, and views of predictions: those of the records and of the node's messages agree."""
 
+import itertools
 from dataclasses import replace
 from datetime import datetime
 from importlib.metadata import version
@@ -125,6 +126,23 @@ def test_results_are_told_in_plain_words_first():
         'Changes way: collisions in 5 % of the trials with guidance; '
         'collisions in 10 % of the trials and 1.23 s for a movement without guidance.'
     ]
+
+
+@pytest.mark.parametrize('factor', [1.02, 12.0, 900.0])
+def test_labels_of_the_axis_of_a_fit_are_apart_and_rules_are_named_in_words(factor):
+    figure = Figure((6.4, 2.6), layout='constrained')
+    axes = figure.subplots()
+    study_pages._draw_multiples(axes, {'a': {'given': 1.0, 'value': factor, 'interval': [1.0 / factor, factor]}})
+    figure.draw_without_rendering()
+    low, high = axes.get_xlim()
+    labels = [each for each in axes.get_xticklabels() if low <= each.get_position()[0] <= high]
+    boxes = [each.get_window_extent() for each in labels]
+    assert len(labels) >= 3 and all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
+    cell = {'operator': 'noisy', 'collision_rate': 0.1, 'collision_rate_interval': [0.0, 0.2]}
+    study_pages._draw_measure(
+        axes := Figure().subplots(), [cell | {'assistance': each} for each in ('none', 'foc')], 'collision_rate'
+    )
+    assert axes.get_legend_handles_labels()[1] == ['without guidance', 'with guidance']
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none():
