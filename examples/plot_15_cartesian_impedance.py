@@ -4,17 +4,17 @@
 Stiffness for a dVRK arm
 ========================
 
-Guidance also has a stiffness and a reference, with the same force at the hand, for arms that control an impedance themselves.
-Here both become the message `crtk_msgs/CartesianImpedance`, which an arm of the dVRK takes on `servo_ci`. Its text definition
-is all that is needed to make it, without the package crtk_msgs.
+The node publishes `~/guidance/stiffness` (std_msgs/Float64MultiArray) and `~/guidance/reference` (geometry_msgs/PoseStamped),
+with the same force at the hand, for arms that control an impedance themselves. Here both become `crtk_msgs/CartesianImpedance`,
+which an arm of the dVRK takes on `servo_ci`. Its text definition is all that is needed, without the package crtk_msgs.
 """
 
 import matplotlib.pyplot as plt
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.spatial.transform import Rotation
 
 import foc_ros
-from foc_ros.ros.messages.types import RosbagsTypes, make_header
 
 GAINS = 'geometry_msgs/Vector3 p\ngeometry_msgs/Vector3 d\ngeometry_msgs/Vector3 bias\ngeometry_msgs/Vector3 deadband\n'
 IMPEDANCE = """std_msgs/Header header
@@ -29,29 +29,45 @@ crtk_msgs/CartesianImpedanceHalfPlaneGains orientation_negative
 HALF_PLANE, MESSAGE = 'crtk_msgs/msg/CartesianImpedanceHalfPlaneGains', 'crtk_msgs/msg/CartesianImpedance'
 store = get_typestore(Stores.ROS2_JAZZY)
 store.register(get_types_from_msg(GAINS, HALF_PLANE) | get_types_from_msg(IMPEDANCE, MESSAGE))
-types = RosbagsTypes(store)
+VECTOR, QUATERNION, POSE = 'geometry_msgs/msg/Vector3', 'geometry_msgs/msg/Quaternion', 'geometry_msgs/msg/PoseStamped'
+
+
+def make(name, *values):
+    """Return a message with the values of all its fields in their order."""
+    return store.types[name](*values)
+
 
 # %%
 # The gains hold along the axes of a frame of their own, so the stiffness matrix becomes its eigenvalues in the frame of its
-# eigenvectors. A gain that draws to the reference is negative. Orientation and the normal of the plane stay free.
+# eigenvectors. A gain that draws to the reference is negative. Orientation and the normal of the plane stay free. The damping
+# `d` is 0, so that the force is that of guidance alone; a negative one [N s/m] also damps.
+#
+# In a node, keep the newest reference and call this with each stiffness, which the node publishes after it.
 
 
-def encode_impedance(output, stamp_ns, height=0.0, frame_id='base'):
-    """Return the message for a `GuidanceOutput`, in the plane xy of the frame of the arm."""
-    stiffness, axes = np.linalg.eigh(output.stiffness)
-    angle = np.arctan2(axes[1, 0], axes[0, 0])
-    x, y = output.reference
-    vector, quaternion = 'geometry_msgs/msg/Vector3', 'geometry_msgs/msg/Quaternion'
-    gains = types.make(HALF_PLANE, p=types.make(vector, x=-stiffness[0], y=-stiffness[1]))
-    return types.make(
-        MESSAGE,
-        header=make_header(types, stamp_ns, frame_id),
-        force_orientation=types.make(quaternion, z=np.sin(angle / 2), w=np.cos(angle / 2)),
-        force_position=types.make(vector, x=x, y=y, z=height),
-        torque_orientation=types.make(quaternion, w=1.0),
-        position_positive=gains,
-        position_negative=gains,
-    )
+def convert(stiffness, reference):
+    """Return the impedance for both messages of guidance."""
+    gains, axes = np.linalg.eigh(np.reshape(stiffness.data, (3, 3)))
+    axes *= np.linalg.det(axes)  # a rotation, no mirror image
+    zero, upright, at = make(VECTOR, 0.0, 0.0, 0.0), make(QUATERNION, 0.0, 0.0, 0.0, 1.0), reference.pose.position
+    held, free = (make(HALF_PLANE, make(VECTOR, *p), zero, zero, zero) for p in (-gains, np.zeros(3)))
+    frame = make(QUATERNION, *Rotation.from_matrix(axes).as_quat())
+    return make(MESSAGE, reference.header, frame, make(VECTOR, at.x, at.y, at.z), upright, held, held, free, free)
+
+
+# %%
+# In place of the node, both messages are made here as :doc:`/interfaces` defines them, in the plane xy.
+
+
+def publish(output, t):
+    """Return stiffness and reference of a `GuidanceOutput` as the node publishes them."""
+    matrix = np.zeros((3, 3))
+    matrix[:2, :2] = output.stiffness
+    rows = [make('std_msgs/msg/MultiArrayDimension', *each) for each in (('row', 3, 9), ('column', 3, 3))]
+    stiffness = make('std_msgs/msg/Float64MultiArray', make('std_msgs/msg/MultiArrayLayout', rows, 0), matrix.ravel())
+    header = make('std_msgs/msg/Header', make('builtin_interfaces/msg/Time', int(t), int(t % 1 * 1e9)), 'base')
+    place = make('geometry_msgs/msg/Point', *output.reference, 0.0), make(QUATERNION, 0.0, 0.0, 0.0, 1.0)
+    return stiffness, make(POSE, header, make('geometry_msgs/msg/Pose', *place))
 
 
 # %%
@@ -67,12 +83,12 @@ for tick, t in enumerate(times):
     if tick % 8 == 0:
         prediction = predictor.update(t, position)
     output = guidance.update(t, position, (0.25, 0.0), prediction)
-    raw = store.serialize_cdr(encode_impedance(output, round(1e9 * t)), MESSAGE)
+    raw = store.serialize_cdr(convert(*publish(output, t)), MESSAGE)
     sent = store.deserialize_cdr(raw, MESSAGE)
-    turn = 2 * np.arctan2(sent.force_orientation.z, sent.force_orientation.w)
-    frame = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    aside = position - (sent.force_position.x, sent.force_position.y)
-    forces.append(frame @ ((sent.position_positive.p.x, sent.position_positive.p.y) * (frame.T @ aside)))
+    turn, at, gains = sent.force_orientation, sent.force_position, sent.position_positive.p
+    frame = Rotation.from_quat((turn.x, turn.y, turn.z, turn.w))
+    aside = frame.inv().apply((*position, 0.0) - np.array((at.x, at.y, at.z)))
+    forces.append(frame.apply((gains.x, gains.y, gains.z) * aside)[:2])
     assert np.allclose(forces[-1], output.force, atol=1e-4), 'the arm would pull otherwise'
 
 figure, axes = plt.subplots(figsize=(7, 3.5), layout='constrained')

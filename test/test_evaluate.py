@@ -107,6 +107,9 @@ def test_a_predictor_has_one_look_in_all_charts_of_the_page_and_no_two_have_the_
     assert all(len(each) == 1 for each in looks.values())
     assert len(set.union(*looks.values())) == len(looks)
     assert not {colour for colour, *_ in set.union(*looks.values())} & {*CLASS_COLOURS}, 'these are the colours of paths'
+    page = (tmp_path / 'evaluation.html').read_text(encoding='utf-8')
+    unexplained = [name for name in BASELINES if f'>{name}: ' not in page.partition('<figure')[0]]
+    assert unexplained == ['foc, held out', 'uniform'] and page.index('>nat: ') < page.index('<figure')
 
 
 def test_a_baseline_from_outside_is_compared(tables, monkeypatch):
@@ -175,7 +178,7 @@ def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_
     assert 'log-likelihood above uniform [nat]' in out and 'foc, held out' in out
     lines = out.splitlines()
     assert max(map(len, lines[:-1])) <= 80
-    assert any(line.startswith('Homotopy classes: foc is better than uniform (+') for line in lines)
+    assert any(line.startswith('Paths: foc is better than uniform (+') for line in lines)
     assert any(line.startswith('Positions 0.5 s ahead: ') for line in lines)
 
 

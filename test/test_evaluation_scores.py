@@ -138,24 +138,24 @@ def test_a_comparison_counts_recordings_and_names_the_tenths_that_are_worse():
 @pytest.mark.parametrize(
     ('interval', 'words'),
     [
-        ([0.1, 0.3], 'foc is better than uniform (+0.2 nat, worse in tenths 1).'),
-        ([-0.1, 0.3], 'foc is not distinguishable from uniform (+0.2 nat, worse in tenths 1).'),
-        ([-0.4, -0.1], 'foc is worse than uniform (+0.2 nat, worse in tenths 1).'),
-        (None, 'foc is by one recording not distinguishable from uniform (+0.2 nat, worse in tenths 1).'),
+        ([0.1, 0.3], 'foc is better than uniform (+0.2 nat, worse in tenths 1 to 3, 5).'),
+        ([-0.1, 0.3], 'foc is not distinguishable from uniform (+0.2 nat, worse in tenths 1 to 3, 5).'),
+        ([-0.4, -0.1], 'foc is worse than uniform (+0.2 nat, worse in tenths 1 to 3, 5).'),
+        (None, 'foc is by one recording not distinguishable from uniform (+0.2 nat, worse in tenths 1 to 3, 5).'),
     ],
 )
 def test_the_verdict_is_by_the_interval(interval, words):
     errors = {'likelihood-weighted': 0.04, 'most likely': 0.03, 'constant velocity': 0.05, 'straight minimum jerk': 0.0401}
     answer = {
         'recordings': 20,
-        'comparisons': {PATH_CLASS: {'uniform': {'difference': 0.2, 'interval': interval, 'worse_tenths': [1]}}},
+        'comparisons': {PATH_CLASS: {'uniform': {'difference': 0.2, 'interval': interval, 'worse_tenths': [1, 2, 3, 5]}}},
         'positions': {
             'displacement_m': {name: {'final': {'0.5': each}} for name, each in errors.items()},
             'inside_all': {'0.9': {'0.5': 0.7}},
         },
     }
     assert make_verdict(answer) == [
-        f'Homotopy classes: {words}',
+        f'Paths: {words}',
         'Positions 0.5 s ahead: 40 mm away on average, better than constant velocity (50 mm), '
         'like straight minimum jerk (40 mm).',
         'Uncertainty: the region of 90 % holds 70 % of the true positions 0.5 s ahead, so it is too narrow.',

@@ -56,8 +56,8 @@ def test_everything_is_fitted_and_written_for_the_node(tmp_path, capsys):
     assert answer['parameters']['estimator.position_stddev']['value'] == pytest.approx(5e-4, rel=0.2)
     assert [values[f'{each}.adaptation'] for each in ('duration', 'covariance')] == ['online', 'online']
     classes = answer['scores']['ways']
-    assert classes['fitted'] >= classes['without the recording'] and classes['fitted'] > classes['uniform']
-    assert set(classes) == {'uniform', 'as given', 'fitted', 'without the recording'}
+    assert classes['fitted'] >= classes['held out'] and classes['fitted'] > classes['uniform']
+    assert set(classes) == {'uniform', 'as given', 'fitted', 'held out'}
     assert 0.5 < answer['scores']['inside_90']['fitted'] <= 1.0
     errors = {f'error_m {t}' for t in ('0.25', '0.5', '1')}
     assert set(answer['comparison']) == {'class_gain', 'gap_right', 'nlpd', 'inside_90', *errors}
@@ -94,8 +94,8 @@ def test_two_recordings_do_not_determine_the_likelihood(tmp_path, capsys):
 
 
 def test_a_coverage_that_falls_is_told():
-    (told,) = fitting.make_verdict({'comparison': {'inside_90': {'before': 0.853, 'after': 0.765}}})
-    assert told.startswith('Worse with the fitted parameters: positions in the region of 90 %') and '85.3 to 76.5' in told
+    (told,) = fitting.make_verdict({'scores': {}, 'comparison': {'inside_90': {'before': 0.853, 'after': 0.765}}})
+    assert told.startswith('Worse on the same recordings with the fitted parameters: positions in the') and '85.3 to 76.5' in told
 
 
 FIXED = {'foc.strategy': 'fixed', 'foc.tau': 1e-4}
@@ -126,8 +126,8 @@ def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_la
     options = ['--params', str(tmp_path / 'given.yaml'), '--workers', '1', '--allow', 'positions', '--report', str(tmp_path)]
     assert main(['fit', str(tmp_path / 'bags'), '--output', str(output), *options]) == 2
     words = capsys.readouterr().out
-    assert 'log-likelihood of the class taken' in words and 'note: ' in words
-    assert 'with the fitted parameters: ' in words
+    assert 'log-likelihood of the path taken' in words and 'note: ' in words
+    assert 'on the same recordings with the fitted parameters: ' in words
     assert max(len(line) for line in words.splitlines() if str(tmp_path) not in line) <= 80
     assert words.endswith(f'\nreport: file://{tmp_path}/fit.html\n')
     assert f'python -m foc_ros node --ros-args --params-file {output}' in words

@@ -313,4 +313,4 @@ def test_the_true_values_are_found_and_ellipses_then_have_their_coverage(endpoin
     assert scores['inside_90']['motor noise alone'] < 0.1
     for kind in ('inside_90', 'inside_all_90'):
         assert scores[kind]['fitted'] == pytest.approx(0.9, abs=0.08)
-        assert scores[kind]['without the recording'] == pytest.approx(0.9, abs=0.08)
+        assert scores[kind]['held out'] == pytest.approx(0.9, abs=0.08)

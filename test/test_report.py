@@ -5,6 +5,7 @@
 import json
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from matplotlib.figure import Figure
 from report_samples import GOALS, OBSTACLES, START_NS, prediction, predictions, samples, widen
 
 from foc_ros.analysis.replay import Step
+from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.scene import Scene
 from foc_ros.core.solution import Status
@@ -141,12 +143,14 @@ def check_paths(frame, known, labels):
 
 
 def test_of_a_recording_that_begins_anew_the_last_run_is_shown(tmp_path):
-    made, collector = samples(), ReportCollector()
+    made, collector = samples(), ReportCollector(Config().with_values({'foc.eta': 0.8}))
     for sample in (*made[:100], *made):
         shown = prediction(sample.stamp_ns, sample.position) if sample.stamp_ns % 10**8 == 0 else None
         collector.add(Step(Item('hand_pose', '/hand_pose', sample.stamp_ns, None, b''), sample, shown, Scene()))
     collector.write(tmp_path, 'x', {})
     numbers = json.loads((tmp_path / 'predictions.json').read_text(encoding='utf-8'))
+    footer = (tmp_path / 'index.html').read_text(encoding='utf-8').partition('<footer')[2].partition('</footer>')[0]
+    assert f'Made by foc_ros {version("foc_ros")} on ' in footer and 'do not have their defaults: foc.eta = 0.8.' in footer
     assert numbers['hand_samples'] == len(made) and numbers['summary']['runs'] == '2, of which the last one is shown'
     assert [each['t_s'] for each in numbers['predictions']] == pytest.approx(np.arange(15) / 10.0)
 

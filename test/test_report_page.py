@@ -74,6 +74,8 @@ return { disc: arguments[0].map((point) => isAt(point, disc)), ring: arguments[0
 def test_the_page_fits_on_a_phone(browser, report, tmp_path, dark):
     assert show(browser, report / 'index.html', 360, 640, dark) == []
     assert browser.execute_script('return document.documentElement.scrollWidth') == 360
+    cut = "return [...document.querySelectorAll('.wide')].filter((each) => each.scrollWidth > each.clientWidth).length"
+    assert browser.execute_script(cut) == 0, 'facts are read without moving the table'
     browser.execute_script("""
         for (const row of document.querySelectorAll('#candidates tr[data-track]')) {
           [row.cells[1].textContent, row.cells[4].textContent] = ['100 %', 'goal0: right of 1, right of 2, left of post_3'];

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages of evaluations and fits, and views of predictions: those of the records and of the node's messages agree."""
 
+import itertools
 from dataclasses import replace
 from datetime import datetime
 from importlib.metadata import version
@@ -40,7 +41,7 @@ ANSWER = {
     },
     'chosen': {'duration.arrival': {'value': 'passing', 'given': 'rest'}},
     'undetermined': {'foc.eta': {'given': 0.9, 'why': 'flat'}},
-    'scores': {'ways': {'given': -1.0, 'fitted': -0.75, 'held out': None}},
+    'scores': {'ways': {'uniform': -1.0, 'as given': -1.0, 'fitted': -0.75, 'held out': -0.8}, 'positions': {'held out': None}},
     'comparison': {'error_m 0.5': {'before': 0.063, 'after': 0.096}, 'inside_90': {'before': 0.5, 'after': 0.8}},
     'warnings': ['<b>few</b> recordings'],
     'failed': {'x.mcap': 'no hand'},
@@ -55,9 +56,11 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path):
     assert '<title>Fit: hers &amp; his</title>' in page
     assert '<tr><th>likelihood.beta</th><td>1</td><td>0.5</td><td>0.4 to 0.7</td><td>classes taken</td></tr>' in page
     assert '<td>0.06 to 0.1</td>' in page
-    assert '<tr><th>log-likelihood of the class taken [nat]</th><td>fitted</td><td>-0.750</td></tr>' in page
+    assert '<tr><th>log-likelihood of the path taken [nat]</th><td>uniform, as given</td><td>-1.000</td></tr>' in page
     row = '<th>error of positions 0.5 s ahead [mm]</th><td>63.0</td><td>96.0</td><td>worse</td>'
-    assert row in page and 'Better with the fitted parameters: positions in the region of 90 %' in page
+    assert row in page and 'Better on the same recordings with the fitted parameters: positions in' in page
+    held_out = 'recordings held out with the fitted parameters: log-likelihood of the path taken [nat] -1.000 to -0.800.'
+    assert page.index(f'Better on {held_out}') < page.index('Better on the same recordings')
     assert '&lt;b&gt;few&lt;/b&gt; recordings' in page and 'x.mcap: no hand' in page
     assert page.count('<img') == 1
     assert '<p class="warning">Few recordings (2)' in page and 'held out: scored on' in page
@@ -123,6 +126,23 @@ def test_results_are_told_in_plain_words_first():
         'Changes way: collisions in 5 % of the trials with guidance; '
         'collisions in 10 % of the trials and 1.23 s for a movement without guidance.'
     ]
+
+
+@pytest.mark.parametrize('factor', [1.02, 12.0, 900.0])
+def test_labels_of_the_axis_of_a_fit_are_apart_and_rules_are_named_in_words(factor):
+    figure = Figure((6.4, 2.6), layout='constrained')
+    axes = figure.subplots()
+    study_pages._draw_multiples(axes, {'a': {'given': 1.0, 'value': factor, 'interval': [1.0 / factor, factor]}})
+    figure.draw_without_rendering()
+    low, high = axes.get_xlim()
+    labels = [each for each in axes.get_xticklabels() if low <= each.get_position()[0] <= high]
+    boxes = [each.get_window_extent() for each in labels]
+    assert len(labels) >= 3 and all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
+    cell = {'operator': 'noisy', 'collision_rate': 0.1, 'collision_rate_interval': [0.0, 0.2]}
+    study_pages._draw_measure(
+        axes := Figure().subplots(), [cell | {'assistance': each} for each in ('none', 'foc')], 'collision_rate'
+    )
+    assert axes.get_legend_handles_labels()[1] == ['without guidance', 'with guidance']
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none():

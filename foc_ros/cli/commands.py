@@ -175,7 +175,7 @@ def replay(
     if report is not None:
         from foc_ros.reporting.report import ReportCollector
     played, summary = Replay(learning.prepare(params)), Summary()
-    collector = None if report is None else ReportCollector()
+    collector = None if report is None else ReportCollector(params)
     consumers = [summary.add, *([] if collector is None else [collector.add])]
     # The answers wait in files: nothing is printed of a recording that turns out to be damaged.
     with TemporaryFile('w+', encoding='utf-8') as predictions, TemporaryFile('w+', encoding='utf-8') as updates:

@@ -52,7 +52,7 @@ class Recorder(ReportCollector):
     """
 
     def __init__(self, config: Config) -> None:
-        super().__init__()
+        super().__init__(config)
         self.delays: list[float] = []
         self.health: dict[str, str] = {}
         # This pipeline never predicts. It decodes the inputs and holds the scene at each of them.

@@ -61,7 +61,7 @@ class Recording:
         self._types, self._scene = types, dict[str, bytes]()
         self._trial: list[tuple[str, bytes, int]] | None = None
         self._trials = {UNGUIDED: 0, GUIDED: 0}
-        self._shown = ReportCollector()
+        self._shown = ReportCollector(config)
         write_parameter_file('--data', self.folder / PARAMETERS, config)
         self._bag = BagWriter(self.folder / SESSION).__enter__()
         for role, message in scene.items():

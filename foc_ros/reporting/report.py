@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from foc_ros.analysis.replay import Step, keep_last_run
+from foc_ros.core.config import Config
 from foc_ros.core.errors import InputError
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
@@ -20,7 +21,7 @@ from foc_ros.io.outputs import MARK, REPORT_FILES, check_page, make_folder, writ
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate
 
 from .encode import encode_report, round_number
-from .page import Table, render
+from .page import Table, describe_origin, render
 from .views import NOTED, HandTrajectory, build_candidate_tracks, build_hand_trajectory, build_snapshot, is_late, list_unsolved
 
 COUNTERS = ('rejected', 'candidates compromised', 'candidates estimated', 'candidates not solved', 'counters of the node')
@@ -35,9 +36,13 @@ class PageWarning(NamedTuple):
 
 
 class ReportCollector:
-    """Collects what a report shows: samples of the hand, snapshots, and runs, of which a replay that begins anew has several."""
+    """Collects what a report shows: samples of the hand, snapshots, and runs, of which a replay that begins anew has several.
 
-    def __init__(self) -> None:
+    config: the parameters that the footer of the report names.
+    """
+
+    def __init__(self, config: Config | None = None) -> None:
+        self.config = config
         self.samples: list[HandSample] = []
         self.snapshots: list[Prediction] = []
         self.runs = 1
@@ -57,7 +62,7 @@ class ReportCollector:
     def write(self, directory: Path, title: str, summary: Mapping[str, str], tables: Sequence[Table] = ()) -> Path:
         """Write the report and return its page; see :func:`write_report`."""
         runs = {'runs': f'{self.runs}, of which the last one is shown'} if self.runs > 1 else {}
-        return write_report(directory, title, self.hand, self.snapshots, {**summary, **runs}, tables)
+        return write_report(directory, title, self.hand, self.snapshots, {**summary, **runs}, tables, self.config)
 
 
 def write_report(
@@ -67,11 +72,12 @@ def write_report(
     snapshots: Sequence[Prediction],
     summary: Mapping[str, str],
     tables: Sequence[Table] = (),
+    config: Config | None = None,
 ) -> Path:
     """Write `REPORT_FILES` into a directory, replacing an earlier report; return the page.
 
-    summary: facts for a table of the page; tables: further ones. Raises InputError if that is impossible, or the hand has no
-    sample.
+    summary: facts for a table of the page; tables: further ones; config: the parameters that its footer names. Raises InputError
+    if that is impossible, or the hand has no sample.
     """
     check_page('--report', directory, *REPORT_FILES)
     if not len(hand.stamps_ns):
@@ -82,7 +88,8 @@ def write_report(
     data = encode_report(hand, tracks, spans)
     folded = {name: facts[name] for name in COUNTERS if name in facts}
     shown = {name: text for name, text in facts.items() if name not in folded}
-    html = render('report.html', title=title, warnings=warnings, facts=shown, tables=tables, counters=folded, data=data)
+    parts = {'warnings': warnings, 'facts': shown, 'tables': tables, 'counters': folded, 'data': data}
+    html = render('report.html', title=title, **parts, **describe_origin(config))
     numbers = {
         'generator': MARK,
         'title': title,

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -39,7 +40,7 @@ NAT = 'the unit of a natural logarithm of a probability. 0.69 nat more mean twic
 EVALUATION_WORDS = {
     'nat': NAT,
     'above uniform': 'compared with a guess that finds all answers equally likely. 0 is no better than this; more is better.',
-    'tenths': 'the first column is about the beginning of the movement, when little is known, the last one about its end.',
+    'tenths': 'the first one is about the beginning of the movement, when little is known, the last one about its end.',
     'gain': 'the log-likelihood above uniform [nat], averaged over the whole movement.',
     'ECE': 'the expected calibration error: how far the stated probabilities are from the shares that come true. 0 is best.',
     'Brier': 'the mean squared error of the probabilities. 0 is best.',
@@ -52,6 +53,15 @@ EVALUATION_WORDS = {
     'Negative log-density': 'how improbable the true position was. Less is better: both a wrong place and a wrong width count.',
     'inside': 'how often the true position is in the region that should hold this share of them. The share itself is best.',
     'held out': 'each recording is scored with the settings that fit the others best, so that none has been learnt by heart.',
+    'bootstrap': 'recordings are drawn again and again, some twice and some not at all; 95 % of the results are in the interval.',
+    'foc': 'this package with the given parameters; of all others but uniform, whatever can be set is held out.',
+    PLAIN: 'the same with one exponent for all choices, near and far.',
+    BOLTZMANN: 'each candidate has the probability exp(-b J), where J is its effort (maximum entropy).',
+    'constant velocity': 'the hand goes on straight ahead, as fast as now.',
+    'nearest gap': 'the gap straight ahead of the hand, or the nearest goal.',
+    'shortest path': 'the shortest of all candidates.',
+    'straight minimum jerk': 'a smooth straight movement to each goal, obstacles disregarded.',
+    'Singer Kalman': 'a Kalman filter for a target that manoeuvres, which knows no scene.',
     'best setting': 'the one that fits all recordings best.',
 }
 FIT_WORDS = {
@@ -77,6 +87,7 @@ SIMULATION_WORDS = {
     'bootstrap interval': 'the mean would be in it in 95 of 100 such studies. Two rules whose intervals overlap may be alike.',
 }
 """What the words in headings, columns and rows of each page mean."""
+RULE_WORDS = {FOC: 'with guidance', NONE: 'without guidance'}
 
 
 def write_evaluation(
@@ -88,11 +99,11 @@ def write_evaluation(
 ) -> None:
     """Write the page; answer: as of `evaluate --json`, of recordings. Raises InputError where that cannot be done."""
     counts = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
-    gain = 'mean log-likelihood of the true {} above a uniform guess.'
+    gain = 'mean log-likelihood of the true {} above uniform [nat], by tenths of the movement.'
     captions = {
-        PATH_CLASS: f'Homotopy class through the obstacles still ahead: {gain.format("class")}',
+        PATH_CLASS: f'Path past the obstacles still ahead: {gain.format("path")}',
         GOAL: f'Goal: {gain.format("goal")}',
-        GAP: 'Gap in the next row: how often the likeliest gap is the true one.',
+        GAP: 'Gap in the next row: how often the likeliest gap is the true one, by tenths of the distance from row to row.',
     }
     pictures = []
     for name, caption in captions.items():
@@ -100,12 +111,14 @@ def write_evaluation(
             reliability = f'{caption.partition(":")[0]}: how often the likeliest answer is true, over its probability, {counts}.'
             for draw, words in ((_draw_tenths, caption), (_draw_reliability, reliability)):
                 pictures.append(make_chart((6.4, 4.6), words, draw, name, answer['questions'][name]))
+    named = [[caption for _, caption in pictures], *map(list, answer['questions'].values())]
+    all_predictors, *tables = explain_tables([('All predictors', (), named), *evaluation.make_tables(answer)], EVALUATION_WORDS)
     sections = [
         Section('In short', summarise_evaluation(answer)),
         *draw_example(recordings, config),
-        Section(pictures=pictures),
+        replace(all_predictors, pictures=pictures, rows=()),
         Section('Compared with simpler predictors', answer['verdict']),
-        *explain_tables(evaluation.make_tables(answer), EVALUATION_WORDS),
+        *tables,
     ]
     failed = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     warnings = [*warn_of_few(answer['recordings'], 'recordings'), *failed]
@@ -201,6 +214,8 @@ def write_fit(
 
 
 def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
+    from matplotlib.ticker import LogLocator
+
     colour, _ = get_class_style(0)
     for row, each in enumerate(drawn.values()):
         ends = [end / each['given'] for end in each['interval'] if end > 0.0]
@@ -209,9 +224,12 @@ def _draw_multiples(axes: Any, drawn: Mapping[str, Any]) -> None:
     axes.axvline(1.0, color='0.4', linewidth=1.0)
     axes.set_yticks(range(len(drawn)), list(drawn))
     axes.set(xscale='log', xlabel='fitted / given', ylim=(len(drawn) - 0.4, -0.6))
-    for set_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
-        set_format('{x:g}')
-    axes.tick_params(axis='x', which='minor', labelsize=7, rotation=90)
+    low, high = axes.get_xlim()
+    axes.set_xlim(min(low, 0.4), max(high, 2.5))  # so that there are three labels at least
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter('{x:g}')
+    axes.xaxis.set_minor_formatter('')
+    axes.tick_params(axis='x', labelsize=8, rotation=90)
 
 
 def write_simulation(
@@ -223,14 +241,14 @@ def write_simulation(
         make_chart((6.4, 4.2), f'{study.COLUMNS[name][0]}: {words}', _draw_measure, cells, name)
         for name in ('collision_rate', 'completion_s', 'opposing_impulse')
     ]
-    words = 'Intended path dashed; arrows: force of foc; crosses: within an obstacle.'
+    words = 'Intended path dashed; arrows: force of guidance; crosses: within an obstacle.'
     trials = [
         make_chart((6.4, 4.2), f'Operator {each.operator}. {words}', _draw_trial, each.task, each.trials)
         for each in results
         if each.task
     ]
     sections = [
-        Section('In short', summarise_simulation(cells), measures),
+        Section('In short', summarise_simulation(cells), pictures=measures),
         *explain_tables(study.make_tables(cells), SIMULATION_WORDS),
         Section('Single trials', pictures=trials),
     ]
@@ -244,7 +262,7 @@ def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
     for operator in dict.fromkeys(cell['operator'] for cell in cells):
         by_rule, told = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}, []
-        for rule, words in ((FOC, 'with guidance'), (NONE, 'without guidance')):
+        for rule, words in RULE_WORDS.items():
             values = {name: by_rule[rule][name] for name in measures} if rule in by_rule else {}
             known = [measures[name].format(study.COLUMNS[name][1] * each) for name, each in values.items() if each is not None]
             if values:
@@ -263,7 +281,16 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
         means = factor * np.array([cell[name] for cell in drawn])
         bounds = factor * np.array([cell[f'{name}_interval'] for cell in drawn]).reshape(-1, 2)
         errors = np.maximum(np.abs(bounds.T - means), 0.0)
-        axes.errorbar(at, means, errors, fmt='o', markersize=4, capsize=2, color=get_class_style(number)[0], label=rule)
+        axes.errorbar(
+            at,
+            means,
+            errors,
+            fmt='o',
+            label=RULE_WORDS.get(rule, rule),
+            markersize=4,
+            capsize=2,
+            color=get_class_style(number)[0],
+        )
     axes.set_xticks(range(len(operators)), [name.replace('_', '\n') for name in operators])
     axes.set(ylabel=heading, xlim=(-0.5, len(operators) - 0.5))
     axes.set_ylim(bottom=0.0)
@@ -275,7 +302,7 @@ def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> Non
     axes.plot(*task.path[:, 0].T, color='black', linestyle='--', linewidth=1.0, label='intended')
     for number, (rule, trial) in enumerate(trials.items()):
         look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
-        axes.plot(*trial.position.T, label=rule, **look)
+        axes.plot(*trial.position.T, label=RULE_WORDS.get(rule, rule), **look)
         touching = trial.position[trial.measure_clearances(task) < 0.0]
         axes.plot(*touching.T, linestyle='', marker='x', markersize=4, color=look['color'])
         if rule == FOC:

@@ -191,19 +191,21 @@ def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
     for baseline, each in comparisons.items():
         low, high = each['interval'] or (0.0, 0.0)
         alike = unknown if each['interval'] else f'by one recording {unknown}'
-        tenths = ', '.join(map(str, each['worse_tenths']))
-        where = f', worse in tenths {tenths}' if 0 < len(each['worse_tenths']) < TENTHS else ''
+        worse = each['worse_tenths']
+        runs = np.split(worse, np.flatnonzero(np.diff(worse) > 1) + 1)
+        tenths = ', '.join(' to '.join(str(end) for end in dict.fromkeys((run[0], run[-1]))) for run in runs if len(run))
+        where = f', worse in tenths {tenths}' if 0 < len(worse) < TENTHS else ''
         words = f'{baseline} ({factor * each["difference"]:+.2g} {unit}{where})'
         groups['better than' if low > 0.0 else 'worse than' if high < 0.0 else alike].append(words)
     judged = '; '.join(f'{verdict} {", ".join(each)}' for verdict, each in groups.items() if each)
-    subject = {PATH_CLASS: 'Homotopy classes', GAP: 'Next gaps', GOAL: 'Goals'}[name]
+    subject = {PATH_CLASS: 'Paths', GAP: 'Next gaps', GOAL: 'Goals'}[name]
     return f'{subject}: {PUBLISHED} is {judged}.'
 
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:
     """Yield the tables of an answer of `evaluate --json`."""
     questions, tenths = answer['questions'], ('', *(str(tenth + 1) for tenth in range(TENTHS)))
-    for name, subject in ((PATH_CLASS, 'Homotopy class'), (GOAL, 'Goal')):
+    for name, subject in ((PATH_CLASS, 'Path'), (GOAL, 'Goal')):
         if name in questions:
             title, scores = f'{subject}: log-likelihood above uniform [nat]', questions[name].items()
             gains = [_show_row(predictor, (tenth['gain'] for tenth in each['by_tenth'])) for predictor, each in scores]

@@ -125,7 +125,7 @@ class SettingTable:
         choices, count = {'as given': given, 'fitted': self.best}, len(self.values)
         found = {how: [setting] * count for how, setting in choices.items()}
         if count >= FEWEST:
-            found['without the recording'] = [self.settings[each] for each in choose_held_out(np.nan_to_num(self.values))]
+            found['held out'] = [self.settings[each] for each in choose_held_out(np.nan_to_num(self.values))]
         return found
 
     def score(self, chosen: Sequence[Setting]) -> float:

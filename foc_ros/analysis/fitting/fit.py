@@ -7,7 +7,7 @@ First come the parameters that need no prediction, then those that need replays,
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -46,7 +46,7 @@ COMPARISON_TITLES = {
 }
 """Words, factor and digits of each measure."""
 SCORE_TITLES = {
-    'ways': 'log-likelihood of the class taken [nat]',
+    'ways': 'log-likelihood of the path taken [nat]',
     'positions': 'log-density of true positions [nat]',
     'inside_90': 'positions of moving hands in the 90 % ellipse of the most likely candidate at 0.5 s',
     'inside_all_90': 'positions of moving hands in the 90 % region of all candidates at 0.5 s',
@@ -216,14 +216,18 @@ def show_value(value: object) -> str:
 
 def format_comparison(answer: Mapping[str, Any]) -> Rows:
     """Return the rows of the measures before and after a fit in an answer of `fit --json`, with a word for each change."""
+    compared = answer['comparison'].items()
+    return _judge((name, COMPARISON_TITLES[name], each['before'], each['after']) for name, each in compared)
+
+
+def _judge(measures: Iterable[tuple[str, tuple[str, float, int], float | None, float | None]]) -> Rows:
+    """Return a row for each measure by name, title, value before and value after; none where a value is not known."""
     rows: Rows = []
-    for name, each in answer['comparison'].items():
-        words, factor, digits = COMPARISON_TITLES[name]
-        before, after = each['before'], each['after']
+    for name, (words, factor, digits), before, after in measures:
         if before is None or after is None:
             continue
         shown = [f'{factor * value:.{digits}f}' for value in (before, after)]
-        if name == 'inside_90':
+        if name.startswith('inside'):
             is_better = after > before if min(before, after) < COVERAGE_LEVEL else after < before
         else:
             is_better = after < before if name.startswith(('error_m', 'nlpd')) else after > before
@@ -232,12 +236,14 @@ def format_comparison(answer: Mapping[str, Any]) -> Rows:
 
 
 def make_verdict(answer: Mapping[str, Any]) -> list[str]:
-    """Return sentences that say what a fit makes better, and what worse."""
-    found: dict[str, list[str]] = {'better': [], 'worse': []}
-    for words, before, after, change in format_comparison(answer):
-        if change:
-            found[change].append(f'{words} {before} to {after}')
-    judged = [f'{change.capitalize()} with the fitted parameters: {"; ".join(each)}.' for change, each in found.items() if each]
+    """Return sentences that say what a fit makes better, and what worse, on recordings held out first."""
+    scores = answer['scores'].items()
+    held_out = _judge((name, (SCORE_TITLES[name], 1.0, 3), each.get('as given'), each.get('held out')) for name, each in scores)
+    found: dict[str, list[str]] = {}
+    for where, rows in (('recordings held out', held_out), ('the same recordings', format_comparison(answer))):
+        for change in ('better', 'worse'):
+            found[f'{change.capitalize()} on {where}'] = [f'{row[0]} {row[1]} to {row[2]}' for row in rows if row[3] == change]
+    judged = [f'{verdict} with the fitted parameters: {"; ".join(each)}.' for verdict, each in found.items() if each]
     return judged or ['The fitted parameters change no measure.']
 
 
@@ -245,11 +251,12 @@ def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...
     """Yield title, columns and rows of the tables of an answer of `fit --json`."""
     yield 'Before and after', ('with the same recordings', 'before', 'after', ''), format_comparison(answer)
     yield 'Parameters', ('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer)
-    scores: Rows = [
-        (SCORE_TITLES[score], setting, '-' if value is None else f'{value:.3f}')
-        for score, values in answer['scores'].items()
-        for setting, value in values.items()
-    ]
+    scores: Rows = []
+    for score, values in answer['scores'].items():
+        settings: dict[str, list[str]] = {}  # those with the same value in one row
+        for setting, value in values.items():
+            settings.setdefault('-' if value is None else f'{value:.3f}', []).append(setting)
+        scores += [(SCORE_TITLES[score], ', '.join(each), shown) for shown, each in settings.items()]
     yield 'Scores of the likelihood and of the widening, all else being fitted', ('score', 'setting', 'value'), scores
 
 

@@ -75,10 +75,10 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> F
         partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], name_stage('likelihood')
     )
     table = SettingTable(np.array(rows), settings)
-    found, left = table.estimate(given, 'likelihood of the classes taken')
+    found, left = table.estimate(given, 'likelihood of the paths taken')
     missed = float(np.mean([question.truth not in question.given for each in questions for _, question in each]))
     if missed > 0.1:
-        words = 'the class taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
+        words = 'the path taken is not among the candidates; the exponent is fitted to the others: raise homotopy.max_candidates'
         found.warnings.append(f'likelihood.beta: in {100 * missed:.0f} % of the predictions {words}')
     uniform = [np.mean([-np.log(question.possible) for _, question in each]) for each in questions if each]
     found.scores['ways'] = {'uniform': float(np.mean(uniform))}

@@ -43,12 +43,12 @@ def render(template: str, **values: Any) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: sentences, pictures, and a table below notes that explain it, whichever of them it has."""
+    """A part of a page: sentences, notes that explain the pictures and the table below them, whichever of them it has."""
 
     heading: str = ''
     sentences: Sequence[str] = ()
-    pictures: Sequence[Picture] = ()
     notes: Sequence[str] = ()
+    pictures: Sequence[Picture] = ()
     columns: Sequence[str] = ()
     rows: Sequence[Sequence[str]] = ()
 
@@ -58,6 +58,13 @@ def write_page(
 ) -> None:
     """Write a page with warnings on top, and what made it below; raises InputError where it cannot be written, or replaced."""
     check_replaceable('--report', directory / name)
+    page = render('study.html', title=title, sections=sections, warnings=warnings, **describe_origin(config))
+    with make_folder('--report', directory), write_whole(directory / name) as unfinished:
+        unfinished.write_text(page, encoding='utf-8', errors='replace')
+
+
+def describe_origin(config: Config | None) -> dict[str, Any]:
+    """Return for the footer of a page what made it, and the parameters that do not have their defaults."""
     system = f'{platform.system()} on {platform.machine()} with {os.cpu_count()} processors, Python {platform.python_version()}'
     made = f'Made by foc_ros {version("foc_ros")} on {datetime.now().astimezone():%Y-%m-%d}; {system}.'
     changed = None
@@ -66,9 +73,7 @@ def write_page(
         changed = {name: value for name, value in flatten(config).items() if value != standard[name]}
         # of a file only its name
         changed = {name: Path(value).name if isinstance(value, str) else f'{value}' for name, value in changed.items()}
-    page = render('study.html', title=title, sections=sections, warnings=warnings, made=made, changed=changed)
-    with make_folder('--report', directory), write_whole(directory / name) as unfinished:
-        unfinished.write_text(page, encoding='utf-8', errors='replace')
+    return {'made': made, 'changed': changed}
 
 
 def make_picture(figure: Any, caption: str) -> Picture:
