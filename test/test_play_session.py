@@ -69,7 +69,8 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page):
         assert sum(item.role == 'hand_pose' for item in reader) > len(stamps)
     asyncio.run(work(page, 'report'))
     report = page.session.report.read_text(encoding='utf-8')
-    assert '<h2>Score</h2>' in report and f'<td>{page.last("score")["rows"][0][2]}</td>' in report
+    assert report.index('<h2>Score</h2>') < report.index('<h2>Recording</h2>'), 'the result comes first'
+    assert f'<td>{page.last("score")["rows"][0][2]}</td>' in report
 
 
 def test_a_blinded_page_learns_nothing_from_what_it_receives(page):
