@@ -42,7 +42,8 @@ def make(name, *values):
 # eigenvectors. A gain that draws to the reference is negative. Orientation and the normal of the plane stay free. The damping
 # `d` is 0, so that the force is that of guidance alone; a negative one [N s/m] also damps.
 #
-# In a node, keep the newest reference and call this with each stiffness, which the node publishes after it.
+# In a node, keep the newest reference and call this with each stiffness, which the node publishes after it. Messages of rclpy do,
+# too. Send a stiffness of zero where none comes for some periods.
 
 
 def convert(stiffness, reference):

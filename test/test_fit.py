@@ -127,7 +127,7 @@ def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_la
     assert main(['fit', str(tmp_path / 'bags'), '--output', str(output), *options]) == 2
     words = capsys.readouterr().out
     assert 'log-likelihood of the path taken' in words and 'note: ' in words
-    assert 'on the same recordings with the fitted parameters: ' in words
+    assert 'on the same recordings, with the fitted parameters: ' in words
     assert max(len(line) for line in words.splitlines() if str(tmp_path) not in line) <= 80
     assert words.endswith(f'\nreport: file://{tmp_path}/fit.html\n')
     assert f'python -m foc_ros node --ros-args --params-file {output}' in words

@@ -58,12 +58,14 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path):
     assert '<td>0.06 to 0.1</td>' in page
     assert '<tr><th>log-likelihood of the path taken [nat]</th><td>uniform, as given</td><td>-1.000</td></tr>' in page
     row = '<th>error of positions 0.5 s ahead [mm]</th><td>63.0</td><td>96.0</td><td>worse</td>'
-    assert row in page and 'Better on the same recordings with the fitted parameters: positions in' in page
-    held_out = 'recordings held out with the fitted parameters: log-likelihood of the path taken [nat] -1.000 to -0.800.'
+    assert row in page and 'Better on the same recordings, with the fitted parameters: positions in' in page
+    held_out = (
+        'recordings held out, by the likelihood and the widening alone: log-likelihood of the path taken [nat] -1.000 to -0.800.'
+    )
     assert page.index(f'Better on {held_out}') < page.index('Better on the same recordings')
     assert '&lt;b&gt;few&lt;/b&gt; recordings' in page and 'x.mcap: no hand' in page
     assert page.count('<img') == 1
-    assert '<p class="warning">Few recordings (2)' in page and 'held out: scored on' in page
+    assert '<p class="warning">Few recordings (2)' in page and 'held out: likelihood and widening fitted to' in page
     assert page.index('Fitted to 2 recordings, 3 parameters changed.') < page.index('<table')
     assert warn_of_few(FEW, 'recordings') == []
     write_report(tmp_path, 'x', ANSWER | {'parameters': {}})

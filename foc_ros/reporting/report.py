@@ -76,8 +76,8 @@ def write_report(
 ) -> Path:
     """Write `REPORT_FILES` into a directory, replacing an earlier report; return the page.
 
-    summary: facts for a table of the page; tables: results that stand above the scene; config: the parameters that its footer names.
-    Raises InputError if that is impossible, or the hand has no sample.
+    summary: facts for a table of the page; tables: results that stand above the scene; config: the parameters that its footer
+    names. Raises InputError if that is impossible, or the hand has no sample.
     """
     check_page('--report', directory, *REPORT_FILES)
     if not len(hand.stamps_ns):

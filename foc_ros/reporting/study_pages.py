@@ -71,8 +71,9 @@ FIT_WORDS = {
     'log-density': 'how probable the true positions were. More is better; of a negative log-density less is better.',
     'region of 90 %': 'should hold 90 % of the true positions.',
     '90 % ellipse': 'should hold 90 % of the true positions, if the hand takes the most likely path.',
-    'held out': 'scored on recordings that were left out of the fit, so that it cannot have learnt them by heart.',
-    'as given': 'these parameters at their given values, and all others fitted.',
+    'widening': 'process noise, scatter of the end point and spread of the duration, which widen the ellipses.',
+    'held out': 'likelihood and widening fitted to the other recordings, all else to all: these two have learnt none by heart.',
+    'as given': 'likelihood and widening at their given values, all else fitted.',
     '95 %': 'the interval within which the value would come out from other recordings of this kind; wide means: not well known.',
 }
 SIMULATION_WORDS = {

@@ -203,7 +203,7 @@ def format_parameters(answer: Mapping[str, Any]) -> Rows:
         found = (value, each['how']) if value != given else ('kept', f'the best of the values tried: {each["how"]}')
         rows.append((name, given, found[0], f'{low} to {high}' if low != high else '', found[1]))
     for name, each in answer['chosen'].items():
-        rows.append((name, show_value(each['given']), each['value'], '', 'predicted positions and classes'))
+        rows.append((name, show_value(each['given']), each['value'], '', 'predicted positions and paths'))
     for name, each in answer['undetermined'].items():
         rows.append((name, show_value(each['given']), 'kept', '', f'not determined: {each["why"]}'))
     return rows
@@ -240,10 +240,12 @@ def make_verdict(answer: Mapping[str, Any]) -> list[str]:
     scores = answer['scores'].items()
     held_out = _judge((name, (SCORE_TITLES[name], 1.0, 3), each.get('as given'), each.get('held out')) for name, each in scores)
     found: dict[str, list[str]] = {}
-    for where, rows in (('recordings held out', held_out), ('the same recordings', format_comparison(answer))):
+    # only these parameters are fitted without the recording that they are scored on
+    alone = 'recordings held out, by the likelihood and the widening alone'
+    for where, rows in ((alone, held_out), ('the same recordings, with the fitted parameters', format_comparison(answer))):
         for change in ('better', 'worse'):
             found[f'{change.capitalize()} on {where}'] = [f'{row[0]} {row[1]} to {row[2]}' for row in rows if row[3] == change]
-    judged = [f'{verdict} with the fitted parameters: {"; ".join(each)}.' for verdict, each in found.items() if each]
+    judged = [f'{verdict}: {"; ".join(each)}.' for verdict, each in found.items() if each]
     return judged or ['The fitted parameters change no measure.']
 
 

@@ -180,7 +180,7 @@ def _describe_choice(chosen: Config, settings: Sequence[Config], winners: Sequen
         else:
             # of another model of duration, a constant has no other values
             values = [float(each[name]) for each in drawn if each['duration.model'] == after['duration.model']] or [float(value)]
-            found.estimates[name] = Estimate.from_resamples(float(value), values, 'predicted positions and classes')
+            found.estimates[name] = Estimate.from_resamples(float(value), values, 'predicted positions and paths')
         if value != before and share < CONFIDENT:
             found.warnings.append(f'{name}: {value} is the best, but only in {100 * share:.0f} % of the resamples')
     return found
