@@ -120,7 +120,7 @@ def test_a_fit_and_its_comparison(tmp_path, monkeypatch):
         compared = await work(page, 'compare')
         assert 'on the trials of the fit' in compared['text']
         scores = [row[0] for row in page.last('result')['rows']]
-        assert scores[:2] == ['path class: correct [%]', 'path class: log-likelihood [nat]']
+        assert scores[:2] == ['path: correct [%]', 'path: log-likelihood [nat]']
 
     use_few_predictions(monkeypatch)
     monkeypatch.setattr(jobs, 'run_command', run_here)

@@ -160,7 +160,7 @@ class Jobs:
 def summarise_evaluation(answer: Mapping[str, Any]) -> dict[str, str]:
     """Return the main scores in an answer of `evaluate --json`."""
     rows = {}
-    for question, words in (('way', 'path class'), ('goal', 'goal')):
+    for question, words in (('way', 'path'), ('goal', 'goal')):
         if question in answer['questions']:
             scores = answer['questions'][question]['foc']
             rows[f'{words}: correct [%]'] = f'{100.0 * scores["right"]:.0f}'
