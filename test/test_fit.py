@@ -95,7 +95,7 @@ def test_two_recordings_do_not_determine_the_likelihood(tmp_path, capsys):
 
 def test_a_coverage_that_falls_is_told():
     (told,) = fitting.make_verdict({'scores': {}, 'comparison': {'inside_90': {'before': 0.853, 'after': 0.765}}})
-    assert told.startswith('Worse on the same recordings, with the fitted parameters: positions in the') and '85.3 to 76.5' in told
+    assert told.startswith('Worse on the same recordings, with the fitted parameters: positions in') and '85.3 to 76.5' in told
 
 
 FIXED = {'foc.strategy': 'fixed', 'foc.tau': 1e-4}
