@@ -16,14 +16,13 @@ from typing import Any, Literal
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.guidance.guide import GuidanceOutput
-from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.pipeline import Pipeline
 from foc_ros.core.predict import warm_up
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.io.class_library import load_library
 from foc_ros.io.topics import HAND
-from foc_ros.reporting.views import is_late
+from foc_ros.reporting.views import find_entered, is_late
 from foc_ros.ros.guidance import GuidanceLoop
 from foc_ros.ros.intake import Intake
 from foc_ros.ros.messages.encode_guidance import SampleHeader
@@ -43,13 +42,6 @@ class State:
 
     level: Literal['well', 'waiting', 'failing']
     text: str
-
-
-def find_entered(prediction: Prediction) -> str:
-    """Return the name of the obstacle that the hand of a prediction with a path is inside, '' if there is none."""
-    obstacles = prediction.blocking_obstacles
-    distances = measure_offsets(prediction.candidates[0].mean[:1, :2], obstacles)[1][0] - obstacles.radius
-    return obstacles.ids[int(distances.argmin())] if distances.min(initial=0.0) < 0.0 else ''
 
 
 class Predictor:
@@ -105,7 +97,7 @@ class Predictor:
         if sum(bool(paths) and all(path.age_s for path in paths) for paths in found) > 0.5 * REMEMBERED:  # no path is new
             return State('failing', 'this computer is too busy: paths from before are shown; end other programs')
         if recent and (entered := find_entered(recent[-1])):
-            return State('waiting', f'predicting, but the hand is inside obstacle {entered}')
+            return State('waiting', f'predicting, but the hand is inside obstacle {", ".join(entered)}')
         if recent and (recent[-1].candidates[0].status is Status.DEADLINE or sum(map(is_late, recent)) > 0.5 * REMEMBERED):
             cause = f'budget_s is {budget_s:g} s' if 0.0 < budget_s < Config().budget_s else 'this computer is busy'
             return State('waiting', f'predicting, but {cause}: some dotted paths are unfinished')

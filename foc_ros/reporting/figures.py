@@ -14,13 +14,12 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from foc_ros.core.obstacles.geometry import find_holders
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
 from . import draw
 from .draw import Bounds, Figure, Span, compute_bounds, open_figure
-from .views import SLOTS, HandTrajectory, build_snapshot
+from .views import SLOTS, HandTrajectory, build_snapshot, find_entered
 
 WIDTH_IN = 6.4
 SIZE_PT, COLUMNS = 7.5, 70
@@ -50,9 +49,8 @@ def _describe_trouble(snapshot: Prediction) -> str | None:
     """Return what a reader has to know before all else: that nothing could be solved, or where the hand is now."""
     if not snapshot.candidates_with_likelihood:
         return 'no candidate could be solved'
-    held = find_holders(snapshot.candidates[0].solution.path[:1], snapshot.blocking_obstacles)[0]
-    inside = [name for name, is_held in zip(snapshot.blocking_obstacles.ids, held.tolist(), strict=True) if is_held]
-    return f'the hand is inside obstacle {", ".join(inside)}' if inside else None
+    entered = find_entered(snapshot)
+    return f'the hand is inside obstacle {", ".join(entered)}' if entered else None
 
 
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:

@@ -17,7 +17,7 @@ import numpy as np
 
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import GRAZE_M
-from foc_ros.core.obstacles.geometry import find_offset
+from foc_ros.core.obstacles.geometry import find_holders, find_offset
 from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.solution import LEFT, RIGHT, Candidate, Solution, Status
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, Record
@@ -127,6 +127,12 @@ def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -
     begin, end = (start_ns + share * (end_ns - start_ns) for share in (0.15, 0.6))
     on_the_way = [row for row in settled if begin <= during[row].stamp_ns <= end]
     return max(on_the_way or settled, key=lambda row: count_likely_paths(during[row]))
+
+
+def find_entered(snapshot: Prediction) -> list[str]:
+    """Return the names of the obstacles that the hand of a snapshot with a path is inside."""
+    (is_entered,) = find_holders(snapshot.candidates[0].mean[:1, :2], snapshot.blocking_obstacles)
+    return [snapshot.blocking_obstacles.ids[row] for row in np.flatnonzero(is_entered)]
 
 
 def describe_ghosts(snapshot: Prediction) -> list[tuple[str, float | None]]:
