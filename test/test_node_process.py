@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import ros_required  # noqa: F401
+import psutil
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from process_helpers import ROOT, ScenePlayer, ended, predict_once, running
@@ -53,6 +54,18 @@ def test_a_working_node_stops_without_an_error(ros, command, number):
         code, errors = ended(process, number)
     assert code == 0, errors
     assert 'Traceback' not in errors
+
+
+def test_a_node_predicts_on_when_the_process_of_its_predictions_is_gone(ros):
+    with running(ros) as process:
+        player = predict_once(ros)
+        for child in psutil.Process(process.pid).children():
+            child.kill()
+        player.predictions.clear()
+        player.play_until(lambda: len(player.predictions) > 1, 'another prediction')
+        code, errors = ended(process)
+    assert code == 0, errors
+    assert errors.count('foc_node: warning: the process of the predictions ended') == (sys.platform == 'linux')
 
 
 def test_a_starting_node_stops_without_an_error_at_any_moment(ros):

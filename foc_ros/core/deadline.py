@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import MutableSequence
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass
@@ -38,11 +40,14 @@ class Deadline:
     def __init__(self, seconds: float | None = None, whole: Deadline | None = None, *, goes_on: bool = False) -> None:
         self.at = None if seconds is None else time.perf_counter() + seconds
         self._whole, self.goes_on = whole, goes_on
+        self._is_cancelled: MutableSequence[int] = bytearray(1)
         self.step_times: StepTimes = StepTimes() if whole is None else whole.step_times
 
     @property
     def left_s(self) -> float:
         """Time that is left [s], negative after the deadline."""
+        if self._is_cancelled[0]:
+            return -math.inf
         left_s = math.inf if self.at is None else self.at - time.perf_counter()
         return left_s if self._whole is None else min(left_s, self._whole.left_s)
 
@@ -53,7 +58,15 @@ class Deadline:
 
     def cancel(self) -> None:
         """Let the time end now, also for a computation in another thread, and for the deadlines taken from this one."""
-        self.at = -math.inf
+        self._is_cancelled[0] = 1
+
+    def share(self, is_cancelled: MutableSequence[int]) -> None:
+        """Keep in this memory whether it is cancelled, for instance in one that another process reads."""
+        before, self._is_cancelled = self._is_cancelled, is_cancelled
+        is_cancelled[0] |= before[0]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {'_is_cancelled': bytearray(1)}
 
     def allows(self) -> bool:
         """Tell whether there is time for a step as long as the longest so far."""

@@ -44,6 +44,10 @@ class InputError(FocError):
         self.expected = expected
         self.got = got
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let it pass from one process to another."""
+        return type(self), (self.field, self.expected, self.got), vars(self)
+
 
 class ParameterError(InputError):
     """A parameter that is unknown, of the wrong type or out of its bounds."""

@@ -26,7 +26,7 @@ from .support import Rejections
 from .tracks import NO_TRACKS, Tracks
 from .types import NANOSECONDS, Array, HandSample, HandState, SampleStatus
 
-__all__ = ['Pipeline', 'PredictionTask', 'SampleStatus']
+__all__ = ['Compute', 'Pipeline', 'PredictionTask', 'SampleStatus']
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +46,10 @@ class PredictionTask:
         """Compute the prediction and the classes that it follows; this may happen in another thread."""
         scene = self.hand, self.obstacles, self.goals
         return predict(self.config, *scene, self.tracks, self.knowledge, self.deadline, self.goal_heights)
+
+
+Compute = Callable[[PredictionTask], tuple[Prediction, Tracks]]
+"""Returns or raises what a task's `run` does, possibly computed in another process."""
 
 
 class Pipeline:

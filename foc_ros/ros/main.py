@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The node's program: one executor, one thread, and an end without an error at any time."""
+"""The node's program: an executor in this thread, a process for predictions, and an end without an error at any time."""
 
 from __future__ import annotations
 
@@ -50,7 +50,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             check_parameter_files(given)
     except FocError as error:
         return print_messages('foc_node', list_messages(error))
-    import rclpy
+    from foc_ros.core.config import Config
+
+    from .worker import Worker
+
+    worker = Worker(Config(), lambda text: print(f'foc_node: warning: {text}', file=sys.stderr))
+    import rclpy  # it may start threads, and a process is forked before
     from rclpy.executors import ExternalShutdownException
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
@@ -64,13 +69,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if extra:
             raise FocError(f'unrecognized arguments: {" ".join(extra)} (those of ROS follow --ros-args)')
         rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
-        node = FocNode(context=context)
+        node = FocNode(worker.run, context=context)
     except (FocError, RuntimeError, ValueError) as error:
+        worker.stop()
         context.try_shutdown()
         if 'initialize logging' in str(error):
             error.add_note('ROS_LOG_DIR names another directory for the log')
         return print_messages('foc_node', list_messages(error))
-    # an update of guidance gives the interpreter away several times, and the thread of the predictions is to return it soon
+    # an update of guidance gives the interpreter away several times, and the other threads are to return it soon
     sys.setswitchinterval(0.0002)
     gc.collect()
     gc.freeze()  # these objects stay alive: a full collection over them would delay a prediction by 80 ms
@@ -84,6 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             break
         except Exception as error:
             node.report(error)
+    worker.stop()
     executor.remove_node(node)
     node.destroy_node()
     executor.shutdown()

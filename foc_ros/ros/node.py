@@ -6,10 +6,10 @@ The pipeline is driven by message stamps, so the node gives the same answers as 
 candidates that `budget_s` leaves to an estimate. The node adds the clocks: it makes no prediction from an input that has fallen
 silent, and publishes none that has become too old.
 
-A prediction is computed in another thread, guidance in a third one (`guidance`), and all else in that of the executor. What is
-received or asked for meanwhile is done at once: after a reset, a release of the clutch, a change of parameters or of the state of
-the managed node, nothing that was computed before is published. A running computation cannot be stopped: its deadline is
-cancelled, it ends when it next checks that, and its result is ignored.
+A prediction is computed in another process (`worker`) for the program, or else in another thread, guidance in a third thread
+(`guidance`), and all else in that of the executor. What is received or asked for meanwhile is done at once: after a reset, a
+release of the clutch, a change of parameters or of the state of the managed node, nothing that was computed before is published.
+A running computation cannot be stopped: its deadline is cancelled, it ends when it next checks that, and its result is ignored.
 
 It is a managed node. Once configured it subscribes and keeps the scene; it predicts only while it is active. With `autostart`,
 the default, it is active at once.
@@ -18,6 +18,7 @@ the default, it is active at once.
 from __future__ import annotations
 
 import traceback
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from time import monotonic, sleep
 from typing import Any, NamedTuple
@@ -30,7 +31,7 @@ from std_srvs.srv import SetBool, Trigger
 from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError
-from foc_ros.core.pipeline import Pipeline, PredictionTask
+from foc_ros.core.pipeline import Compute, Pipeline, PredictionTask
 from foc_ros.core.predict import warm_up
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import Tracks
@@ -52,6 +53,8 @@ REST_S, LONGEST_REST_S = 0.004, 0.02
 """Shortest and longest time for which the poses of a fast hand gather before they are taken together [s]."""
 DRAWN_S = 0.035
 """Least time between the stamps of two arrays of markers [s]: of 50 predictions a second, every second one is drawn."""
+DRAWING = 'markers'
+"""The output that takes longer than all others; it is published last."""
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
@@ -65,9 +68,12 @@ class Computation(NamedTuple):
 
 
 class FocNode(LifecycleNode):
-    """Node `foc`. Raises ParameterError if it is started with a wrong parameter, FocError if it cannot start."""
+    """Node `foc`; compute: called in another thread for each prediction, for instance `Worker.run`.
 
-    def __init__(self, **options: Any) -> None:
+    Raises ParameterError if it is started with a wrong parameter, FocError if it cannot start.
+    """
+
+    def __init__(self, compute: Compute = PredictionTask.run, **options: Any) -> None:
         super().__init__('foc', automatically_declare_parameters_from_overrides=True, **options)
         self._live_parameters = LiveParameters(self, declare_parameters(self), self._reconfigure)
         self._library = load_library(self._live_parameters.config.homotopy.library)
@@ -86,7 +92,7 @@ class FocNode(LifecycleNode):
             self._tf = None
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._retries = self.create_timer(0.01, self._take_held, clock=steady)  # of messages that wait for their transforms
-        self._thread, self._is_destroyed = ThreadPoolExecutor(1, 'prediction'), False
+        self._compute, self._thread, self._is_destroyed = compute, ThreadPoolExecutor(1, 'prediction'), False
         self._computation: Computation | None = None
         self._create_pipeline()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -254,7 +260,7 @@ class FocNode(LifecycleNode):
             self._forget_movement()
             return
         if task is not None:
-            result = self._thread.submit(task.run)
+            result = self._thread.submit(self._compute, task)
             self._computation = Computation(task, self._freshness.used_s(HAND, start_s), start_s, result)
             result.add_done_callback(self._announce)
 
@@ -270,36 +276,47 @@ class FocNode(LifecycleNode):
         if ended is None or not ended.result.done():
             return
         self._computation = None
+        published = None
         try:
-            self._publish_prediction(ended)
+            published = self._publish_prediction(ended)
         except Exception as error:
             self.report(error)
             self._forget_movement()
         self._receive(HAND)  # the next prediction is made from the newest pose, though the executor had no time for it yet
         self._predict()
+        if published is not None:
+            self._draw(published)  # meanwhile the next prediction is computed
 
-    def _publish_prediction(self, ended: Computation) -> None:
+    def _publish_prediction(self, ended: Computation) -> Prediction | None:
+        """Publish the result of a computation, but for the markers; return it if it is published."""
         prediction, config = self.pipeline.finish(ended.task, ended.result.result), ended.task.config
         if prediction is None:
-            return
+            return None
         clock_ns = self.get_clock().now().nanoseconds
         late = self._freshness.find_late_reason(prediction.stamp_ns, ended.received_s, monotonic(), clock_ns)
         if late is None:
             self._guidance.loop.note_prediction(prediction, ended.received_s)
-            # one after the other: the markers of 8 candidates take longer than all else, and come last
-            for name in [name for name in OUTPUTS if self._outputs[name].get_subscription_count()]:
-                if name == 'markers' and abs(prediction.stamp_ns - self._drawn_ns) < DRAWN_S * NANOSECONDS:
-                    continue
-                (message,) = encode_outputs(prediction, config.plane, self._types, [name]).values()
-                if name == 'markers':
-                    self._drawn_ns = prediction.stamp_ns
-                    message.markers.extend(self._guidance.encode_markers(self._types))
-                endpoints.publish(self, self._outputs[name], message)
+            for name in [name for name in OUTPUTS if name != DRAWING and self._outputs[name].get_subscription_count()]:
+                self._publish_output(name, prediction, config.plane)
             self._goal_topics.publish(prediction, self._types)
         self._monitor.note_prediction(prediction, ended.start_s, monotonic(), config.budget_s, late)
         if late is None and not self._has_predicted:
             self._has_predicted = True
             self.get_logger().info(f'predicting in frame {self.pipeline.frame_id}, plane {config.plane}')
+        return prediction if late is None else None
+
+    def _publish_output(self, name: str, prediction: Prediction, plane: str, more: Sequence[Any] = ()) -> None:
+        (message,) = encode_outputs(prediction, plane, self._types, [name]).values()
+        if more:
+            message.markers.extend(more)
+        endpoints.publish(self, self._outputs[name], message)
+
+    def _draw(self, prediction: Prediction) -> None:
+        """Publish the markers, unless nobody looks or the last ones are hardly older."""
+        is_new = abs(prediction.stamp_ns - self._drawn_ns) >= DRAWN_S * NANOSECONDS
+        if is_new and DRAWING in self._outputs and self._outputs[DRAWING].get_subscription_count():
+            self._drawn_ns = prediction.stamp_ns
+            self._publish_output(DRAWING, prediction, self.pipeline.config.plane, self._guidance.encode_markers(self._types))
 
     def _forget_movement(self) -> None:
         self.pipeline.reset()

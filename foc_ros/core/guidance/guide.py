@@ -135,7 +135,7 @@ class Followed(Record):
     """The newest prediction as guidance uses it.
 
     paths: of its candidates, None if none has a likelihood; progress (c,): on them [m]; obstacles: as far as the hand has to keep
-    away; margins, zones: of these, as large as force and clearance need them; grown: by the radius of the hand, and by both [m].
+    away; margins, zones: of these, as large as force and clearance need them.
     """
 
     prediction: Prediction | None = None
@@ -144,7 +144,6 @@ class Followed(Record):
     obstacles: Obstacles = field(default_factory=make_obstacles)
     margins: Margins = field(default_factory=lambda: build_margins(make_obstacles(), 0.0))
     zones: Margins = field(default_factory=lambda: build_margins(make_obstacles(), 0.0))
-    grown: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,21 +230,17 @@ def _follow_prediction(config: Config, before: Followed, given: GuidanceInput) -
     prediction = given.prediction
     if prediction is None or prediction is before.prediction:
         return before
-    obstacles, margins, zones = before.obstacles, before.margins, before.zones
-    known, grown = before.prediction, (config.scene.hand_radius, config.guidance.margin, config.guidance.clearance)
-    is_same = known is not None and prediction.obstacles is known.obstacles and prediction.cleared == known.cleared
-    if not is_same or grown != before.grown:
-        obstacles = prediction.blocking_obstacles.grow(grown[0])
-        margins, zones = (build_margins(obstacles, growth) for growth in grown[1:])
+    obstacles = prediction.blocking_obstacles.grow(config.scene.hand_radius)
+    margins, zones = (build_margins(obstacles, growth) for growth in (config.guidance.margin, config.guidance.clearance))
     if not prediction.candidates_with_likelihood:
-        return Followed(prediction, obstacles=obstacles, margins=margins, zones=zones, grown=grown)
+        return Followed(prediction, obstacles=obstacles, margins=margins, zones=zones)
     paths, references = build_paths(prediction), {}
     if before.paths is not None:
         points = before.paths.interpolate(before.paths.points, before.paths.locate(before.progress))
         references = dict(zip(before.paths.labels, points, strict=True))
     travelled = float(np.hypot(*given.velocity)) * max(given.prediction_age_s, 0.0)
     progress = transfer_progress(paths, references, given.position, travelled)
-    return Followed(prediction, paths, progress, obstacles, margins, zones, grown)
+    return Followed(prediction, paths, progress, obstacles, margins, zones)
 
 
 def _compute_demand(settings: GuidanceConfig, followed: Followed, seen: SeenMargins, given: GuidanceInput) -> _Demand:

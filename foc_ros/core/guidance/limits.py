@@ -12,13 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.config import GuidanceConfig
 from foc_ros.core.obstacle_table import Obstacles
-from foc_ros.core.obstacles.geometry import trace_obstacle
+from foc_ros.core.obstacles.geometry import trace_shape
 from foc_ros.core.types import Array, Record
 
 
@@ -91,18 +92,25 @@ class Margins(Record):
 
 def build_margins(obstacles: Obstacles, growth: float) -> Margins:
     """Return the polygons about obstacles that are larger by a growth [m]; they contain the rounded shapes."""
-    extra = [(growth + radius) / math.cos(math.pi / POINTS) - radius for radius in obstacles.radius.tolist()]
-    outlines = [trace_obstacle(obstacles, row, extra[row], POINTS) for row in range(len(obstacles))]
-    most = max((len(each) - 1 for each in outlines), default=1)
-    start, edge = np.zeros((len(outlines), most, 2)), np.zeros((len(outlines), most, 2))
-    for row, outline in enumerate(outlines):
-        edges = np.diff(outline, axis=0)
-        is_long = np.hypot(edges[:, 0], edges[:, 1]) > 1e-12
-        corners, edges = outline[:-1][is_long], edges[is_long]
-        start[row], edge[row] = corners[0], edges[0]
-        start[row, : len(edges)], edge[row, : len(edges)] = corners, edges
+    shapes = zip(obstacles.vertices, obstacles.corners.tolist(), obstacles.radius.tolist(), strict=True)
+    polygons = [_list_edges(polygon[:corners].tobytes(), radius, growth) for polygon, corners, radius in shapes]
+    most = max((len(starts) for starts, _ in polygons), default=1)
+    start, edge = np.zeros((len(polygons), most, 2)), np.zeros((len(polygons), most, 2))
+    for row, (starts, edges) in enumerate(polygons):
+        start[row], edge[row] = starts[0], edges[0]
+        start[row, : len(edges)], edge[row, : len(edges)] = starts, edges
+    start += obstacles.centre[:, None]
     lengths = np.hypot(edge[..., 0], edge[..., 1])[..., None]
     return Margins(start, edge, np.stack([edge[..., 1], -edge[..., 0]], axis=-1) / lengths)
+
+
+@lru_cache(maxsize=1024)
+def _list_edges(vertices: bytes, radius: float, growth: float) -> tuple[Array, Array]:
+    """Return the first corners (k, 2), relative to the centre, and the vectors (k, 2) of the edges of one margin [m]."""
+    outline = trace_shape(vertices, (growth + radius) / math.cos(math.pi / POINTS), POINTS)
+    edges = np.diff(outline, axis=0)
+    is_long = np.hypot(edges[:, 0], edges[:, 1]) > 1e-12
+    return outline[:-1][is_long], edges[is_long]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +142,10 @@ def turn_along(seen: SeenMargins, most: Array, vector: Array) -> Array:
     """Return a vector f (2,) with a part into each margin of at most `most` (n,).
 
     With n the outward normal of the edge that is nearest to the hand, f <- f + max(-f . n - most, 0) n for one obstacle after the
-    other.
+    other. The vector does not become longer, so a margin with `most` >= |f| has no effect.
     """
-    for row, nearest in enumerate(seen.distance.argmin(axis=1)):
-        normal = seen.normal[row, nearest]
+    for row in np.flatnonzero(most < np.hypot(*vector)):
+        normal = seen.normal[row, seen.distance[row].argmin()]
         vector = vector + max(-float(vector @ normal) - float(most[row]), 0.0) * normal
     return vector
 

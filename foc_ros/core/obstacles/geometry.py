@@ -10,13 +10,14 @@ inside it, and n = d / D points away from the obstacle. Where q is a vertex n tu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foc_ros.core.obstacle_table import Edges, Obstacles
-from foc_ros.core.types import Array
+from foc_ros.core.types import Array, as_readonly
 
 SMALLEST_DISTANCE = 1e-13
 """Distance [m] below which a point counts as on the polygon, where its normal is not defined: rounding."""
@@ -123,8 +124,15 @@ def trace_obstacle(obstacles: Obstacles, row: int, growth: float = 0.0, points: 
     growth [m]: added to the radius; points: number of them on a full circle. They go round anticlockwise, and the last one is the
     first. The arc about a vertex begins at the outward normal of the edge before it and ends at that of the edge behind it.
     """
-    polygon = obstacles.centre[row] + obstacles.vertices[row, : obstacles.corners[row]]
-    radius = float(obstacles.radius[row]) + growth
+    polygon = obstacles.vertices[row, : obstacles.corners[row]].tobytes()
+    outline: Array = obstacles.centre[row] + trace_shape(polygon, float(obstacles.radius[row]) + growth, points)
+    return outline
+
+
+@lru_cache(maxsize=1024)
+def trace_shape(vertices: bytes, radius: float, points: int) -> Array:
+    """Return the outline of an obstacle as `trace_obstacle` does, relative to its centre; the last outlines are kept."""
+    polygon = np.frombuffer(vertices).reshape(-1, 2)
     edges = np.roll(polygon, -1, axis=0) - polygon
     normals = np.arctan2(-edges[:, 0], edges[:, 1])
     begins = np.roll(normals, 1)
@@ -133,7 +141,7 @@ def trace_obstacle(obstacles: Obstacles, row: int, growth: float = 0.0, points: 
     for vertex, begin, turn in zip(polygon, begins, turns, strict=True):
         angles = begin + np.linspace(0.0, turn, 1 + int(np.ceil(points * turn / TURN)) if radius else 1)
         arcs.append(vertex + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
-    return np.concatenate([*arcs, arcs[0][:1]])
+    return as_readonly(np.concatenate([*arcs, arcs[0][:1]]))
 
 
 def find_limits(obstacles: Obstacles, growth: Array | float = 0.0) -> tuple[Array, Array]:
