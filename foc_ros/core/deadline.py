@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import MutableSequence
 from dataclasses import dataclass
+from mmap import mmap
 from typing import Any
 
 
@@ -40,7 +40,7 @@ class Deadline:
     def __init__(self, seconds: float | None = None, whole: Deadline | None = None, *, goes_on: bool = False) -> None:
         self.at = None if seconds is None else time.perf_counter() + seconds
         self._whole, self.goes_on = whole, goes_on
-        self._is_cancelled: MutableSequence[int] = bytearray(1)
+        self._is_cancelled: bytearray | mmap = bytearray(1)
         self.step_times: StepTimes = StepTimes() if whole is None else whole.step_times
 
     @property
@@ -60,7 +60,7 @@ class Deadline:
         """Let the time end now, also for a computation in another thread, and for the deadlines taken from this one."""
         self._is_cancelled[0] = 1
 
-    def share(self, is_cancelled: MutableSequence[int]) -> None:
+    def share(self, is_cancelled: bytearray | mmap) -> None:
         """Keep in this memory whether it is cancelled, for instance in one that another process reads."""
         before, self._is_cancelled = self._is_cancelled, is_cancelled
         is_cancelled[0] |= before[0]

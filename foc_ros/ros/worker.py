@@ -48,7 +48,7 @@ class Worker:
         task.deadline.share(self._is_cancelled)
         try:
             self._end.send(task)
-            result = self._end.recv()
+            result: tuple[Prediction, Tracks] | Exception = self._end.recv()
         except (EOFError, OSError):
             if self._is_stopped:
                 raise
