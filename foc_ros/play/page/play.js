@@ -164,6 +164,8 @@ const handlers = {
     predictedMs = performance.now();
     measured.predictions += 1;
     if (event !== null) waitingEvents.push(event);
+    draw(predictedMs); // the browser shows it with its next frame, and what is drawn in that frame with the one after
+    measureDelays();
   },
   force({ force }) {
     hand.setForce(force, performance.now());
@@ -272,12 +274,16 @@ function showWays() {
   }));
 }
 
-function measure(time) {
+function measureDelays() {
   const now = performance.now();
   measured.delays.push(...waitingEvents.map((event) => now - event));
   if (waitingEvents.length) measuredMs = now;
   measured.delays.splice(0, Math.max(measured.delays.length - DELAYS, 0));
   waitingEvents = [];
+}
+
+function measure(time) {
+  measureDelays();
   frames.push(time);
   while (frames[0] < time - COUNTED_MS) frames.shift();
   if (frames.length > 1) measured.fps = (1000 * (frames.length - 1)) / (time - frames[0]);
