@@ -288,6 +288,7 @@ NO_SCENES = [
             lambda: foc_ros.Box((0, 0), (1, 1), angle=0.3),
             r'obstacle\.angle: expected an argument of Box: centre, size, yaw, .*0\.3',
         ),
+        (lambda: Circle((0, 0), r=0.3), r'obstacle\.r: .* \(did you mean radius\?\)'),
         (lambda: foc_ros.Capsule((0, 0), (1, 1), radios=0.3), r'obstacle\.radios: .* \(did you mean radius\?\)'),
         (lambda: Config(eta=0.9), r'^eta: expected a known parameter \(did you mean foc\.eta\?\), got 0\.9'),
         (lambda: Config(beta=2.0), r'^beta: .* \(did you mean likelihood\.beta\?\)'),

@@ -104,6 +104,10 @@ def test_the_status_line_is_not_green_while_predictions_come_late(page):
     page.execute_script('play.measured.delays.fill(400)')
     wait_for(page, "document.getElementById('status').innerText.startsWith('predictions come')", 'what is late', 20)
     assert page.execute_script("return document.getElementById('status').className") == 'status waiting'
+    steer(page, (0.14, 0.015))
+    page.execute_script('play.measured.delays.fill(400)')
+    words = "/^predicting, but .*; predictions come/.test(document.getElementById('status').innerText)"
+    wait_for(page, words, 'what else there is to tell', 20)
 
 
 def test_a_gamepad_steers_and_guidance_pulls(page):
@@ -278,6 +282,7 @@ def test_everything_can_be_done_by_keys_and_survives_a_reload(page, tmp_path):
     wait_for(page, 'globalThis.play && play.view.candidates.length > 0', 'predictions')
     assert page.execute_script('return play.view.hand.position') == pytest.approx(before, abs=0.01), 'the hand is where it was'
     assert [text_of(page, name) for name in ('score', 'session', 'job', 'result')] == kept
+    assert page.execute_script("return document.getElementById('trials').value") == '1'
     assert not page.execute_script("return document.getElementById('download').hidden")
     page.get('about:blank')
     check_report(page, folder / 'report')
@@ -389,6 +394,9 @@ def test_a_finger_moves_the_hand_and_what_it_drags_changes_the_prediction_and_is
     browser.get('about:blank')
 
 
+CONTROLS = "[...document.querySelectorAll('main :is(button, input, select)')]"
+
+
 def test_the_page_says_that_the_server_is_gone_and_recovers_as_the_page_of_another_one(browser, tmp_path):
     with play(tmp_path) as started:
         visit(browser, started)
@@ -407,8 +415,11 @@ def test_the_page_says_that_the_server_is_gone_and_recovers_as_the_page_of_anoth
     assert 'Traceback' not in started.output
     wait_for(browser, "document.getElementById('status').innerText === 'The server is gone; trying again.'", 'the message')
     assert browser.execute_script('return play.view.candidates.length') == 0
+    assert browser.execute_script(f'return {CONTROLS}.every((each) => each.disabled)')
     with play(tmp_path, '--port', port) as other:
         wait_for(browser, 'play.view.candidates.length > 0', 'predictions after a new start of the server')
+        disabled = browser.execute_script(f'return {CONTROLS}.filter((each) => each.disabled).map(({{ id }}) => id)')
+        assert disabled == ['report', 'fit', 'compare'], 'there is no session yet'
         wait_for(browser, "document.getElementById('status').className === 'status well'", 'the message is gone')
         assert [text_of(browser, name) for name in ('score', 'session')] == ['', 'Tasks and recordings are kept in bags.']
         first = browser.current_window_handle
@@ -417,8 +428,7 @@ def test_the_page_says_that_the_server_is_gone_and_recovers_as_the_page_of_anoth
         browser.switch_to.window(first)
         replaced = "document.getElementById('status').innerText.startsWith('Another page has taken over.')"
         wait_for(browser, replaced, 'the new page', 20)
-        controls = "[...document.querySelectorAll('main :is(button, input, select)')]"
-        assert browser.execute_script(f'return {controls}.every((each) => each.disabled)')
+        assert browser.execute_script(f'return {CONTROLS}.every((each) => each.disabled)')
         browser.close()
         browser.switch_to.window(browser.window_handles[0])
         browser.get('about:blank')

@@ -44,6 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.environ['COLUMNS'] = str(max(columns, NARROWEST))
         # matrices are small: threads of a linear algebra library would only wait for each other
         os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+        # said by joblib's process that cleans up after a command that was terminated
+        os.environ.setdefault('PYTHONWARNINGS', 'ignore:resource_tracker:UserWarning')
         os.environ['MPLBACKEND'] = 'agg'  # pictures are files; the backend of a notebook or of a desktop may not exist here
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors='backslashreplace')  # a name of a file or topic may have characters that it cannot show

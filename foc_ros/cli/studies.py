@@ -168,7 +168,8 @@ def simulate(
         results = collect_all(run, make_pairs(operators, assistance, trials, seed, tasks), 'simulate')
     cells = summarise(results, seed)
     write_report(cells, results, study.params)
-    study.show({'cells': cells, 'seed': seed}, make_tables(cells), (), SIMULATION_PAGE)
+    words = 'none: without guidance; foc: with it; path: how far the hand moved.'
+    study.show({'cells': cells, 'seed': seed}, make_tables(cells), (words,), SIMULATION_PAGE)
     return 0
 
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field, fields, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, cast
 
-from .errors import ParameterError, guard_keywords, join_errors
+from .errors import ParameterError, join_errors
 from .parameter import Group, Parameter, check_fields, check_value, param
 from .registry import LIKELIHOOD_RULES, PLANTS, QP_BACKENDS, STRATEGIES
-from .removed import find_parameter
+from .removed import find_parameter, guard_parameters
 
 PLANES = ('xy', 'xz', 'yz')
 ARRIVALS = ('rest', 'passing')
@@ -286,8 +286,7 @@ class Config:
             if 'bound' in item.metadata or isinstance(given, cast('type', item.default_factory)):
                 continue
             if not isinstance(given, Mapping):
-                expected = 'a mapping of its parameters to their values'
-                raise ParameterError(item.name, expected, repr(given))
+                raise ParameterError(item.name, 'a mapping of its parameters to their values', repr(given))
             defaults = replace_values(Config(), {f'{item.name}.{name}': value for name, value in given.items()})
             vars(self)[item.name] = getattr(defaults, item.name)
         vars(self).update(check_fields(self))
@@ -347,16 +346,5 @@ def replace_values(config: Config, values: Mapping[str, object]) -> Config:
     return config
 
 
-def _explain_keywords(group: type) -> None:
-    """Let the constructor of a group, or of `Config`, answer a keyword that is no parameter as `replace_values` does."""
-    prefix = group.__name__.removesuffix('Config').lower()
-
-    def refuse(name: str, value: object) -> None:
-        find_parameter(f'{prefix}.{name}'.lstrip('.'), value, {each.name: each for each in list_parameters()})
-
-    guard_keywords(group, refuse)
-
-
-_KINDS: list[type] = [Config, *Group.__subclasses__()]
-for _kind in _KINDS:
-    _explain_keywords(_kind)
+for _kind in cast('list[type]', [Config, *Group.__subclasses__()]):
+    guard_parameters(_kind, {each.name: each for each in list_parameters()})

@@ -167,13 +167,14 @@ def guard_keywords(kind: C, refuse: Callable[[str, object], object]) -> C:
 
 
 def explain_keywords(field: str) -> Callable[[C], C]:
-    """Return a decorator of a dataclass: for a keyword that is none of its fields SceneError names a similar one, or all."""
+    """Return a decorator of a dataclass: for a keyword that is none of its fields SceneError names one like it, or all."""
 
     def explain(kind: C) -> C:
         known = [each.name for each in fields(kind)]
 
         def refuse(name: str, value: object) -> None:
-            hint = suggest(name, known) or f': {", ".join(known)}'
+            begun = next((each for each in known if each.startswith(name)), name)  # r is short for radius
+            hint = suggest(begun, known) or f': {", ".join(known)}'
             raise SceneError(f'{field}.{name}', f'an argument of {kind.__name__}{hint}', repr(value))
 
         return guard_keywords(kind, refuse)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .errors import ParameterError, suggest
+from .errors import ParameterError, guard_keywords, suggest
 from .parameter import Parameter
 
 RECORDINGS = 'how much recordings count is fixed'
@@ -49,3 +49,9 @@ def find_parameter(name: str, value: object, known: Mapping[str, Parameter]) -> 
     hint = suggest(name, [each for each in known if each.endswith(f'.{name}')], 0.0) or suggest(name, (*known, *groups))
     expected = 'a group of parameters' if name in groups else f'a known parameter{hint}'
     raise ParameterError(name, expected, repr(value))
+
+
+def guard_parameters(group: type, known: Mapping[str, Parameter]) -> None:
+    """Let the constructor of a group, or of `Config`, answer a keyword that is no parameter as `find_parameter` does."""
+    prefix = group.__name__.removesuffix('Config').lower()
+    guard_keywords(group, lambda name, value: find_parameter(f'{prefix}.{name}'.lstrip('.'), value, known))

@@ -77,10 +77,13 @@ FIT_WORDS = {
     '95 %': 'the interval within which the value would come out from other recordings of this kind; wide means: not well known.',
 }
 SIMULATION_WORDS = {
+    'none': 'the operator moves alone, without guidance.',
+    'foc': 'the operator moves with the guidance of this package.',
     'collisions': 'trials in which the hand entered an obstacle.',
     'arrivals': 'trials in which the hand came to rest at its goal.',
     'time': 'from the beginning of the movement to the arrival, over these trials.',
     'clearance': 'the least distance from an obstacle; negative within one.',
+    'path [m]': 'the length of the path of the hand.',
     'effort': 'the integral of the square of the force of the operator.',
     'opposing impulse': 'force of the guidance against the direction in which the operator wants to go, added up over time.',
     'mean opposing force': 'the same on average, in parts of the greatest force of the guidance.',

@@ -237,7 +237,8 @@ def make_tables(cells: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, tuple
     def show(cell: Mapping[str, Any], name: str, factor: float, digits: int) -> str:
         if cell[name] is None:
             return '-'
-        value, low, high = (f'{factor * each:.{digits}f}' for each in (cell[name], *cell[f'{name}_interval']))
+        # z: 0 has no sign
+        value, low, high = (f'{factor * each:z.{digits}f}' for each in (cell[name], *cell[f'{name}_interval']))
         return f'{value} ({low} to {high})'
 
     for operator in dict.fromkeys(cell['operator'] for cell in cells):

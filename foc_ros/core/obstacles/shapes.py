@@ -22,14 +22,12 @@ from .table_checks import check_obstacles
 
 MOST_VERTICES = 16
 """Most vertices of a convex hull that a user gives."""
-
-
 T = TypeVar('T', bound='type[Shape]')
 
 
 def accept_center(shape: T) -> T:
-    """Let the constructor of a shape take `center` for `centre`, both spellings being common."""
-    changed: Any = shape
+    """Let the constructor of a shape take `center` for `centre`, both spellings being common, and explain other keywords."""
+    changed: Any = explain_keywords('obstacle')(shape)
     create = changed.__init__
 
     @wraps(create)
@@ -84,7 +82,6 @@ class Shape:
 
 
 @accept_center
-@explain_keywords('obstacle')
 @dataclass(frozen=True, repr=False)
 class Circle(Shape):
     """A circular obstacle in the task plane.
@@ -132,7 +129,6 @@ class Circle(Shape):
 
 
 @accept_center
-@explain_keywords('obstacle')
 @dataclass(frozen=True, repr=False)
 class Box(Shape):
     """A rectangular obstacle in the task plane, with corners that are sharp or rounded; a wall is a long thin box.

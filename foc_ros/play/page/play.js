@@ -79,6 +79,11 @@ function refuse(text) {
   setTimeout(() => { failure = ''; }, REFUSED_MS);
 }
 
+// Lets all controls be used, or none; the server tells afterwards which of them have to wait.
+function enableControls(on) {
+  for (const each of document.querySelectorAll('main :is(button, input, select)')) each.disabled = !on;
+}
+
 // Returns the corners of an obstacle from its centre, none for a circle.
 function cornersOf({ kind, size_x: length, size_y: width, yaw }) {
   if (kind !== 'box') return [];
@@ -128,6 +133,7 @@ const handlers = {
     globalThis.play.settings = message;
     for (const each of [hand, arranging]) each.configure(message);
     scene.fit(message.bounds);
+    enableControls(true);
     failure = '';
     for (const name of ['score', 'result']) byId(name).replaceChildren(); // those of this server follow
   },
@@ -135,7 +141,7 @@ const handlers = {
     isReplaced = true;
     socket.close();
     view.candidates = [];
-    for (const each of document.querySelectorAll('main :is(button, input, select)')) each.disabled = true;
+    enableControls(false);
     fail('Another page has taken over. Load this page again to take it back.');
   },
   scene({ obstacles, goals }) {
@@ -154,8 +160,9 @@ const handlers = {
     byId('download').hidden = !message.report;
   },
   status({ level, text }) {
-    const isLate = level === 'well' && measured.delayMs > LATE_MS && performance.now() - measuredMs < OLD_MS;
-    if (isLate) showStatus('waiting', `predictions come ${Math.round(measured.delayMs)} ms late: this computer is busy; end other programs`);
+    const isLate = level !== 'failing' && measured.delayMs > LATE_MS && performance.now() - measuredMs < OLD_MS;
+    const late = `predictions come ${Math.round(measured.delayMs)} ms late: this computer is busy; end other programs`;
+    if (isLate) showStatus('waiting', level === 'well' ? late : `${text}; ${late}`);
     else showStatus(level, text);
   },
   prediction({ event, candidates, unknown, other }) {
@@ -239,6 +246,7 @@ function connect() {
     endJob();
     if (isReplaced) return;
     view.candidates = [];
+    enableControls(false);
     fail('The server is gone; trying again.');
     setTimeout(connect, RETRY_MS);
   });
@@ -351,6 +359,13 @@ byId('begin').addEventListener('click', () => {
   });
   canvas.focus();
 });
+// What was chosen for the tasks survives a reload of the page, as what the server knows does.
+for (const name of ['trials', 'seed', 'assistance', 'blinded', 'shuffled']) {
+  const [field, kept] = [byId(name), sessionStorage.getItem(name)];
+  const part = field.type === 'checkbox' ? 'checked' : 'value';
+  if (kept !== null) field[part] = JSON.parse(kept);
+  field.addEventListener('input', () => sessionStorage.setItem(name, JSON.stringify(field[part])));
+}
 for (const name of ['report', 'fit', 'compare']) byId(name).addEventListener('click', () => send({ type: 'job', name }));
 byId('cancel').addEventListener('click', () => send({ type: 'cancel' }));
 addEventListener('resize', () => settings && scene.resize());
