@@ -48,7 +48,7 @@ BLACK: Colour = (0.0, 0.0, 0.0, 1.0)
 OBSTACLE: Colour = (0.45, 0.45, 0.5, 0.9)
 DEVIATION: Colour = (0.85, 0.35, 0.2, 0.25)
 UNLIKELY, LIKELY = np.array([0.25, 0.45, 0.85]), np.array([0.78, 0.32, 0.04])
-"""Colours of paths. Foxglove writes in each mixture of them, and in GREY, on white; RViz shows them on a dark background."""
+"""Colours of paths. Foxglove and RViz, as config/ sets them up, write in each mixture of them, and in GREY, on white."""
 ORIGIN = np.zeros(3)
 PLANE_ROTATION = {
     'xy': (0.0, 0.0, 0.0, 1.0),
