@@ -99,8 +99,7 @@ class Predictor:
         if recent and (entered := find_entered(recent[-1])):
             return State('waiting', f'predicting, but the hand is inside obstacle {", ".join(entered)}')
         if recent and (recent[-1].candidates[0].status is Status.DEADLINE or sum(map(is_late, recent)) > 0.5 * REMEMBERED):
-            cause = f'budget_s is {budget_s:g} s' if 0.0 < budget_s < Config().budget_s else 'this computer is busy'
-            return State('waiting', f'predicting, but {cause}: some dotted paths are unfinished')
+            return State('waiting', f'predicting, but some dotted paths are not finished within {budget_s:g} s (budget_s)')
         return State('well', 'predicting')
 
     def _run(self) -> None:
