@@ -158,7 +158,6 @@ class Session:
         self._end_recording()
         self._begin_recording()
         self._tasks, self._guided_before = tasks.Tasks(settings, self._scene), self._is_guided
-        self._kept.pop('score', None)
         self._prepare_trial(self._tasks)
 
     def _prepare_trial(self, running: tasks.Tasks) -> None:
@@ -206,6 +205,7 @@ class Session:
     def _begin_recording(self) -> None:
         self._recording = Recording(self._data, self._standard, self._scene.encode(self._types, time_ns()), self._types)
         self._jobs.recording = self._recording
+        self._kept.pop('score', None)  # that of the session before
 
     def _end_recording(self) -> None:
         if self._recording is not None:

@@ -158,6 +158,7 @@ const handlers = {
     const place = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
     byId('session').textContent = message.session ? place : 'Tasks and recordings are kept in bags.';
     byId('download').hidden = !message.report;
+    if (message.recording) byId('score').replaceChildren(); // that of the session before
   },
   status({ level, text }) {
     const isLate = level !== 'failing' && measured.delayMs > LATE_MS && performance.now() - measuredMs < OLD_MS;
