@@ -327,6 +327,7 @@ class Session:
             'fitted': self._jobs.operator is not None,
             'recording': self._recording is not None,
             'session': '' if recording is None else str(recording.folder),
+            'unguided': recording is not None and recording.has_unguided,
             'report': recording is not None and report is not None and report.is_relative_to(recording.folder),
         }
 
