@@ -74,6 +74,7 @@ class Session:
             radius_stddev=scene.RADIUS_STDDEV,
             first_scene=scene.FIRST_SCENE.model_dump(),
             most=limits,
+            data=str(self._data),
             max_speed=self._standard.guidance.max_speed,
             # with a spring that is as stiff as guidance at most, the loop of cursor and guidance is stable at any delay
             coupling=max(self._standard.guidance.k_max, 1.0),

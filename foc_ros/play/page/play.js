@@ -159,7 +159,7 @@ const handlers = {
       [byId(name).disabled, byId(name).title] = [message.recording || reason !== '', reason];
     }
     const place = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
-    byId('session').textContent = message.session ? place : 'Tasks and recordings are kept in bags.';
+    byId('session').textContent = message.session ? place : `Tasks and recordings are kept in ${settings.data}, also earlier ones.`;
     byId('download').hidden = !message.report;
     if (message.recording) byId('score').replaceChildren(); // that of the session before
   },
