@@ -25,7 +25,7 @@ from foc_ros.cli.main import main
 from foc_ros.core.config import Config, replace_values
 from foc_ros.core.errors import InputError
 from foc_ros.io.bags import BagReader
-from foc_ros.play import jobs, recording
+from foc_ros.play import jobs, recording, tasks
 from foc_ros.play.predictor import State
 from foc_ros.play.scene import BOUNDS, FIRST_SCENE, START, view_prediction
 from foc_ros.play.session import Session
@@ -58,6 +58,7 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page):
     assert sorted(row[0] for row in page.last('score')['rows']) == ['with guidance', 'without guidance']
     assert [each.guidance.enabled for each in page.session.predictor.configs] in ([True, False], [True])
     folder = Path(page.last('settings')['session'])
+    assert page.last('settings')['unguided'] is True
     (name,) = recordings = find_recordings(folder / recording.UNGUIDED)
     replay = Replay(Config(rate_hz=5.0))
     steps = list(replay.steps(recordings[name].items()))
@@ -71,6 +72,18 @@ def test_tasks_leave_bags_that_fit_and_evaluate_read(page):
     report = page.session.report.read_text(encoding='utf-8')
     assert report.index('<h2>Score</h2>') < report.index('<h2>Recording</h2>'), 'the result comes first'
     assert f'<td>{page.last("score")["rows"][0][2]}</td>' in report
+    page.send({'type': 'record', 'on': True})
+    again = Page(page.session)
+    assert 'score' not in [each['type'] for each in again.received], 'it is of the session before'
+    again.send({'type': 'record', 'on': False})
+
+
+def test_a_prediction_of_the_hand_before_the_light_is_ahead_by_the_time_of_the_trial():
+    movement = tasks.TrialMovement(tasks.Trial(FIRST_SCENE, 0, False), 10.0, START)
+    movement.note_most_likely(9.9, 1)
+    for t in (11.0, 11.4):
+        is_over = movement.add(t, FIRST_SCENE.points[0])
+    assert is_over and movement.ahead_s == movement.time_s == 1.0
 
 
 def test_a_blinded_page_learns_nothing_from_what_it_receives(page):
@@ -203,7 +216,7 @@ def test_what_is_impossible_is_refused(page):
     page.send({'type': 'record', 'on': False})
     with pytest.raises(InputError, match='job: expected a session with trials without guidance, got fit'):
         page.send({'type': 'job', 'name': 'fit'})
-    assert page.last('settings')['recording'] is False
+    assert (page.last('settings')['recording'], page.last('settings')['unguided']) == (False, False)
 
 
 def test_a_fit_shows_its_progress_and_can_be_cancelled(page, tmp_path, monkeypatch):

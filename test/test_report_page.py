@@ -132,6 +132,21 @@ def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_t
     )
 
 
+def test_a_path_below_one_percent_has_neither_letter_nor_colour(browser, report):
+    show(browser, report / 'index.html')
+    letter = "return document.querySelector('#candidates .letter')"
+    before = browser.execute_script(f'{letter}.style.borderColor')
+    assert browser.execute_script(f'{letter}.textContent') != ''
+    browser.execute_script("""
+        const frame = report.data.frames[report.state.frame];
+        const { first, share } = report.data.tracks[frame.candidates[0].track];
+        share[frame.at - first] = 0.004;
+    """)
+    browser.execute_script(MOVE, browser.execute_script('return report.state.frame'))
+    assert browser.execute_script(f'{letter}.textContent') == ''
+    assert browser.execute_script(f'{letter}.style.borderColor') != before
+
+
 def test_letters_of_the_chart_of_likelihoods_do_not_lie_over_each_other(browser, report):
     show(browser, report / 'index.html')
     found = browser.execute_script("""

@@ -84,7 +84,7 @@ class Jobs:
             raise InputError('job', 'one at a time', name)
         if self.recording is None:
             raise InputError('job', 'a session that was recorded', name)
-        if name != 'report' and not (self.recording.folder / UNGUIDED).is_dir():
+        if name != 'report' and not self.recording.has_unguided:
             raise InputError('job', 'a session with trials without guidance', name)
         if name == 'compare' and self.operator is None:
             raise InputError('job', 'a fit before', name)

@@ -67,6 +67,11 @@ class Recording:
         for role, message in scene.items():
             self.add_input(role, message)
 
+    @property
+    def has_unguided(self) -> bool:
+        """Whether there are trials without guidance, which a fit and its comparison need."""
+        return self._trials[UNGUIDED] > 0
+
     def add_hand(self, stamp_ns: int, position: Point) -> None:
         """Keep a hand sample for the report."""
         self._shown.samples.append(HandSample(stamp_ns, as_readonly(np.array(position)), 0.0, FRAME))

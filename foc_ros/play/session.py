@@ -74,6 +74,7 @@ class Session:
             radius_stddev=scene.RADIUS_STDDEV,
             first_scene=scene.FIRST_SCENE.model_dump(),
             most=limits,
+            data=str(self._data),
             max_speed=self._standard.guidance.max_speed,
             # with a spring that is as stiff as guidance at most, the loop of cursor and guidance is stable at any delay
             coupling=max(self._standard.guidance.k_max, 1.0),
@@ -158,7 +159,6 @@ class Session:
         self._end_recording()
         self._begin_recording()
         self._tasks, self._guided_before = tasks.Tasks(settings, self._scene), self._is_guided
-        self._kept.pop('score', None)
         self._prepare_trial(self._tasks)
 
     def _prepare_trial(self, running: tasks.Tasks) -> None:
@@ -206,6 +206,7 @@ class Session:
     def _begin_recording(self) -> None:
         self._recording = Recording(self._data, self._standard, self._scene.encode(self._types, time_ns()), self._types)
         self._jobs.recording = self._recording
+        self._kept.pop('score', None)  # that of the session before
 
     def _end_recording(self) -> None:
         if self._recording is not None:
@@ -327,6 +328,7 @@ class Session:
             'fitted': self._jobs.operator is not None,
             'recording': self._recording is not None,
             'session': '' if recording is None else str(recording.folder),
+            'unguided': recording is not None and recording.has_unguided,
             'report': recording is not None and report is not None and report.is_relative_to(recording.folder),
         }
 

@@ -76,7 +76,7 @@ class TrialMovement:
     def note_most_likely(self, t: float, way: int) -> None:
         """Take the number of the class that is the most likely one from a time [s] on."""
         if math.isnan(self._arrival_s) and way != self._most_likely[1]:
-            self._most_likely = (t, way)
+            self._most_likely = (max(t, self._begin_s), way)  # a prediction may be of the hand before the light
 
 
 class Tasks:

@@ -153,11 +153,15 @@ const handlers = {
     byId('parameters').options[1].disabled = !message.fitted;
     byId('record').dataset.on = message.recording;
     nameRecordButton();
-    for (const name of ['report', 'fit', 'compare']) byId(name).disabled = message.recording || !message.session;
-    byId('compare').disabled ||= !message.fitted;
+    byId('report').disabled = message.recording || !message.session;
+    const lack = message.unguided ? '' : 'needs tasks with trials without guidance';
+    for (const [name, reason] of [['fit', lack], ['compare', lack || (message.fitted ? '' : 'needs a fit before')]]) {
+      [byId(name).disabled, byId(name).title] = [message.recording || reason !== '', reason];
+    }
     const place = `${message.recording ? 'Recording' : 'Recorded'} to ${message.session}`;
-    byId('session').textContent = message.session ? place : 'Tasks and recordings are kept in bags.';
+    byId('session').textContent = message.session ? place : `Tasks and recordings are kept in ${settings.data}, also earlier ones.`;
     byId('download').hidden = !message.report;
+    if (message.recording) byId('score').replaceChildren(); // that of the session before
   },
   status({ level, text }) {
     const isLate = level !== 'failing' && measured.delayMs > LATE_MS && performance.now() - measuredMs < OLD_MS;

@@ -11,6 +11,8 @@ const scenes = data.scenes.map((rows) => rows.map(([name, ...shape]) => {
 }));
 const frameTimes = data.frames.map((frame) => data.times[frame.at]);
 const slotOf = (track) => data.tracks[track].slot;
+// Returns the slot of a candidate of a frame, null where the candidate is too unlikely for a letter and a colour.
+const slotAt = (track, row) => (track !== undefined && shareOf(track, row) >= NOTED ? slotOf(track) : null);
 const shareOf = (track, row) => { const value = data.tracks[track].share[row - data.tracks[track].first]; return value === undefined ? null : value; };
 // Above this number of points, the likelihoods are drawn without marks.
 const MOST_MARKS = 3000;
@@ -39,10 +41,11 @@ function pick(time) {
 // Returns a candidate of a frame, or one without a likelihood, as the scene draws it.
 function viewOf(frame, each) {
   const [track, share] = each.track === undefined ? [null, null] : [each.track, shareOf(each.track, frame.at)];
+  const slot = slotAt(each.track, frame.at);
   const words = data.labels[each.description] || 'no obstacle in the way';
-  const text = `${track === null ? '' : `${letterOf(slotOf(track))} ${percent(share)} `}${words} (${data.labels[each.label]})${each.reason ? `: ${data.labels[each.reason]}` : ''}`;
+  const text = `${track === null ? '' : `${letterOf(slot)} ${percent(share)} `.trimStart()}${words} (${data.labels[each.label]})${each.reason ? `: ${data.labels[each.reason]}` : ''}`;
   return {
-    ...each, track, share, words, text, slot: track === null ? null : slotOf(track), likelihood: share, path: decodePath(each),
+    ...each, track, share, words, text, slot, likelihood: share, path: decodePath(each),
     motor: decodeEllipses(each.motor), total: decodeEllipses(each.total), ghost: data.labels[each.ghost],
   };
 }
@@ -90,7 +93,7 @@ function drawSpeeds(frame) {
   const predicted = [...frame.candidates].reverse().map((each) => {
     const speeds = sums(each.v, SPEED);
     const points = sums(each.t, TIME).map((time, row) => [now + time, Math.min(speeds[row], topSpeed)]);
-    return { points: points.filter(([time]) => time <= span()[1]), colour: colourOf(slotOf(each.track)), dotted: each.compromised, alpha: alphaOf(each.track), width: 1.2 + 2.5 * shareOf(each.track, frame.at) };
+    return { points: points.filter(([time]) => time <= span()[1]), colour: colourOf(slotAt(each.track, frame.at)), dotted: each.compromised, alpha: alphaOf(each.track), width: 1.2 + 2.5 * shareOf(each.track, frame.at) };
   });
   const lines = [...predicted, { points: measured(Math.max(past - 1, from), to), colour: 'var(--soft)', width: 1.5 }, { points: measured(from, past), colour: 'var(--ink)', width: 2.5 }];
   charts.speeds.draw({ span: span(), top: topSpeed, lines, now });
@@ -221,7 +224,7 @@ scene.canvas.addEventListener('wheel', (event) => {
   zoom(scene.bounds.map((edge, row) => at[row >> 1] + factor * (edge - at[row >> 1])));
 }, { passive: false });
 scene.canvas.addEventListener('dblclick', () => { zoom(); drawScene(data.frames[state.frame]); });
-writeLegend(byId('signs'), ['hand', 'past', 'later', 'path', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal']);
+writeLegend(byId('signs'), ['hand', 'past', 'later', 'path', 'unlikely', 'compromised', 'ghost', 'motor', 'total', 'obstacle', 'goal']);
 zoom();
 choice.value = data.movements.length > 1 ? data.opened : -1;
 choose(Number(choice.value));

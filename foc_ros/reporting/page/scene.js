@@ -10,7 +10,7 @@ const FORCE = { ink: '--ink', width: 4 };
 const letterOf = (slot) => (slot === null || slot === undefined ? '' : String.fromCharCode(65 + slot));
 const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot % COLOURS.length]);
 const percent = (share) => (share === null ? '' : share < 0.0005 ? '< 0.1 %' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
-// Likelihood below which a path has no letter: letters of paths that hardly anybody takes would cover the others.
+// Likelihood below which a path has no letter, colour or words: those of paths that hardly anybody takes would cover the others.
 const NOTED = 0.01;
 const PALE = 0.25; // a ghost
 // Lengths come as whole tenths of a millimetre, and a list of them as the first value and then the differences.
@@ -151,6 +151,7 @@ class Scene {
     if (ghost) {
       this.trace(path);
       this.stroke(ink('--soft'), width, [], PALE * alpha);
+      if ((likelihood ?? 1) < NOTED) return;
       const [x, y] = path[Math.round((path.length - 1) * (ghostAt ?? place))];
       // Words of one obstacle would cover each other.
       const length = this.entered.has(ghost) ? 0 : this.text(ghost, [x, y], ink('--soft'), { size: 11, up: 14, halo: true });
