@@ -151,7 +151,6 @@ class Scene {
     if (ghost) {
       this.trace(path);
       this.stroke(ink('--soft'), width, [], PALE * alpha);
-      if ((likelihood ?? 1) < NOTED) return;
       const [x, y] = path[Math.round((path.length - 1) * (ghostAt ?? place))];
       // Words of one obstacle would cover each other.
       const length = this.entered.has(ghost) ? 0 : this.text(ghost, [x, y], ink('--soft'), { size: 11, up: 14, halo: true });
