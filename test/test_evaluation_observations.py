@@ -12,7 +12,7 @@ from evaluation_samples import reach, write_tables
 from foc_ros.analysis.evaluation import observations
 from foc_ros.analysis.evaluation.baselines import power_rule_shares
 from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, WIDENINGS, ask, find_relevant_obstacles, observe
-from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth
+from foc_ros.analysis.evaluation.truth import RecordedPath, find_ground_truth, warn_of_several_movements
 from foc_ros.analysis.fitting.one_replay import widen_covariances
 from foc_ros.analysis.recordings import EPOCH_NS, find_recordings
 from foc_ros.core import tracks
@@ -154,6 +154,29 @@ def test_progress_is_the_share_of_distance_and_positions_are_unknown_beyond_the_
     np.testing.assert_allclose(path.progress, [0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 1.0, 1.0])
     ahead = path.interpolate(350_000_000, np.array([0.1, 0.2, 0.4]))
     np.testing.assert_allclose(ahead, [[0.375, 0.0], [0.75, 0.0], [np.nan, np.nan]])
+
+
+def test_a_recording_of_several_movements_is_named_but_a_goal_that_is_passed_or_where_the_hand_begins_counts_not():
+    def move(*stops, rest_s):
+        """Return the path in steps of 10 ms that rests at each stop, 0.5 s apart."""
+        x = np.interp(np.arange(0.0, len(stops) * (0.5 + rest_s), 0.01), *zip(*times(stops, rest_s), strict=True))
+        return RecordedPath(np.arange(len(x)) * 10_000_000, np.column_stack([x, np.zeros(len(x))]), goals)
+
+    def times(stops, rest_s):
+        for number, each in enumerate(stops):
+            yield from ((number * (0.5 + rest_s), each), (number * (0.5 + rest_s) + rest_s, each))
+
+    goals = np.array([[0.2, 0.0], [0.5, 0.0]])
+    paths = {
+        'one': move(0.0, 0.5, rest_s=0.5),
+        'passing': move(0.0, 0.2, 0.5, rest_s=0.0),
+        'between goals': move(0.2, 0.5, rest_s=0.5),
+        'back': move(0.0, 0.5, 0.0, rest_s=0.5),
+        'two': move(0.0, 0.2, 0.5, rest_s=0.5),
+        'again': move(0.0, 0.5, 0.0, 0.5, rest_s=0.5),
+    }
+    (words,) = warn_of_several_movements(paths.items())
+    assert words.startswith('two, again: the hand comes to rest at goals more than once; one recording per movement is expected')
 
 
 def test_a_hand_that_passes_a_row_and_comes_back_to_a_goal_before_it_has_a_truth():

@@ -98,7 +98,7 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
     study.check(EVALUATION_PAGE)
     recordings = find_recordings(data)
     write_report = study.load_report('evaluation')
-    from foc_ros.analysis.evaluation import observations, report, scores
+    from foc_ros.analysis.evaluation import observations, report, scores, truth
 
     with study.open_workers():
         observed, failed = observations.observe_all(recordings, study.params, in_order)
@@ -106,6 +106,8 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
         if not observed:
             print_messages('foc_ros evaluate', [f'none of the {len(failed)} recordings could be evaluated'])
             return 3
+        warnings = truth.warn_of_several_movements((each.name, each.path) for each in observed)
+        print_messages('foc_ros evaluate', warnings)
         answer = report.evaluate(observed, study.params)
         if unannounced:
             without = scores.leave_goals_out(recordings, study.params.plane)
@@ -118,7 +120,7 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
     mismatches = report.find_label_mismatches(data, observed)
     differ = 'the label differs from the recorded path'
     print_messages('foc_ros evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
-    answer |= {'failed': failed, 'labels_not_taken': mismatches}
+    answer |= {'failed': failed, 'warnings': warnings, 'labels_not_taken': mismatches}
     write_report(data.resolve().name, answer, recordings, study.params)
     study.show(answer, report.make_tables(answer), answer['verdict'], EVALUATION_PAGE)
     return 2 if failed else 0

@@ -125,7 +125,7 @@ def write_evaluation(
         *tables,
     ]
     failed = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
-    warnings = [*warn_of_few(answer['recordings'], 'recordings'), *failed]
+    warnings = [*answer['warnings'], *warn_of_few(answer['recordings'], 'recordings'), *failed]
     write_page(directory, EVALUATION_PAGE, f'Evaluation: {title}', sections, warnings, config)
 
 

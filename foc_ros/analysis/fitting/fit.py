@@ -20,7 +20,7 @@ from foc_ros.analysis.evaluation.observations import GAP, ObservedRecording, ask
 from foc_ros.analysis.evaluation.positions import compute_position_scores
 from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S, OURS
 from foc_ros.analysis.evaluation.scores import find_mean, score_forecasts
-from foc_ros.analysis.evaluation.truth import RecordedHand, read_hand
+from foc_ros.analysis.evaluation.truth import RecordedHand, read_hand, warn_of_several_movements
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
@@ -79,6 +79,7 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     if not hands:
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
     fit.recordings, usable = len(hands), {each.name: recordings[each.name] for each in hands}
+    fit.warnings += warn_of_several_movements((each.name, each.path) for each in hands)
     for step in (fit_estimator, fit_fading, fit_duration, fit_wait):
         fit.take(step(hands, fit.config))
     if config.foc.strategy == 'fixed':
