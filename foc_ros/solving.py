@@ -158,8 +158,8 @@ def solve_classes(
     >>> import foc_ros
     >>> for candidate in foc_ros.solve_classes((0, 0), (0.3, 0), [foc_ros.Circle((0.15, 0.01), radius=0.03)]):
     ...     print(candidate)
-    <PredictedCandidate goal0:-0, solved, likelihood 0.66>
-    <PredictedCandidate goal0:+0, solved, likelihood 0.34>
+    <PredictedCandidate goal0: right of 0, solved, likelihood 0.66>
+    <PredictedCandidate goal0: left of 0, solved, likelihood 0.34>
     """
     table = _collect_goals(goal)
     scene = _build_scene(start, table, obstacles, _fix_parameters(config, eta, strategy, duration_s))

@@ -182,6 +182,7 @@ def test_a_prediction_is_the_sequence_of_its_candidates(predicted):
     nothing = prediction()
     assert len(nothing) == 0 and nothing, 'a prediction without candidates is one all the same'
     first = predicted.candidates[0]
+    assert repr(first).startswith(f'<PredictedCandidate {first.description}, ')
     assert all(len(repr(each)) < 100 for each in (predicted, first, first.candidate, first.solution, *predicted.goals))
 
 

@@ -173,7 +173,7 @@ def test_the_lead_of_the_goal_that_was_reached_is_described():
     words = describe_lead(build_hand_trajectory(made), snapshots)
     # the most likely candidate always leads to goal0, where the hand arrives
     assert words.startswith(
-        f'{len(snapshots)} predictions were made. The hand moved to a goal 1 times, for 0.8 s; this goal was the most '
+        f'{len(snapshots)} predictions were made. The hand moved to a goal once, for 0.8 s; this goal was the most '
     )
     assert 'most likely one from 0.8 s before the arrival' in words
     others = [replace(each, candidates=each.candidates[::-1]) for each in snapshots]

@@ -221,8 +221,9 @@ def describe_lead(hand: HandTrajectory, snapshots: Sequence[Prediction]) -> str:
     if not leads:
         return f'{len(snapshots)} predictions were made; no movement ended at a goal.'
     median, duration_s = np.median(leads, axis=0).tolist()
+    times = f'{len(leads)} times, for {duration_s:.1f} s each' if len(leads) > 1 else f'once, for {duration_s:.1f} s'
     return (
-        f'{len(snapshots)} predictions were made. The hand moved to a goal {len(leads)} times, for {duration_s:.1f} s; this goal '
+        f'{len(snapshots)} predictions were made. The hand moved to a goal {times}; this goal '
         f'was the most likely one from {median:.1f} s before the arrival on (medians).'
     )
 

@@ -60,8 +60,8 @@ class PredictedCandidate:
     height: HeightTrajectory | None = None
 
     def __repr__(self) -> str:
-        """Say label, status and likelihood."""
-        return f'<PredictedCandidate {self.label}, {self.status.value}, likelihood {self.likelihood:.2f}>'
+        """Say the class in words, status and likelihood."""
+        return f'<PredictedCandidate {self.description}, {self.status.value}, likelihood {self.likelihood:.2f}>'
 
     def with_goal_name(self, name: str) -> PredictedCandidate:
         """Return the candidate with a name for its goal, for its description."""

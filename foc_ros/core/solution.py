@@ -111,8 +111,8 @@ class Candidate(Record):
     goal_name: str = ''
 
     def __repr__(self) -> str:
-        """Say label and length."""
-        return f'<Candidate {self.label}, {self.length:.3g} m>'
+        """Say the class in words and the length."""
+        return f'<Candidate {self.description}, {self.length:.3g} m>'
 
     @property
     def description(self) -> str:

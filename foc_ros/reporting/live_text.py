@@ -57,7 +57,8 @@ def show_live(console: Console | None = None) -> Iterator[Show]:
             drawing = Text(draw_scene(snapshot, hand, bounds))
             live.update(Group(drawing, Text(LEGEND), _make_table(snapshot, heading)), refresh=True)
             return
-        goals, shown = len(snapshot.goal_positions), snapshot.candidates_with_likelihood
+        goals = len(snapshot.goal_positions)
+        shown = sorted(snapshot.candidates_with_likelihood, key=lambda each: -each.likelihood)
         listed = [f'{100 * each.likelihood:.0f} % {describe_candidate(each, goals)}' for each in shown[:2]]
         line = f'{heading}   {"   ".join(listed) or "no solved candidate"}'
         console.print(line, highlight=False, soft_wrap=True, markup=False)

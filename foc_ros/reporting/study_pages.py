@@ -36,7 +36,7 @@ FEW = 20
 """Number of recordings or trials below which a page warns."""
 AHEAD_S, LEVEL = '0.5', '0.9'
 """The time ahead [s] and the probability of a region that the summary of an evaluation is about."""
-NAT = 'the unit of a natural logarithm of a probability. 0.69 nat more mean twice the probability for what really happened.'
+NAT = 'the unit of a natural logarithm of a probability. 0.69 nat more means twice the probability for what really happened.'
 EVALUATION_WORDS = {
     'nat': NAT,
     'above uniform': 'compared with a guess that finds all answers equally likely. 0 is no better than this; more is better.',
@@ -131,7 +131,9 @@ def write_evaluation(
 
 def summarise_evaluation(answer: Mapping[str, Any]) -> list[str]:
     """Return the main results of `evaluate --json` in plain words."""
-    sentences = [f'{answer["recordings"]} recordings were predicted, at {answer["predictions"]} moments on the way.']
+    count = answer['recordings']
+    words = f'{count} recording{"s were" if count > 1 else " was"} predicted'
+    sentences = [f'{words}, at {answer["predictions"]} moments on the way.']
     questions = {PATH_CLASS: 'path past the obstacles', GOAL: 'goal', GAP: 'gap in the next row of obstacles'}
     for name, asked in questions.items():
         if name in answer['questions']:
@@ -168,7 +170,7 @@ def _draw_tenths(axes: Any, name: str, by_predictor: Mapping[str, Any]) -> None:
         if predictor != UNIFORM:
             heights = [each[score] if each[score] is not None else float('nan') for each in scores['by_tenth']]
             axes.plot(range(1, TENTHS + 1), heights, label=predictor, **_find_look(predictor, by_predictor))
-    axes.set(xlabel='tenth of the distance', xticks=range(1, TENTHS + 1))
+    axes.set(xlabel=f'tenth of the {"distance" if name == GAP else "movement"}', xticks=range(1, TENTHS + 1))
     axes.set_ylabel('share of true answers' if name == GAP else 'log-likelihood above uniform [nat]')
     axes.axhline(0.0, color='0.4', linewidth=0.8)
 

@@ -191,7 +191,7 @@ def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
     for baseline, each in comparisons.items():
         low, high = each['interval'] or (0.0, 0.0)
         alike = unknown if each['interval'] else f'by one recording {unknown}'
-        worse = each['worse_tenths']
+        worse = each['worse_tenths'] if each['interval'] else []  # the tenths of one recording are no evidence
         runs = np.split(worse, np.flatnonzero(np.diff(worse) > 1) + 1)
         tenths = ', '.join(' to '.join(str(end) for end in dict.fromkeys((run[0], run[-1]))) for run in runs if len(run))
         where = f', worse in tenths {tenths}' if 0 < len(worse) < TENTHS else ''
