@@ -57,7 +57,7 @@ def whole(tmp_path_factory):
 
 
 def test_reaches_past_an_obstacle_are_scored_by_class(whole):
-    assert whole['recordings'] == 3 and whole['failed'] == {} and whole['predictions'] >= 12
+    assert whole['recordings'] == 3 and whole['failed'] == {} and whole['warnings'] == [] and whole['predictions'] >= 12
     assert set(whole['questions']) == {'way', 'gap'}
     by_class = whole['questions']['way']
     assert by_class['uniform']['gain'] == 0.0 and by_class['uniform']['log_likelihood'] == pytest.approx(np.log(0.5))
