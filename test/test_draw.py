@@ -17,6 +17,7 @@ from matplotlib.patches import Circle, Ellipse
 from report_samples import START_NS, prediction, widen
 
 from foc_ros import Config, replay
+from foc_ros.core.errors import FocWarning
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT, Status
 from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, GHOST_COLOUR, get_candidate_style
@@ -231,6 +232,19 @@ def test_a_plot_survives_subplots_and_savefig(name, tmp_path):
         assert not any(box.overlaps(other) for other in others)
     assert axes.get_window_extent(renderer).height > 50.0
     assert given is not None or boxes[1].y0 < 20.0, 'no empty room in a figure of its own'
+    plt.close('all')
+
+
+def test_a_legend_that_nobody_could_read_is_left_out_and_this_is_told(tmp_path):
+    figure = plt.figure(figsize=(8.0, 6.0))
+    made = prediction(START_NS, NOWHERE)
+    for axes in figure.subplots(2, 2).flat:
+        with pytest.warns(FocWarning, match=r'a legend has no room in axes of [\d.]+ x [\d.]+ in, .* would have 3\.\d pt'):
+            plot_prediction(made, axes)
+    figure.tight_layout()
+    figure.savefig(tmp_path / 'plot.png')
+    assert len(figure.axes) == 4
+    assert all(axes.get_window_extent().height > 150.0 for axes in figure.axes)
     plt.close('all')
 
 

@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from foc_ros.core.errors import warn
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.types import Array
 
@@ -24,6 +25,8 @@ from .views import SLOTS, HandTrajectory, build_snapshot, find_entered
 WIDTH_IN = 6.4
 SIZE_PT, COLUMNS = 7.5, 70
 """Size of the text, where there is room for it [pt], and characters in a line of a candidate."""
+LEAST_PT = 4.0
+"""Size of the text below which nobody can read it, and the legend is left out [pt]."""
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
 _PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
@@ -56,7 +59,7 @@ def _describe_trouble(snapshot: Prediction) -> str | None:
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     """Draw a prediction with its obstacles and goals, on axes of a new pyplot figure by default; return the axes.
 
-    The legend takes a part of their place.
+    The legend takes a part of their place. It is left out, with a FocWarning, where nobody could read it.
     """
     import matplotlib.pyplot as plt
 
@@ -108,6 +111,8 @@ def _get_height(bounds: Bounds) -> float:
 def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> None:
     """Write all that is drawn on axes into a legend, in a part of their place; a second call replaces it.
 
+    One that nobody could read is left out, with a warning.
+
     is_added: whether the figure becomes higher by it; otherwise the text is as small as the place needs.
     """
     from matplotlib.lines import Line2D
@@ -142,6 +147,10 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
         height_in += wanted_in
     wanted_in = min(wanted_in, 0.5 * height_in)
     size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (LINE * max(lines, 1)))
+    if size_pt < LEAST_PT:
+        reason = f'a legend has no room in axes of {width_in:.1f} x {height_in:.1f} in, where its text would have {size_pt:.1f} pt'
+        warn('; '.join(filter(None, [title, f'{reason}: it is left out; draw in larger axes'])))
+        return
     below = _take_place(axes, slot, place, height_in, wanted_in)
     below.set(gid=name)
     below.axis('off')
