@@ -239,7 +239,7 @@ def test_a_legend_that_nobody_could_read_is_left_out_and_this_is_told(tmp_path):
     figure = plt.figure(figsize=(8.0, 6.0))
     made = prediction(START_NS, NOWHERE)
     for axes in figure.subplots(2, 2).flat:
-        with pytest.warns(FocWarning, match=r'a legend has no room in axes of [\d.]+ x [\d.]+ in, .* would have 3\.\d pt'):
+        with pytest.warns(FocWarning, match=r'no room for a legend in axes of [\d.]+ x [\d.]+ in, .* would have [34]\.\d pt'):
             plot_prediction(made, axes)
     figure.tight_layout()
     figure.savefig(tmp_path / 'plot.png')

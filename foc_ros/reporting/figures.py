@@ -25,7 +25,7 @@ from .views import SLOTS, HandTrajectory, build_snapshot, find_entered
 WIDTH_IN = 6.4
 SIZE_PT, COLUMNS = 7.5, 70
 """Size of the text, where there is room for it [pt], and characters in a line of a candidate."""
-LEAST_PT = 4.0
+LEAST_PT = 5.0
 """Size of the text below which nobody can read it, and the legend is left out [pt]."""
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
@@ -148,7 +148,7 @@ def draw_legend(axes: Any, title: str | None = None, is_added: bool = False) -> 
     wanted_in = min(wanted_in, 0.5 * height_in)
     size_pt = min(size_pt, 72.0 * (wanted_in - 0.05) / (LINE * max(lines, 1)))
     if size_pt < LEAST_PT:
-        reason = f'a legend has no room in axes of {width_in:.1f} x {height_in:.1f} in, where its text would have {size_pt:.1f} pt'
+        reason = f'no room for a legend in axes of {width_in:.1f} x {height_in:.1f} in, its text would have {size_pt:.1f} pt'
         warn('; '.join(filter(None, [title, f'{reason}: it is left out; draw in larger axes'])))
         return
     below = _take_place(axes, slot, place, height_in, wanted_in)
