@@ -61,7 +61,7 @@ class Deadline:
         self._is_cancelled[0] = 1
 
     def share(self, is_cancelled: bytearray | mmap) -> None:
-        """Keep in this memory whether it is cancelled, for instance in one that another process reads."""
+        """Store the cancellation in one byte of given memory, which another process may read."""
         before, self._is_cancelled = self._is_cancelled, is_cancelled
         is_cancelled[0] |= before[0]
 

@@ -45,7 +45,7 @@ class InputError(FocError):
         self.got = got
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let it pass from one process to another."""
+        """Allow pickling: the constructor takes other arguments than the text of the message."""
         return type(self), (self.field, self.expected, self.got), vars(self)
 
 

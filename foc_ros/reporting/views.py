@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from foc_ros.core.learning.movements import find_movements, measure_speed
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.clearance import GRAZE_M
 from foc_ros.core.obstacles.geometry import find_holders, find_offset
@@ -29,8 +30,6 @@ COLOURS, SLOTS = 6, 12
 """Numbers of colours, and of the letters that tell candidates apart: the letters beyond F have the same colours again."""
 NOTED, LIKELY = 0.01, 0.05
 """Likelihoods from which a candidate is worth mentioning, and from which its ellipses are drawn."""
-ONSET_SPEED, PAUSE_S, LEAST_M = 0.05, 0.15, 0.03
-"""Speed [m/s] above which the hand counts as moving, longest pause within a movement, and its least extent."""
 
 
 def build_snapshot(prediction: Prediction) -> Prediction:
@@ -171,14 +170,8 @@ class HandTrajectory(Record):
 
     @cached_property
     def speed(self) -> Array:
-        """Speed (n,) [m/s]: central differences over an interval that suppresses sensor noise and is short beside a reach."""
-        if not len(self.stamps_ns):
-            return np.zeros(0)
-        times = self.seconds_after(int(self.stamps_ns[0]))
-        begins, ends = (np.clip(times + shift, times[:1], times[-1:]) for shift in (-0.05, 0.05))
-        moved = [np.interp(ends, times, axis) - np.interp(begins, times, axis) for axis in self.positions.T]
-        speed: Array = np.hypot(*moved) / np.where(ends > begins, ends - begins, np.inf)
-        return speed
+        """Speed (n,) [m/s]."""
+        return measure_speed(self.stamps_ns, self.positions)
 
     def seconds_after(self, origin_ns: int) -> Array:
         """Return the times (n,) [s] of the samples after an origin."""
@@ -199,13 +192,7 @@ class HandTrajectory(Record):
 
     def find_movements(self) -> list[tuple[int, int]]:
         """Return start and end [ns] of every movement."""
-        rows = np.flatnonzero(self.speed > ONSET_SPEED)
-        breaks = np.flatnonzero(np.diff(self.stamps_ns[rows]) > PAUSE_S * NANOSECONDS)
-        return [
-            (int(self.stamps_ns[each[0]]), int(self.stamps_ns[each[-1]]))
-            for each in np.split(rows, breaks + 1)
-            if len(each) and np.ptp(self.positions[each[0] : each[-1] + 1], axis=0).max() > LEAST_M
-        ]
+        return find_movements(self.stamps_ns, self.positions)
 
 
 def build_hand_trajectory(samples: Sequence[HandSample]) -> HandTrajectory:

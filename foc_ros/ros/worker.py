@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 the foc_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A process that computes predictions: the threads of the node, among them guidance, do not wait for Python's lock meanwhile."""
+"""A process that computes predictions, so that the threads of the node, such as guidance, need not wait for Python's lock."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from foc_ros.core.tracks import Tracks
 class Worker:
     """Computes one prediction at a time in a process that is forked from this one, and so knows all parts registered so far.
 
-    Begin it while this process has one thread. Outside of Linux, where libraries do not bear to be forked, predictions are
-    computed here, and so they are once the process is gone; `warn` is then called with a text.
+    Begin it while this process has one thread. Outside of Linux, where some libraries cannot be forked, predictions are computed
+    in this process. The same happens once the other process is gone; `warn` is then called with a text.
     """
 
     def __init__(self, config: Config, warn: Callable[[str], object]) -> None:

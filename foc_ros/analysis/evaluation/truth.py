@@ -18,7 +18,7 @@ from foc_ros.core.classes.rows import WALL, Rows, locate_rows
 from foc_ros.core.config import Config, EstimatorConfig
 from foc_ros.core.errors import RecordingError
 from foc_ros.core.hand.kalman import Update, update
-from foc_ros.core.learning.movements import AT_GOAL_M, find_reached_goal
+from foc_ros.core.learning.movements import AT_GOAL_M, find_goal_at_end, find_movements, find_reached_goal
 from foc_ros.core.obstacle_table import Obstacles
 from foc_ros.core.obstacles.geometry import measure_offsets
 from foc_ros.core.solution import LEFT, RIGHT
@@ -30,8 +30,6 @@ HORIZONS_S = (0.25, 0.5, 1.0)
 """Those of them that are reported."""
 HORIZONS = np.searchsorted(TIMES_S, HORIZONS_S)
 MIN_SAMPLES = 10
-REST_M, REST_S = 0.005, 0.2
-"""A hand is at rest where it is no farther away [m] some time later [s]."""
 
 Bools = NDArray[np.bool_]
 Sides = NDArray[np.int8]
@@ -69,12 +67,9 @@ class RecordedPath:
         return cls(np.array([each.stamp_ns for each in samples]), np.array([each.position for each in samples]), goals, goal)
 
     def count_arrivals(self) -> int:
-        """Return how often the hand came from elsewhere to rest at a goal; an end at a goal counts as a rest."""
-        distance = np.hypot(*(self.positions[:, None] - self.goals).transpose(2, 0, 1)).min(axis=1)
-        later = np.searchsorted(self.stamps_ns, self.stamps_ns + round(REST_S * NANOSECONDS)).clip(max=len(distance) - 1)
-        is_near = distance <= AT_GOAL_M
-        is_resting = is_near & (np.hypot(*(self.positions[later] - self.positions).T) <= REST_M)
-        return int((np.diff(is_resting[is_resting | ~is_near].astype(int)) > 0).sum())
+        """Return how many movements of the hand end at a goal."""
+        arrived = [self.positions[self.stamps_ns <= end_ns] for _, end_ns in find_movements(self.stamps_ns, self.positions)]
+        return sum(find_goal_at_end(each, self.goals)[1] <= AT_GOAL_M for each in arrived)
 
     def interpolate(self, stamp_ns: int, seconds: Array) -> Array:
         """Return the positions (h, 2) [m] some seconds (h,) after a stamp, nan beyond the end."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from foc_ros.core.classes.library import MOST_STATES, STEP_S, Demonstration, record_demonstration
 from foc_ros.core.errors import RecordingError
@@ -119,6 +120,35 @@ class Movements(Record):
 
 AT_GOAL_M = 0.05
 """A path that ends no farther from a goal than this ends at it [m]."""
+
+
+ONSET_SPEED, PAUSE_S, LEAST_M = 0.05, 0.15, 0.03
+"""Speed [m/s] above which the hand counts as moving, longest pause within a movement, and its least extent."""
+
+
+def measure_speed(stamps_ns: NDArray[np.int64], positions: Array) -> Array:
+    """Return the speed (n,) [m/s] of a hand at positions (n, 2) [m].
+
+    These are central differences over an interval that suppresses sensor noise and is short beside a reach.
+    """
+    if not len(stamps_ns):
+        return np.zeros(0)
+    times = (stamps_ns - stamps_ns[0]) / NANOSECONDS
+    begins, ends = (np.clip(times + shift, times[:1], times[-1:]) for shift in (-0.05, 0.05))
+    moved = [np.interp(ends, times, axis) - np.interp(begins, times, axis) for axis in positions.T]
+    speed: Array = np.hypot(*moved) / np.where(ends > begins, ends - begins, np.inf)
+    return speed
+
+
+def find_movements(stamps_ns: NDArray[np.int64], positions: Array) -> list[tuple[int, int]]:
+    """Return start and end [ns] of every movement of a hand at positions (n, 2) [m]."""
+    rows = np.flatnonzero(measure_speed(stamps_ns, positions) > ONSET_SPEED)
+    breaks = np.flatnonzero(np.diff(stamps_ns[rows]) > PAUSE_S * NANOSECONDS)
+    return [
+        (int(stamps_ns[each[0]]), int(stamps_ns[each[-1]]))
+        for each in np.split(rows, breaks + 1)
+        if len(each) and np.ptp(positions[each[0] : each[-1] + 1], axis=0).max() > LEAST_M
+    ]
 
 
 def find_reached_goal(positions: Array, goals: Array) -> tuple[int | None, int]:
