@@ -20,7 +20,6 @@ from .obstacles.clearance import is_free, measure_clearance
 from .obstacles.risk import centre_trajectories
 from .ocp.problem import Problem, group_by_response
 from .ocp.solve import solve_problems
-from .ocp.solver import MOST_ITERATIONS
 from .ocp.start import Start, cold_start, warm_start
 from .prediction import PredictedCandidate
 from .solution import Candidate, Solution, Status, label_class
@@ -32,6 +31,8 @@ SHORTEST_M = 1e-6
 """Lower limit of a distance in ratios [m]: a micrometre."""
 NO_NUMBER = 2**31
 """In place of the number of a class that is not followed: larger than all of them."""
+LEFT_BEHIND = 3.0
+"""The hand has left an earlier solution if it costs more than this times as much to follow it from where the hand is now."""
 DETOUR = 64.0 / 9.0
 """Effort of going aside over that of going straight, see `compute_detour_effort`."""
 
@@ -66,25 +67,22 @@ def solve_candidates(
 
 
 def _begin(candidates: Sequence[Candidate], problems: Sequence[Problem], earlier: Sequence[Solution | None]) -> list[Start]:
-    """Return the earlier solution of each candidate as its start, or its guess where that passes an obstacle on another side.
+    """Return the earlier solution of each candidate as its start, or its guess.
 
-    Where the earlier solution ran out of time or iterations, the start has both; one that was postponed goes on.
+    An earlier solution is no start if it passes an obstacle on another side, or if the hand has left it.
     """
     starts = [cold_start(each.guess) for each in candidates]
     for rows in group_by_response(problems):
         known = {row: solution for row in rows if (solution := earlier[row]) is not None}
         for row, start in zip(known, warm_start(list(known.values()), [problems[row] for row in known]), strict=True):
-            starts[row] = start
+            control, solution = start.control, known[row]
+            if control is None or control @ control * problems[row].horizon.dt <= LEFT_BEHIND * solution.effort * solution.dt:
+                starts[row] = start
     sides = find_all_sides([each.path for each in starts], problems)
-    chosen = []
-    for each, start, solution, found in zip(candidates, starts, earlier, sides, strict=True):
-        if not each.contains(found):
-            chosen.append(cold_start(each.guess))
-        elif solution is not None and (solution.status is Status.DEADLINE or solution.qp_solves >= MOST_ITERATIONS):
-            chosen.append(replace(start, guess=each.guess))
-        else:
-            chosen.append(start)
-    return chosen
+    return [
+        start if each.contains(found) else cold_start(each.guess)
+        for each, start, found in zip(candidates, starts, sides, strict=True)
+    ]
 
 
 def find_all_sides(paths: Sequence[Array], problems: Sequence[Problem]) -> list[dict[str, int]]:

@@ -26,6 +26,8 @@ REPEAT = 1.5
 """A class that passes the obstacles as a class to another goal does ranks as if it were this times as long: it adds little."""
 MOST_UNFOLLOWED = 8
 """Number of classes besides the candidates that are looked for, to know what is not followed."""
+LEAST = 4
+"""Number of classes besides the best ones that are looked for whatever the time: each takes a tenth of the time of the first."""
 STAY = 0.95
 """A class of the previous prediction ranks as if it were this times as long: noise does not swap classes of equal length."""
 
@@ -224,24 +226,26 @@ class _Ranking:
             before.append((found.goal, found.signature))
             labels.add(found.label)
 
-        is_late = room > 0 and self._deadline.has_passed
-        others = merge(*self._others)
-        for found in others if room and not is_late else ():
+        is_late, others = False, merge(*self._others)
+        for found in others if room else ():
             self.seen.append(found)
             if len(chosen) >= room and found.key * (1.0 if labels.issuperset(self._followed) else STAY) > chosen[room - 1][0]:
                 break
             add(found)
-            is_late = self._deadline.has_passed
+            is_late = len(chosen) >= LEAST and self._deadline.has_passed
             if is_late:
                 break
         self._scene.notes['search_late'] += is_late
         self.seen += self._bests if is_late else [*self._bests, *self._find_more(others)]
         if self._scene.notes['search_late']:
             # beside others to its goal, a class has to have the same obstacles in its name, so that no class comes twice
-            named = {each.goal: each.named for each in [*bests, *[found for *_, found in chosen]]}
-            for each in self._scene.known:
-                if each.label not in labels and named.get(each.goal) == each.named:
-                    add(each)
+            found_now = [found for *_, found in chosen]
+            named = {each.goal: each.named for each in [*bests, *found_now]}
+            known = [each for each in self._scene.known if each.label not in labels and named.get(each.goal) == each.named]
+            chosen.clear()
+            del before[len(self._shortest) :]
+            for each in sorted([*found_now, *known]):
+                add(each)
         return sorted([*bests, *[found for *_, found in chosen[:room]]])
 
     def _find_more(self, others: Iterable[PathClass]) -> list[PathClass]:

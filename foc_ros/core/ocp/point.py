@@ -18,7 +18,7 @@ from .margin import Contacts, Indices, Margins
 from .minima import find_minima
 from .problem import Problem
 from .solver import LARGEST_RATE, MOST_ITERATIONS, Solver
-from .start import Start, cold_start, follow
+from .start import Start, follow
 
 TOUCHING, TOUCHING_NEAR = 1e-3, 0.05
 """Distance that the mean lacks, relative to the scene, up to which a class has a path, and within which it is looked for."""
@@ -29,8 +29,6 @@ LEAP = 2.0
 TIGHTNESS, HELD_OFF = (1e-4, 1e-2, 1.0, 1e2, 1e4), 0.5
 """How tightly a guess is followed: as the first of these with which the path stays in its class, and farther from the polygons
 than this part of the radii. Tightly followed, a guess takes an effort, and so has a variance, that makes margins meaningless."""
-UNSETTLED_EFFORT = 3.0
-"""Effort relative to that of following the guess. A solution that ran out of time with more is no start: it takes more QPs."""
 
 
 @dataclass
@@ -117,7 +115,7 @@ def solve_at(
     rate = np.array(rates) if is_chance else np.ones(len(problems))
     solver = Solver(margins, wanted, rate, lam, goes_on=deadline.goes_on and is_chance)
     if before is None:
-        control, starts, angles = _begin(margins, problems, starts)
+        control, angles = _begin(margins, problems, starts)
         contacts, multipliers = _stack_forces(starts)
         k = np.array([each.safety_factor for each in starts])
     else:
@@ -130,32 +128,22 @@ def solve_at(
     return Point(solver, now, now.at.factor)
 
 
-def _begin(margins: Margins, problems: Sequence[Problem], starts: Sequence[Start]) -> tuple[Array, list[Start], Array]:
-    """Return the controls (b, 2N) at which the search begins, with their starts, and the swept angles (b, m) of the classes.
-
-    The search begins at the guess where there is no earlier solution, or one that ran out of time with much more effort.
-    """
-    angles, chosen = margins.sweep_steps(np.stack([each.path for each in starts])), list(starts)
-    control, most = np.zeros((len(starts), 2 * margins.steps)), np.full(len(starts), np.inf)
+def _begin(margins: Margins, problems: Sequence[Problem], starts: Sequence[Start]) -> tuple[Array, Array]:
+    """Return the controls (b, 2N) at which the search begins, and the swept angles (b, m) of the classes."""
+    angles, control = margins.sweep_steps(np.stack([each.path for each in starts])), np.zeros((len(starts), 2 * margins.steps))
     for row, (problem, start) in enumerate(zip(problems, starts, strict=True)):
         if start.control is not None:
             control[row] = start.control * problem.horizon.gain
-            most[row] = control[row] @ control[row] / UNSETTLED_EFFORT
-    guesses = [start.path if start.control is None else start.guess for start in starts]
-    rows = np.array([row for row, guess in enumerate(guesses) if guess is not None], dtype=np.intp)
-    followed = _follow_guesses(margins, rows, guesses, angles, most)
-    for row, found in zip(rows.tolist(), followed, strict=True):
-        if found @ found < most[row]:
-            control[row], chosen[row] = found, cold_start(guesses[row])
-    return control, chosen, angles
+    rows = np.array([row for row, start in enumerate(starts) if start.control is None], dtype=np.intp)
+    control[rows] = _follow_guesses(margins, rows, [starts[row].path for row in rows.tolist()], angles[rows])
+    return control, angles
 
 
-def _follow_guesses(margins: Margins, rows: Indices, guesses: Sequence[Array | None], angles: Array, most: Array) -> Array:
+def _follow_guesses(margins: Margins, rows: Indices, guesses: Sequence[Array], angles: Array) -> Array:
     """Return the controls (r, 2N) that follow guesses of problems (r,) no more tightly than it takes to stay in their classes.
 
-    guesses (N + 1, 2), angles (b, m) that they sweep, and most (b,): of all problems. No tighter path is tried after a control
-    whose sum of squares is at least `most`, because tighter ones need more. A path that enters a polygon may be nearest to an
-    edge on the wrong side of it.
+    guesses (N + 1, 2), and the angles (r, m) that they sweep. A path that enters a polygon may be nearest to an edge on the wrong
+    side of it.
     """
     control, left = np.zeros((len(rows), 2 * margins.steps)), np.arange(len(rows))
     times, smoothing = 1.0 + np.arange(margins.steps), margins.response.smoothing
@@ -163,15 +151,13 @@ def _follow_guesses(margins: Margins, rows: Indices, guesses: Sequence[Array | N
         if not len(left):
             break
         now = rows[left]
-        where, places = np.repeat(np.arange(len(now)), margins.steps), np.concatenate([guesses[row][1:] for row in now.tolist()])
+        where, places = np.repeat(np.arange(len(now)), margins.steps), np.concatenate([guesses[row][1:] for row in left.tolist()])
         problems, weight = [margins.problems[row] for row in now.tolist()], np.full(len(now), smoothing / tightness)
         control[left] = follow(problems, where, np.tile(times, len(now)), places, weight)
-        is_open = (control[left] ** 2).sum(axis=1) < most[now]
-        left, now = left[is_open], now[is_open]
         motion = margins.move(now, control[left])
         swept, grid = margins.sweep(now, margins.find_path(motion)), margins.measure_grid(now, motion, np.zeros(len(now)))
         least = HELD_OFF * np.sqrt(margins.reach_square[now])[..., None]
-        left = left[~((np.abs(swept - angles[now]) < np.pi).all(axis=1) & (grid.distance > least).all(axis=(1, 2)))]
+        left = left[~((np.abs(swept - angles[left]) < np.pi).all(axis=1) & (grid.distance > least).all(axis=(1, 2)))]
     return control
 
 

@@ -47,8 +47,7 @@ class Start:
     """Where a strategy begins.
 
     path (N + 1, 2): positions at steps 0..N, which tell the homotopy class [m]. A start from an earlier solution also has its
-    stacked control (2N,), its contacts, its safety factor and its lambda; control and lam are None for a guess. guess (N + 1, 2):
-    where the search may begin instead of an earlier solution that ran out of time.
+    stacked control (2N,), its contacts, its safety factor and its lambda; control and lam are None for a guess.
     """
 
     path: Array
@@ -56,7 +55,6 @@ class Start:
     forces: Forces = field(default=NO_FORCES)
     safety_factor: float = 0.0
     lam: float | None = None
-    guess: Array | None = None
 
 
 def cold_start(guess: Array) -> Start:
