@@ -4,8 +4,7 @@
 
 A path is a solid line that begins at the hand, and is the thicker the more likely it is; it is dotted if it is not known to avoid
 the obstacles as surely as wanted. A path that is no proper prediction, because it could not be solved or leads through an
-obstacle, is a ghost: pale, with the reason beside it. Colours are those of Okabe and Ito, which can be told apart without
-perception of hue, and a letter stands beside each.
+obstacle, is a ghost: pale, with the reason beside it. A letter stands beside each colour.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, write_whole
 from foc_ros.ros.messages.ranking import MOST_LETTERS, MOST_NAME_LETTERS, cut, describe_candidate, find_drawn_curve
 
-from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghosts
+from .views import LIKELY, NOTED, SLOTS, HandTrajectory, describe_ghosts
 
 try:
     import matplotlib as mpl
@@ -38,8 +37,8 @@ try:
 except ImportError as error:
     raise FocError("pictures need matplotlib: install python3-matplotlib, or pip install 'foc_ros[report]'") from error
 
-CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')[:COLOURS]
-"""Colours of Okabe and Ito, without yellow (invisible on white) and black (used for the measured hand)."""
+CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#7E57C2', '#8B5A2B', '#C2185B', '#8BC34A')
+"""Those of Okabe and Ito, which differ without perception of hue, but yellow and black, and then further ones."""
 GHOST_COLOUR = '#777777'
 """Colour of a ghost, and of a candidate without a letter."""
 ELLIPSES_PER_CANDIDATE = 8
@@ -87,7 +86,7 @@ def save_figure(figure: Figure, file: Path) -> None:
 
 def get_class_style(number: int) -> tuple[str, str]:
     """Return colour and dash of a line in a chart of numbered things."""
-    return CLASS_COLOURS[number % COLOURS], ('-', '--')[number // COLOURS % 2]
+    return CLASS_COLOURS[number % SLOTS], ('-', '--')[number // SLOTS % 2]
 
 
 def get_letter(slot: int | None) -> str:
@@ -97,7 +96,7 @@ def get_letter(slot: int | None) -> str:
 
 def get_candidate_style(slot: int | None, likelihood: float, is_compromised: bool = False) -> dict[str, Any]:
     """Return the line style of a candidate: the colour of its slot, dotted if compromised, the thicker the more likely."""
-    colour = GHOST_COLOUR if slot is None else CLASS_COLOURS[slot % COLOURS]
+    colour = GHOST_COLOUR if slot is None else CLASS_COLOURS[slot]
     return {'color': colour, 'linestyle': ':' if is_compromised else '-', 'linewidth': 1.2 + 3.0 * likelihood}
 
 

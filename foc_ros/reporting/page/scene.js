@@ -4,11 +4,11 @@
 // that is not known to avoid the obstacles as surely as wanted, dashed a total uncertainty; a pale wide line is a ghost, which is no proper prediction.
 'use strict';
 const FULL = 2 * Math.PI;
-const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9'];
+const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#7E57C2', '#8B5A2B', '#C2185B', '#8BC34A'];
 const LIT = '#E69F00';
 const FORCE = { ink: '--ink', width: 4 };
 const letterOf = (slot) => (slot === null || slot === undefined ? '' : String.fromCharCode(65 + slot));
-const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot % COLOURS.length]);
+const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot]);
 const percent = (share) => (share === null ? '' : share < 0.0005 ? '< 0.1 %' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
 // Likelihood below which a path has no letter, colour or words: those of paths that hardly anybody takes would cover the others.
 const NOTED = 0.01;
