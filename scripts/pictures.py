@@ -50,7 +50,7 @@ from foc_ros.ros.parameters import dump_parameter_file
 sys.path.append(str(ROOT / 'test'))
 
 RECORDING, SCENE = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', ROOT / 'doc' / 'examples' / 'scene.yaml'
-MOVEMENT, AFTER_S = 5, 0.02
+MOVEMENT, AFTER_S = 5, 0.14
 """The movement, counted from 1, and the time after its beginning [s] of the scene: early, with several candidates."""
 SHOWN_MOVEMENTS = (0, 4, 6)
 """Rows of the movements of the recording that the animation shows."""

@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 from importlib.resources import files
-from itertools import combinations, islice
+from itertools import combinations, islice, pairwise
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from foc_ros import Config, replay
 from foc_ros.core.errors import FocWarning
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT, Status
-from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, GHOST_COLOUR, get_candidate_style
+from foc_ros.reporting.draw import GHOST_COLOUR, get_candidate_style
 from foc_ros.reporting.figures import make_scene_figure, plot_prediction, write_picture
 from foc_ros.reporting.views import build_snapshot
 from foc_ros.ros.messages.ranking import find_drawn_curve
@@ -38,13 +38,13 @@ def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dot
     (first, *rest) = made.candidates
     changed = replace(first, solution=replace(first.solution, status=Status.COMPROMISED))
     axes = axes_of(replace(made, candidates=(changed, *rest)))
-    assert legend_of(axes).count('compromised: eta 0.900') == 1
+    assert legend_of(axes).count('avoids less surely than wanted: eta 0.900') == 1
     assert 'dotted: not known to avoid' in legend_of(axes) and 'dotted' not in legend_of(axes_of(made))
     assert [line.get_linestyle() for line in axes.lines if line.get_label().startswith('A')] == [':']
     for status in (Status.DEADLINE, Status.ESTIMATED):
         unfinished = replace(first, solution=replace(first.solution, status=status))
         words = legend_of(axes_of(replace(made, candidates=(unfinished, *rest))))
-        assert words.count('estimated: eta about 0.900') == 1 and 'compromised' not in words
+        assert words.count('estimated: eta about 0.900') == 1 and 'less surely' not in words
 
 
 def axes_of(made):
@@ -175,9 +175,15 @@ def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse
         limits.append((*axes.get_xlim(), *axes.get_ylim()))
         ellipses = [patch for patch in axes.patches if type(patch) is Ellipse]
         dashed = [patch for patch in ellipses if patch.get_linestyle() == '--']
-        assert len(dashed) == (ELLIPSES_PER_CANDIDATE if each is wide else 0)
-        assert len(ellipses) - len(dashed) == 2 * ELLIPSES_PER_CANDIDATE, 'none for the ghost'
+        assert (len(dashed) > 2) is (each is wide)
+        assert len({patch.get_facecolor() for patch in ellipses if patch not in dashed}) == 2, 'none for the ghost'
         assert all(patch.get_facecolor()[3] >= 0.3 for patch in ellipses if patch not in dashed)
+        assert all(axes.bbox.fully_contains(*corner) for patch in dashed for corner in patch.get_extents().get_points())
+        assert all(np.hypot(*np.subtract(one.center, other.center)) > 0.25 * other.width for one, other in pairwise(dashed))
+    assert ['larger ones are left out' in legend_of(axes_of(with_uncertainty(made, factor))) for factor in (1.1, 50.0)] == [
+        False,
+        True,
+    ]
     assert limits[0] == limits[1] == limits[2], 'ellipses beyond the axes are left out'
     left, right, bottom, top = limits[0]
     paths = np.concatenate([each.solution.path for each in made])
@@ -218,9 +224,9 @@ def test_a_plot_survives_subplots_and_savefig(name, tmp_path):
     given, made = layouts()[name], widen(prediction(START_NS, NOWHERE))
     axes = plot_prediction(made, given)
     assert given is None or axes is given
-    count = len(axes.figure.axes)
-    plot_prediction(made, axes)
-    assert len(axes.figure.axes) == count
+    axes.plot([0.0, 0.1], [0.0, 0.1])
+    counts = [(plot_prediction(made, axes), len(axes.figure.axes), len(axes.get_children()))[1:] for _ in range(3)]
+    assert len({*counts}) == 1 and len([text for text in axes.texts if text.get_text() == 'A']) == 1
     axes.figure.savefig(tmp_path / 'plot.png')
     renderer = axes.figure.canvas.get_renderer()
     (below,) = [each for each in axes.figure.axes if each.get_gid() == f'legend {id(axes)}']

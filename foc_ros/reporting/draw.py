@@ -33,6 +33,7 @@ try:
     from matplotlib.colors import to_rgba
     from matplotlib.figure import Figure as Figure
     from matplotlib.patches import Circle, Ellipse, Patch, Polygon
+    from matplotlib.patheffects import withStroke
     from matplotlib.rcsetup import cycler
 except ImportError as error:
     raise FocError("pictures need matplotlib: install python3-matplotlib, or pip install 'foc_ros[report]'") from error
@@ -105,7 +106,7 @@ def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = 
     name = describe_candidate(candidate, goals, MOST_LETTERS)
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
-    found = 'estimated: eta about' if candidate.is_estimated else 'compromised: eta'
+    found = 'estimated: eta about' if candidate.is_estimated else 'avoids less surely than wanted: eta'
     words = '' if candidate.is_solved else f'; {found} {candidate.eta:.3f}'
     return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
 
@@ -115,6 +116,15 @@ def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
     variances, vectors = np.linalg.eigh(covariance)
     stddevs = np.sqrt(np.maximum(variances, 0.0))
     return stddevs[..., 1], stddevs[..., 0], np.degrees(np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1]))
+
+
+def find_apart(centres: Array, greater: Array) -> list[int]:
+    """Return the rows of ellipses that do not lie upon each other, the last one among them; greater: standard deviation (n,)."""
+    kept: list[int] = []
+    for row in reversed(range(len(centres))):
+        if not kept or np.hypot(*(centres[row] - centres[kept[-1]])) > 0.5 * greater[kept[-1]]:
+            kept.append(row)
+    return kept[::-1]
 
 
 def make_stddev_ellipse(centre: Array, covariance: Array) -> Ellipse:
@@ -131,7 +141,7 @@ def make_obstacle_patch(obstacles: Obstacles, row: int, growth: float, **look: A
 
 
 def compute_bounds(
-    obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array, margin: float = 0.04
+    obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array, margin: float = 0.08
 ) -> Bounds:
     """Return limits of x and y [m] around obstacles, goals, paths and further points (m, 2), with a share of them as margin."""
     shapes = find_limits(obstacles, obstacles.radius_stddev)
@@ -166,7 +176,7 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
         name = cut(names[number], MOST_NAME_LETTERS) if names else f'goal{number}'
         side = -1 if len(name) > MOST_NAME_LETTERS / 2 and 2.0 * goal[0] > bounds[0] + bounds[1] else 1  # where it has room
         look = {'xytext': (6 * side, 6), 'textcoords': 'offset points', 'ha': 'left' if side > 0 else 'right'}
-        axes.annotate(name, goal, fontsize=8, zorder=6, **look)
+        axes.annotate(name, goal, fontsize=8, zorder=6, path_effects=[withStroke(linewidth=2.5, foreground='white')], **look)
     axes.set(xlim=bounds[:2], ylim=bounds[2:], xlabel='x [m]', ylabel='y [m]')
     axes.set_aspect('equal')
 
@@ -239,20 +249,24 @@ def _draw_later_obstacles(axes: Any, snapshot: Prediction) -> None:
 def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, total: str) -> None:
     """Draw the ellipses along one path: filled for motor noise, dashed for the total uncertainty; total: its words, if any.
 
-    One that is longer than three quarters of the axes would hide the picture, and is left out.
+    One that is not within the axes is left out: it would be cut, or hide the picture.
     """
     look: dict[str, Any] = {'facecolor': to_rgba(colour, 0.3), 'edgecolor': to_rgba(colour, 0.8)}
     looks = [(candidate.motor_covariance, look | {'label': 'motor noise, one standard deviation'})]
     if total and candidate.solution.motor_covariance is not None:
-        look = {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': total}
-        looks.append((candidate.covariance, look))
-    path, longest = candidate.solution.path, 0.75 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
-    for row in np.unique(np.linspace(0, len(path) - 1, ELLIPSES_PER_CANDIDATE + 1).astype(int))[1:]:
-        for covariance, look in looks:
-            ellipse = make_stddev_ellipse(path[row], covariance[row, :2, :2])
-            if ellipse.width <= longest:
-                ellipse.set(linewidth=0.8, zorder=2, **look)
-                axes.add_patch(ellipse)
+        looks.append((candidate.covariance, {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': total}))
+    rows = np.unique(np.linspace(0, len(candidate.mean) - 1, ELLIPSES_PER_CANDIDATE + 1).astype(int))[1:]
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    for covariances, look in looks:
+        path, covariance = candidate.solution.path[rows], covariances[rows, :2, :2]
+        kept = find_apart(path, compute_ellipse_axes(covariance)[0])
+        room = np.abs(path - [left, bottom]), np.abs(path - [right, top])
+        fits = np.all(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)) <= np.minimum(*room), axis=1)[kept]
+        look['label'] += '' if all(fits) else '; larger ones are left out'
+        for row in np.array(kept)[fits]:
+            ellipse = make_stddev_ellipse(path[row], covariance[row])
+            ellipse.set(linewidth=0.8, zorder=2, **look)
+            axes.add_patch(ellipse)
 
 
 def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: Span) -> None:

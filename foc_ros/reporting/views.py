@@ -122,7 +122,7 @@ def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -
     if not during:
         return None
     sizes = {row: np.linalg.eigvalsh(each.candidates[0].covariance[:, :2, :2]).max() for row, each in during.items()}
-    settled = [row for row, size in sizes.items() if size <= 1.5**2 * np.median(list(sizes.values()))]
+    settled = [row for row, size in sizes.items() if size <= 3.0**2 * np.median(list(sizes.values()))]
     begin, end = (start_ns + share * (end_ns - start_ns) for share in (0.15, 0.6))
     on_the_way = [row for row in settled if begin <= during[row].stamp_ns <= end]
     return max(on_the_way or settled, key=lambda row: count_likely_paths(during[row]))
