@@ -125,9 +125,7 @@ def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_t
     assert [text.split('; ')[0] for text in words] == [each['description'] for each in known['candidates']]
     assert any('right of 1' in each for each in words) and any('leads through obstacle post' in each for each in words)
     (goal, *_), letters = browser.execute_script('return [report.scene.goals, report.scene.letters]')
-    assert letters and min(np.hypot(*(np.array(letters) - goal['place']).T)) >= browser.execute_script(
-        'return 20 * report.scene.unit'
-    )
+    assert letters and min(np.hypot(*(np.array(letters) - goal['place']).T)) > goal['radius']
     kind, text, points = paths[-1]
     assert (kind, browser.execute_script('return report.scene.find(arguments[0])', points[12])) == ('path', text)
     signs = browser.find_element('id', 'signs').text

@@ -180,28 +180,28 @@ class Scene {
     const paths = list.filter(({ ghost }) => !ghost);
     [...paths].reverse().forEach((each) => this.candidate(each, alphaOf(each)));
     this.goals.forEach(({ name, place, up }) => this.text(name, place, ink('--ink'), { size: 11, up, halo: true }));
-    const taken = [...this.words, ...this.goals.map(({ place }) => place)];
-    const given = taken.length;
+    const taken = [...this.words];
+    const isFree = ([x, y]) => this.goals.every(({ place: [u, v], radius }) => Math.hypot(x - u, y - v) > radius + 10 * this.unit);
     for (const each of paths.filter(({ likelihood, slot }) => likelihood >= NOTED && letterOf(slot))) {
       const { slot, path } = each;
       const shares = Array.from({ length: 10 }, (_, row) => 0.3 + 0.05 * ((3 + 2 * slot + row) % 10));
       const places = shares.map((share) => path[Math.round((path.length - 1) * share)]);
       // A hand at its goal leaves no room upon the path.
       const beside = each === paths[0] ? [30, -30].flatMap((up) => places.map(([x, y]) => [x, y + up * this.unit])) : [];
-      const at = takePlace([...places, ...beside], taken, 20 * this.unit);
+      const at = takePlace([...places, ...beside].filter(isFree), taken, 20 * this.unit);
       if (!at) continue;
       this.disc(at, 9 * this.unit, ink('--page'), { filled: 1, width: 0 });
       this.disc(at, 9 * this.unit, colourOf(slot));
       this.text(letterOf(slot), at, ink('--ink'));
     }
-    this.letters = taken.slice(given);
+    this.letters = taken.slice(this.words.length);
   }
 
   goal(place, row, { lit = false, selected = false, radius = 0.009 } = {}) {
     this.disc(place, radius, lit ? LIT : ink('--ink'), { filled: lit ? 0.5 : 0, width: 1.5 });
     if (selected) this.disc(place, 1.3 * radius, COLOURS[0]);
     this.text(lit ? '★' : '☆', place, ink('--ink'), { size: 13 });
-    this.goals.push({ name: `goal${row}`, place, up: radius / this.unit + 8 });
+    this.goals.push({ name: `goal${row}`, place, radius, up: radius / this.unit + 8 });
   }
 
   // Draws lines at round lengths with their lengths [m] at the border.
