@@ -136,7 +136,11 @@ def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it():
     assert depth < made.obstacles.radius[post]  # the words stand where the path is in the obstacle
     lost = made.candidates[-1]
     assert f'- % {lost.description}; {lost.reason}' in legend_of(axes) and lost.status.remedy in legend_of(axes)
-    assert 'goal1: left of 1, right of post; leads through obstacle post' in legend_of(axes)
+    words = 'goal1: left of 1, right of post; leads through obstacle post'
+    assert words in legend_of(axes) and 'below 1 %' not in legend_of(axes)
+    unlikely = [replace(each, likelihood=min(each.likelihood, 0.001)) for each in made.candidates[2:]]
+    text = legend_of(axes_of(replace(made, candidates=(*made.candidates[:2], *unlikely))))
+    assert words not in text and 'below 1 %: leads through obstacle post' in text
 
 
 def test_classes_stand_in_the_legend_in_words_also_those_past_many_obstacles():
@@ -180,7 +184,7 @@ def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse
         assert all(patch.get_facecolor()[3] >= 0.3 for patch in ellipses if patch not in dashed)
         assert all(axes.bbox.fully_contains(*corner) for patch in dashed for corner in patch.get_extents().get_points())
         assert all(np.hypot(*np.subtract(one.center, other.center)) > 0.25 * other.width for one, other in pairwise(dashed))
-    assert ['larger ones are left out' in legend_of(axes_of(with_uncertainty(made, factor))) for factor in (1.1, 50.0)] == [
+    assert [', within the axes' in legend_of(axes_of(with_uncertainty(made, factor))) for factor in (1.1, 50.0)] == [
         False,
         True,
     ]

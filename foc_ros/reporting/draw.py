@@ -107,8 +107,8 @@ def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = 
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
     found = 'estimated: eta about' if candidate.is_estimated else 'avoids less surely than wanted: eta'
-    words = '' if candidate.is_solved else f'; {found} {candidate.eta:.3f}'
-    return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
+    words = f'; {reason}' if reason else '' if candidate.is_solved else f'; {found} {candidate.eta:.3f}'
+    return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}'
 
 
 def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
@@ -212,9 +212,9 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
         axes.plot([], [], linestyle='', label=words, gid='candidate ~')  # the last one
     for number, (each, reason, place) in enumerate(view for view in reversed(views) if view[1]):
         is_noted, curve = not each.has_likelihood or each.likelihood >= NOTED, find_drawn_curve(each)
-        label = describe_in_legend(each, goals, get_letter(slots.get(each.label) if is_noted else None), reason)
+        label = describe_in_legend(each, goals, get_letter(slots.get(each.label)), reason) if is_noted else f'below 1 %: {reason}'
         look = {'color': GHOST_COLOUR, 'linewidth': 4.0 if is_noted else 1.5, 'alpha': 0.3, 'solid_capstyle': 'round'}
-        axes.plot(*curve.T, zorder=2, label=label, gid=order[each.label], **look)
+        axes.plot(*curve.T, zorder=2, label=label, gid=order[each.label] if is_noted else None, **look)
         share = 0.5 + 0.15 * (number % 3) if place is None else place
         if reason not in entered:  # those of one obstacle would cover each other
             look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
@@ -225,16 +225,29 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
 
 
 def draw_letters(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -> None:
-    """Write the letters of the paths, when all else is drawn: each where it covers no text, or where there is most room."""
+    """Write the letters of the paths, when all else is drawn: each where it covers no text or goal, or where there is most room.
+
+    That of the most likely path may stand beside it: a hand at its goal leaves no room upon it.
+    """
     axes.figure.draw_without_rendering()  # texts have places only then
+    point, to_pixels = axes.figure.dpi / 72.0, axes.transData.transform
+    goals = [(at - 5.0 * point, at + 5.0 * point) for at in to_pixels(snapshot.goal_positions.reshape(-1, 2))]
     for each, (ghost, _) in zip(snapshot, describe_ghosts(snapshot), strict=True):
         if not ghost and each.likelihood >= NOTED and each.label in slots:
             slot, path = slots[each.label], each.solution.path
             places = path[[round(share * (len(path) - 1)) for share in 0.3 + 0.05 * ((3 + 2 * slot + np.arange(10)) % 10)]]
-            points, room = axes.transData.transform(places), np.full(len(places), ROOM_PT * axes.figure.dpi / 72.0)
-            for low, high in (text.get_window_extent().get_points() for text in axes.texts):
+            points = to_pixels(places)
+            if each is snapshot.candidates[0]:
+                points = np.concatenate([points + np.array([0.0, up * point]) for up in (0.0, 2.0 * ROOM_PT, -2.0 * ROOM_PT)])
+            room = np.full(len(points), ROOM_PT * point)
+            for low, high in (*goals, *(text.get_window_extent().get_points() for text in axes.texts)):
                 room = np.minimum(room, np.linalg.norm(np.maximum(0.0, np.maximum(low - points, points - high)), axis=1))
-            draw_tag(axes, places[np.argmax(room)], get_letter(slot), get_candidate_style(slot, each.likelihood)['color'])
+            draw_tag(
+                axes,
+                axes.transData.inverted().transform(points[np.argmax(room)]),
+                get_letter(slot),
+                get_candidate_style(slot, each.likelihood)['color'],
+            )
 
 
 def _draw_later_obstacles(axes: Any, snapshot: Prediction) -> None:
@@ -249,7 +262,7 @@ def _draw_later_obstacles(axes: Any, snapshot: Prediction) -> None:
 def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, total: str) -> None:
     """Draw the ellipses along one path: filled for motor noise, dashed for the total uncertainty; total: its words, if any.
 
-    One that is not within the axes is left out: it would be cut, or hide the picture.
+    Of the total uncertainty, what is not within the axes is left out: it would be cut, or hide the picture.
     """
     look: dict[str, Any] = {'facecolor': to_rgba(colour, 0.3), 'edgecolor': to_rgba(colour, 0.8)}
     looks = [(candidate.motor_covariance, look | {'label': 'motor noise, one standard deviation'})]
@@ -260,9 +273,10 @@ def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, total:
     for covariances, look in looks:
         path, covariance = candidate.solution.path[rows], covariances[rows, :2, :2]
         kept = find_apart(path, compute_ellipse_axes(covariance)[0])
-        room = np.abs(path - [left, bottom]), np.abs(path - [right, top])
-        fits = np.all(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)) <= np.minimum(*room), axis=1)[kept]
-        look['label'] += '' if all(fits) else '; larger ones are left out'
+        size = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        room = np.minimum(path - [left, bottom], [right, top] - path) if 'fill' in look else np.inf
+        fits = np.all(size <= room, axis=1)[kept]
+        look['label'] += '' if all(fits) else ', within the axes'
         for row in np.array(kept)[fits]:
             ellipse = make_stddev_ellipse(path[row], covariance[row])
             ellipse.set(linewidth=0.8, zorder=2, **look)
