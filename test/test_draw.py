@@ -38,13 +38,13 @@ def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dot
     (first, *rest) = made.candidates
     changed = replace(first, solution=replace(first.solution, status=Status.COMPROMISED))
     axes = axes_of(replace(made, candidates=(changed, *rest)))
-    assert legend_of(axes).count('avoids less surely than wanted: eta 0.900') == 1
+    assert legend_of(axes).count('less sure than wanted: eta 0.900') == 1
     assert 'dotted: not known to avoid' in legend_of(axes) and 'dotted' not in legend_of(axes_of(made))
     assert [line.get_linestyle() for line in axes.lines if line.get_label().startswith('A')] == [':']
     for status in (Status.DEADLINE, Status.ESTIMATED):
         unfinished = replace(first, solution=replace(first.solution, status=status))
         words = legend_of(axes_of(replace(made, candidates=(unfinished, *rest))))
-        assert words.count('estimated: eta about 0.900') == 1 and 'less surely' not in words
+        assert words.count('estimated: eta about 0.900') == 1 and 'less sure' not in words
 
 
 def axes_of(made):

@@ -106,7 +106,7 @@ def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = 
     name = describe_candidate(candidate, goals, MOST_LETTERS)
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
-    found = 'estimated: eta about' if candidate.is_estimated else 'avoids less surely than wanted: eta'
+    found = 'estimated: eta about' if candidate.is_estimated else 'less sure than wanted: eta'
     words = f'; {reason}' if reason else '' if candidate.is_solved else f'; {found} {candidate.eta:.3f}'
     return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}'
 
