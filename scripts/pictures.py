@@ -50,7 +50,7 @@ from foc_ros.ros.parameters import dump_parameter_file
 sys.path.append(str(ROOT / 'test'))
 
 RECORDING, SCENE = ROOT / 'foc_ros' / 'recordings' / 'reaching.mcap', ROOT / 'doc' / 'examples' / 'scene.yaml'
-MOVEMENT, AFTER_S = 5, 0.02
+MOVEMENT, AFTER_S = 5, 0.14
 """The movement, counted from 1, and the time after its beginning [s] of the scene: early, with several candidates."""
 SHOWN_MOVEMENTS = (0, 4, 6)
 """Rows of the movements of the recording that the animation shows."""
@@ -117,7 +117,7 @@ def draw_likelihoods(axes: Any, tracks: CandidateTracks, origin_ns: int) -> None
     times = (np.array([each.stamp_ns for each in tracks.snapshots]) - origin_ns) / NANOSECONDS
     drawn = {track: values for track, values in tracks.likelihoods().items() if track in tracks.slots}
     for rank, (track, (first, values)) in enumerate(drawn.items()):
-        colour = draw.CLASS_COLOURS[tracks.slots[track] % len(draw.CLASS_COLOURS)]
+        colour = draw.CLASS_COLOURS[tracks.slots[track]]
         axes.plot(times[first : first + len(values)], values, color=colour, linewidth=1.8, marker='.', markersize=2.5)
         known = np.flatnonzero(np.isfinite(values))
         row = known[(2 * rank + 1) * len(known) // (2 * len(drawn))]

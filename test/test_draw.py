@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 from importlib.resources import files
-from itertools import combinations, islice
+from itertools import combinations, islice, pairwise
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from foc_ros import Config, replay
 from foc_ros.core.errors import FocWarning
 from foc_ros.core.obstacle_table import make_obstacles
 from foc_ros.core.solution import LEFT, RIGHT, Status
-from foc_ros.reporting.draw import ELLIPSES_PER_CANDIDATE, GHOST_COLOUR, get_candidate_style
+from foc_ros.reporting.draw import GHOST_COLOUR, get_candidate_style
 from foc_ros.reporting.figures import make_scene_figure, plot_prediction, write_picture
 from foc_ros.reporting.views import build_snapshot
 from foc_ros.ros.messages.ranking import find_drawn_curve
@@ -32,19 +32,19 @@ NOWHERE = np.zeros(2)
 def test_the_likely_candidate_is_the_thickest_and_a_compromised_one_alone_is_dotted_and_says_its_eta():
     widths = [get_candidate_style(0, likelihood)['linewidth'] for likelihood in np.linspace(0.0, 1.0, 20)]
     assert np.all(np.diff(widths) > 0.0)
-    assert {get_candidate_style(slot, 0.5)['linestyle'] for slot in (None, 0, 5, 6, 11)} == {'-'}
+    assert {get_candidate_style(slot, 0.5)['linestyle'] for slot in (None, 0, 5, 9)} == {'-'}
     assert get_candidate_style(0, 0.5, is_compromised=True)['linestyle'] == ':'
     made = prediction(START_NS, NOWHERE)
     (first, *rest) = made.candidates
     changed = replace(first, solution=replace(first.solution, status=Status.COMPROMISED))
     axes = axes_of(replace(made, candidates=(changed, *rest)))
-    assert legend_of(axes).count('compromised: eta 0.900') == 1
+    assert legend_of(axes).count('less sure than wanted: eta 0.900') == 1
     assert 'dotted: not known to avoid' in legend_of(axes) and 'dotted' not in legend_of(axes_of(made))
     assert [line.get_linestyle() for line in axes.lines if line.get_label().startswith('A')] == [':']
     for status in (Status.DEADLINE, Status.ESTIMATED):
         unfinished = replace(first, solution=replace(first.solution, status=status))
         words = legend_of(axes_of(replace(made, candidates=(unfinished, *rest))))
-        assert words.count('estimated: eta about 0.900') == 1 and 'compromised' not in words
+        assert words.count('estimated: eta about 0.900') == 1 and 'less sure' not in words
 
 
 def axes_of(made):
@@ -136,7 +136,11 @@ def test_a_path_through_an_obstacle_is_a_ghost_with_its_reason_beside_it():
     assert depth < made.obstacles.radius[post]  # the words stand where the path is in the obstacle
     lost = made.candidates[-1]
     assert f'- % {lost.description}; {lost.reason}' in legend_of(axes) and lost.status.remedy in legend_of(axes)
-    assert 'goal1: left of 1, right of post; leads through obstacle post' in legend_of(axes)
+    words = 'goal1: left of 1, right of post; leads through obstacle post'
+    assert words in legend_of(axes) and 'below 1 %' not in legend_of(axes)
+    unlikely = [replace(each, likelihood=min(each.likelihood, 0.001)) for each in made.candidates[2:]]
+    text = legend_of(axes_of(replace(made, candidates=(*made.candidates[:2], *unlikely))))
+    assert words not in text and 'below 1 %: leads through obstacle post' in text
 
 
 def test_classes_stand_in_the_legend_in_words_also_those_past_many_obstacles():
@@ -175,9 +179,15 @@ def test_only_the_most_likely_candidate_has_its_total_uncertainty_and_no_ellipse
         limits.append((*axes.get_xlim(), *axes.get_ylim()))
         ellipses = [patch for patch in axes.patches if type(patch) is Ellipse]
         dashed = [patch for patch in ellipses if patch.get_linestyle() == '--']
-        assert len(dashed) == (ELLIPSES_PER_CANDIDATE if each is wide else 0)
-        assert len(ellipses) - len(dashed) == 2 * ELLIPSES_PER_CANDIDATE, 'none for the ghost'
+        assert (len(dashed) > 2) is (each is wide)
+        assert len({patch.get_facecolor() for patch in ellipses if patch not in dashed}) == 2, 'none for the ghost'
         assert all(patch.get_facecolor()[3] >= 0.3 for patch in ellipses if patch not in dashed)
+        assert all(axes.bbox.fully_contains(*corner) for patch in dashed for corner in patch.get_extents().get_points())
+        assert all(np.hypot(*np.subtract(one.center, other.center)) > 0.25 * other.width for one, other in pairwise(dashed))
+    assert [', within the axes' in legend_of(axes_of(with_uncertainty(made, factor))) for factor in (1.1, 50.0)] == [
+        False,
+        True,
+    ]
     assert limits[0] == limits[1] == limits[2], 'ellipses beyond the axes are left out'
     left, right, bottom, top = limits[0]
     paths = np.concatenate([each.solution.path for each in made])
@@ -218,9 +228,9 @@ def test_a_plot_survives_subplots_and_savefig(name, tmp_path):
     given, made = layouts()[name], widen(prediction(START_NS, NOWHERE))
     axes = plot_prediction(made, given)
     assert given is None or axes is given
-    count = len(axes.figure.axes)
-    plot_prediction(made, axes)
-    assert len(axes.figure.axes) == count
+    axes.plot([0.0, 0.1], [0.0, 0.1])
+    counts = [(plot_prediction(made, axes), len(axes.figure.axes), len(axes.get_children()))[1:] for _ in range(3)]
+    assert len({*counts}) == 1 and len([text for text in axes.texts if text.get_text() == 'A']) == 1
     axes.figure.savefig(tmp_path / 'plot.png')
     renderer = axes.figure.canvas.get_renderer()
     (below,) = [each for each in axes.figure.axes if each.get_gid() == f'legend {id(axes)}']

@@ -124,6 +124,8 @@ def test_paths_begin_at_the_hand_and_are_named_in_words_in_the_table_and_under_t
     )
     assert [text.split('; ')[0] for text in words] == [each['description'] for each in known['candidates']]
     assert any('right of 1' in each for each in words) and any('leads through obstacle post' in each for each in words)
+    (goal, *_), letters = browser.execute_script('return [report.scene.goals, report.scene.letters]')
+    assert letters and min(np.hypot(*(np.array(letters) - goal['place']).T)) > goal['radius']
     kind, text, points = paths[-1]
     assert (kind, browser.execute_script('return report.scene.find(arguments[0])', points[12])) == ('path', text)
     signs = browser.find_element('id', 'signs').text
@@ -145,6 +147,20 @@ def test_a_path_below_one_percent_has_neither_letter_nor_colour(browser, report)
     browser.execute_script(MOVE, browser.execute_script('return report.state.frame'))
     assert browser.execute_script(f'{letter}.textContent') == ''
     assert browser.execute_script(f'{letter}.style.borderColor') != before
+
+
+def test_the_chart_of_speeds_holds_the_lines_of_the_paths_with_letters(browser, report):
+    show(browser, report / 'index.html')
+    for number in range(0, 40, 8):
+        browser.execute_script(MOVE, number)
+        found = browser.execute_script("""
+            const { charts: { speeds }, state, data } = report;
+            const lines = [...speeds.box.querySelectorAll('g[data-name] > path')].map((each) => each.getAttribute('d'));
+            return [lines.map((each) => each.split(/[ML]/).slice(1).map((at) => Number(at.split(' ')[1]))), speeds.base];""")
+        letters = browser.execute_script("return document.querySelectorAll('#candidates .letter:not(:empty)').length")
+        lines, base = found
+        assert len(lines) == letters + 2, 'and the hand before and later'
+        assert all(6.0 < y <= base + 0.01 for line in lines for y in line)
 
 
 def test_letters_of_the_chart_of_likelihoods_do_not_lie_over_each_other(browser, report):

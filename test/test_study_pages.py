@@ -23,11 +23,20 @@ from foc_ros.core.errors import InputError, RecordingError
 from foc_ros.core.solution import Status
 from foc_ros.io.bags import TYPESTORE, BagReader
 from foc_ros.reporting import study_pages
-from foc_ros.reporting.draw import save_figure
-from foc_ros.reporting.page import Section, write_page
+from foc_ros.reporting.draw import CLASS_COLOURS, save_figure
+from foc_ros.reporting.page import FOLDER, Section, write_page
 from foc_ros.reporting.study_pages import FEW, draw_example, warn_of_few
 from foc_ros.reporting.study_pages import write_fit as write_report
-from foc_ros.reporting.views import HandTrajectory, Slots, build_hand_trajectory, build_snapshot, is_late, read_snapshot
+from foc_ros.reporting.views import (
+    SLOTS,
+    HandTrajectory,
+    Slots,
+    build_candidate_tracks,
+    build_hand_trajectory,
+    build_snapshot,
+    is_late,
+    read_snapshot,
+)
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
 from foc_ros.ros.messages.ranking import compute_cost_ratios
 
@@ -187,18 +196,24 @@ def test_letters_and_colours_differ_while_there_are_any_and_are_kept_over_an_abs
     assert slots.assign(range(6)) == list(range(6)), 'in order of likelihood'
     assert slots.assign([7, 3]) == [6, 3], 'a letter that has been free for longest'
     assert slots.assign([3, 0, 8]) == [3, 0, 7]
-    assert slots.assign([8, 0, 9]) == [7, 0, 8], 'and of another colour'
-    many = slots.assign(range(20, 33))
-    assert sorted(many[:12]) == list(range(12)) and many[12] is None
-    assert len({slot % 6 for slot in many[:6]}) == 6
-    assert slots.assign([3])[0] in range(12)
+    many = slots.assign(range(20, 31))
+    assert sorted(many[:SLOTS]) == list(range(SLOTS)) and many[SLOTS] is None
+    assert slots.assign([3])[0] in range(SLOTS) and len({*CLASS_COLOURS}) == SLOTS
+    assert str([*CLASS_COLOURS]) in (FOLDER / 'scene.js').read_text(encoding='utf-8'), 'pages have the same ones'
 
 
-def test_a_class_that_comes_back_has_its_letter_only_if_its_colour_is_free():
-    slots = Slots()
-    assert slots.assign([0, 1]) == [0, 1]
-    assert slots.assign([2, 3, 4, 5, 6, 7]) == [2, 3, 4, 5, 6, 7]
-    assert slots.assign([6, 0, 1]) == [6, 8, 1]
+def test_paths_below_one_percent_take_no_letter_from_others_and_keep_their_own():
+    made = build_snapshot(prediction(START_NS, np.zeros(2)))
+    shares = np.array([[*(SLOTS * [0.001]), 0.99], [*(SLOTS * [0.1]), 0.0], [0.005, *((SLOTS - 1) * [0.11]), 0.0]])
+    ways = [
+        replace(made.candidates[0], candidate=replace(made.candidates[0].candidate, label=f'{way}'), way=way)
+        for way in range(SLOTS + 1)
+    ]
+    given = [tuple(replace(each, likelihood=share) for each, share in zip(ways, row, strict=True)) for row in shares.tolist()]
+    tracks = build_candidate_tracks([replace(made, candidates=each) for each in given])
+    assert [tracks.slots.get(each) for each in tracks.tracks[0].values()] == [*(SLOTS * [None]), 0]
+    assert {tracks.slots[tracks.tracks[1][f'{way}']] for way in range(SLOTS)} == set(range(SLOTS))
+    assert tracks.tracks[2] == tracks.tracks[1]
 
 
 def test_a_page_that_cannot_be_written_to_its_end_leaves_the_earlier_one(tmp_path):

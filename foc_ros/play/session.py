@@ -282,7 +282,7 @@ class Session:
             self._tasks.note_most_likely(stamp_ns * 1e-9, prediction.candidates[0].way)
         if hand is not None and not self._is_blind:
             ways = [each['way'] for each in view.candidates if (each['likelihood'] or 0.0) >= NOTED]
-            slots = dict(zip(ways, self._slots.assign(ways), strict=True))  # unlikely ones would take the colours of others
+            slots = dict(zip(ways, self._slots.assign(ways), strict=True))
             candidates = [each | {'slot': slots.get(each['way'])} for each in view.candidates]
             shares = {'unknown': round(prediction.unknown, 4), 'other': round(prediction.other, 4)}
             self._say('prediction', t=hand.t, event=hand.event, candidates=candidates, **shares)

@@ -4,8 +4,7 @@
 
 A path is a solid line that begins at the hand, and is the thicker the more likely it is; it is dotted if it is not known to avoid
 the obstacles as surely as wanted. A path that is no proper prediction, because it could not be solved or leads through an
-obstacle, is a ghost: pale, with the reason beside it. Colours are those of Okabe and Ito, which can be told apart without
-perception of hue, and a letter stands beside each.
+obstacle, is a ghost: pale, with the reason beside it. A letter stands beside each colour.
 """
 
 from __future__ import annotations
@@ -27,19 +26,20 @@ from foc_ros.core.types import Array
 from foc_ros.io.outputs import MARK, write_whole
 from foc_ros.ros.messages.ranking import MOST_LETTERS, MOST_NAME_LETTERS, cut, describe_candidate, find_drawn_curve
 
-from .views import COLOURS, LIKELY, NOTED, HandTrajectory, describe_ghosts
+from .views import LIKELY, NOTED, SLOTS, HandTrajectory, describe_ghosts
 
 try:
     import matplotlib as mpl
     from matplotlib.colors import to_rgba
     from matplotlib.figure import Figure as Figure
     from matplotlib.patches import Circle, Ellipse, Patch, Polygon
+    from matplotlib.patheffects import withStroke
     from matplotlib.rcsetup import cycler
 except ImportError as error:
     raise FocError("pictures need matplotlib: install python3-matplotlib, or pip install 'foc_ros[report]'") from error
 
-CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')[:COLOURS]
-"""Colours of Okabe and Ito, without yellow (invisible on white) and black (used for the measured hand)."""
+CLASS_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#7E57C2', '#8B5A2B', '#C2185B', '#8BC34A')
+"""Those of Okabe and Ito, which differ without perception of hue, but yellow and black, and then further ones."""
 GHOST_COLOUR = '#777777'
 """Colour of a ghost, and of a candidate without a letter."""
 ELLIPSES_PER_CANDIDATE = 8
@@ -87,7 +87,7 @@ def save_figure(figure: Figure, file: Path) -> None:
 
 def get_class_style(number: int) -> tuple[str, str]:
     """Return colour and dash of a line in a chart of numbered things."""
-    return CLASS_COLOURS[number % COLOURS], ('-', '--')[number // COLOURS % 2]
+    return CLASS_COLOURS[number % SLOTS], ('-', '--')[number // SLOTS % 2]
 
 
 def get_letter(slot: int | None) -> str:
@@ -97,7 +97,7 @@ def get_letter(slot: int | None) -> str:
 
 def get_candidate_style(slot: int | None, likelihood: float, is_compromised: bool = False) -> dict[str, Any]:
     """Return the line style of a candidate: the colour of its slot, dotted if compromised, the thicker the more likely."""
-    colour = GHOST_COLOUR if slot is None else CLASS_COLOURS[slot % COLOURS]
+    colour = GHOST_COLOUR if slot is None else CLASS_COLOURS[slot]
     return {'color': colour, 'linestyle': ':' if is_compromised else '-', 'linewidth': 1.2 + 3.0 * likelihood}
 
 
@@ -106,9 +106,9 @@ def describe_in_legend(candidate: PredictedCandidate, goals: int, letter: str = 
     name = describe_candidate(candidate, goals, MOST_LETTERS)
     if not candidate.has_likelihood:
         return f'{letter}    - %  {name}; {candidate.reason}'
-    found = 'estimated: eta about' if candidate.is_estimated else 'compromised: eta'
-    words = '' if candidate.is_solved else f'; {found} {candidate.eta:.3f}'
-    return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}{f"; {reason}" if reason else ""}'
+    found = 'estimated: eta about' if candidate.is_estimated else 'less sure than wanted: eta'
+    words = f'; {reason}' if reason else '' if candidate.is_solved else f'; {found} {candidate.eta:.3f}'
+    return f'{letter}  {100 * candidate.likelihood:3.0f} %  {name}{words}'
 
 
 def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
@@ -116,6 +116,15 @@ def compute_ellipse_axes(covariance: Array) -> tuple[Array, Array, Array]:
     variances, vectors = np.linalg.eigh(covariance)
     stddevs = np.sqrt(np.maximum(variances, 0.0))
     return stddevs[..., 1], stddevs[..., 0], np.degrees(np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1]))
+
+
+def find_apart(centres: Array, greater: Array) -> list[int]:
+    """Return the rows of ellipses that do not lie upon each other, the last one among them; greater: standard deviation (n,)."""
+    kept: list[int] = []
+    for row in reversed(range(len(centres))):
+        if not kept or np.hypot(*(centres[row] - centres[kept[-1]])) > 0.5 * greater[kept[-1]]:
+            kept.append(row)
+    return kept[::-1]
 
 
 def make_stddev_ellipse(centre: Array, covariance: Array) -> Ellipse:
@@ -132,7 +141,7 @@ def make_obstacle_patch(obstacles: Obstacles, row: int, growth: float, **look: A
 
 
 def compute_bounds(
-    obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array, margin: float = 0.04
+    obstacles: Obstacles, goals: Array, candidates: Sequence[PredictedCandidate], *points: Array, margin: float = 0.08
 ) -> Bounds:
     """Return limits of x and y [m] around obstacles, goals, paths and further points (m, 2), with a share of them as margin."""
     shapes = find_limits(obstacles, obstacles.radius_stddev)
@@ -167,7 +176,7 @@ def draw_scene(axes: Any, obstacles: Obstacles, goals: Array, bounds: Bounds, na
         name = cut(names[number], MOST_NAME_LETTERS) if names else f'goal{number}'
         side = -1 if len(name) > MOST_NAME_LETTERS / 2 and 2.0 * goal[0] > bounds[0] + bounds[1] else 1  # where it has room
         look = {'xytext': (6 * side, 6), 'textcoords': 'offset points', 'ha': 'left' if side > 0 else 'right'}
-        axes.annotate(name, goal, fontsize=8, zorder=6, **look)
+        axes.annotate(name, goal, fontsize=8, zorder=6, path_effects=[withStroke(linewidth=2.5, foreground='white')], **look)
     axes.set(xlim=bounds[:2], ylim=bounds[2:], xlabel='x [m]', ylabel='y [m]')
     axes.set_aspect('equal')
 
@@ -203,9 +212,9 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
         axes.plot([], [], linestyle='', label=words, gid='candidate ~')  # the last one
     for number, (each, reason, place) in enumerate(view for view in reversed(views) if view[1]):
         is_noted, curve = not each.has_likelihood or each.likelihood >= NOTED, find_drawn_curve(each)
-        label = describe_in_legend(each, goals, get_letter(slots.get(each.label) if is_noted else None), reason)
+        label = describe_in_legend(each, goals, get_letter(slots.get(each.label)), reason) if is_noted else f'below 1 %: {reason}'
         look = {'color': GHOST_COLOUR, 'linewidth': 4.0 if is_noted else 1.5, 'alpha': 0.3, 'solid_capstyle': 'round'}
-        axes.plot(*curve.T, zorder=2, label=label, gid=order[each.label], **look)
+        axes.plot(*curve.T, zorder=2, label=label, gid=order[each.label] if is_noted else None, **look)
         share = 0.5 + 0.15 * (number % 3) if place is None else place
         if reason not in entered:  # those of one obstacle would cover each other
             look = {'fontsize': 7, 'color': '0.35', 'xytext': (0, 5), 'textcoords': 'offset points', 'ha': 'center', 'zorder': 6}
@@ -216,16 +225,29 @@ def draw_candidates(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -
 
 
 def draw_letters(axes: Any, snapshot: Prediction, slots: Mapping[str, int]) -> None:
-    """Write the letters of the paths, when all else is drawn: each where it covers no text, or where there is most room."""
+    """Write the letters of the paths, when all else is drawn: each where it covers no text or goal, or where there is most room.
+
+    That of the most likely path may stand beside it: a hand at its goal leaves no room upon it.
+    """
     axes.figure.draw_without_rendering()  # texts have places only then
+    point, to_pixels = axes.figure.dpi / 72.0, axes.transData.transform
+    goals = [(at - 5.0 * point, at + 5.0 * point) for at in to_pixels(snapshot.goal_positions.reshape(-1, 2))]
     for each, (ghost, _) in zip(snapshot, describe_ghosts(snapshot), strict=True):
         if not ghost and each.likelihood >= NOTED and each.label in slots:
             slot, path = slots[each.label], each.solution.path
             places = path[[round(share * (len(path) - 1)) for share in 0.3 + 0.05 * ((3 + 2 * slot + np.arange(10)) % 10)]]
-            points, room = axes.transData.transform(places), np.full(len(places), ROOM_PT * axes.figure.dpi / 72.0)
-            for low, high in (text.get_window_extent().get_points() for text in axes.texts):
+            points = to_pixels(places)
+            if each is snapshot.candidates[0]:
+                points = np.concatenate([points + np.array([0.0, up * point]) for up in (0.0, 2.0 * ROOM_PT, -2.0 * ROOM_PT)])
+            room = np.full(len(points), ROOM_PT * point)
+            for low, high in (*goals, *(text.get_window_extent().get_points() for text in axes.texts)):
                 room = np.minimum(room, np.linalg.norm(np.maximum(0.0, np.maximum(low - points, points - high)), axis=1))
-            draw_tag(axes, places[np.argmax(room)], get_letter(slot), get_candidate_style(slot, each.likelihood)['color'])
+            draw_tag(
+                axes,
+                axes.transData.inverted().transform(points[np.argmax(room)]),
+                get_letter(slot),
+                get_candidate_style(slot, each.likelihood)['color'],
+            )
 
 
 def _draw_later_obstacles(axes: Any, snapshot: Prediction) -> None:
@@ -240,20 +262,25 @@ def _draw_later_obstacles(axes: Any, snapshot: Prediction) -> None:
 def _draw_ellipses(axes: Any, candidate: PredictedCandidate, colour: str, total: str) -> None:
     """Draw the ellipses along one path: filled for motor noise, dashed for the total uncertainty; total: its words, if any.
 
-    One that is longer than three quarters of the axes would hide the picture, and is left out.
+    Of the total uncertainty, what is not within the axes is left out: it would be cut, or hide the picture.
     """
     look: dict[str, Any] = {'facecolor': to_rgba(colour, 0.3), 'edgecolor': to_rgba(colour, 0.8)}
     looks = [(candidate.motor_covariance, look | {'label': 'motor noise, one standard deviation'})]
     if total and candidate.solution.motor_covariance is not None:
-        look = {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': total}
-        looks.append((candidate.covariance, look))
-    path, longest = candidate.solution.path, 0.75 * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
-    for row in np.unique(np.linspace(0, len(path) - 1, ELLIPSES_PER_CANDIDATE + 1).astype(int))[1:]:
-        for covariance, look in looks:
-            ellipse = make_stddev_ellipse(path[row], covariance[row, :2, :2])
-            if ellipse.width <= longest:
-                ellipse.set(linewidth=0.8, zorder=2, **look)
-                axes.add_patch(ellipse)
+        looks.append((candidate.covariance, {'fill': False, 'edgecolor': colour, 'linestyle': '--', 'label': total}))
+    rows = np.unique(np.linspace(0, len(candidate.mean) - 1, ELLIPSES_PER_CANDIDATE + 1).astype(int))[1:]
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    for covariances, look in looks:
+        path, covariance = candidate.solution.path[rows], covariances[rows, :2, :2]
+        kept = find_apart(path, compute_ellipse_axes(covariance)[0])
+        size = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        room = np.minimum(path - [left, bottom], [right, top] - path) if 'fill' in look else np.inf
+        fits = np.all(size <= room, axis=1)[kept]
+        look['label'] += '' if all(fits) else ', within the axes'
+        for row in np.array(kept)[fits]:
+            ellipse = make_stddev_ellipse(path[row], covariance[row])
+            ellipse.set(linewidth=0.8, zorder=2, **look)
+            axes.add_patch(ellipse)
 
 
 def draw_hand(axes: Any, hand: HandTrajectory, now_ns: int, span: Span) -> None:

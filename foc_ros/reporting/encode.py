@@ -21,7 +21,7 @@ from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.types import NANOSECONDS, Array
 from foc_ros.ros.messages.ranking import compute_cost_ratios, describe_candidate, find_drawn_curve, find_drawn_curves
 
-from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Span, compute_bounds, compute_ellipse_axes
+from .draw import ELLIPSES_PER_CANDIDATE, NAMED_OBSTACLES, Span, compute_bounds, compute_ellipse_axes, find_apart
 from .views import (
     LIKELY,
     NOTED,
@@ -146,8 +146,7 @@ def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
     if not shown:
         return []
     mean, times = np.stack([each.mean for each in shown]), np.stack([each.times for each in shown])
-    points, marks = select_evenly(mean.shape[1], PATH_POINTS), select_evenly(mean.shape[1], ELLIPSES_PER_CANDIDATE + 1)[1:]
-    ellipses = _encode_ellipses(mean[:, marks, :2], np.stack([each.motor_covariance[marks, :2, :2] for each in shown]))
+    points = select_evenly(mean.shape[1], PATH_POINTS)
     is_widened = shown[0].solution.motor_covariance is not None
     columns = {
         **_encode_points(find_drawn_curves(shown).swapaxes(0, 1), PATH_POINTS),
@@ -165,8 +164,10 @@ def encode_candidates(snapshot: Prediction) -> list[dict[str, Any]]:
             'eta': round_number(each.eta),
             'compromised': not each.is_solved,
             **{name: values[row] for name, values in columns.items()},
-            'motor': ellipses[row] if (row == 0 or each.likelihood >= LIKELY) and not each.is_estimated else [],
-            'total': _encode_ellipses(mean[0, marks, :2], each.covariance[marks, :2, :2]) if row == 0 and is_widened else [],
+            'motor': _encode_ellipses(each, each.motor_covariance)
+            if (row == 0 or each.likelihood >= LIKELY) and not each.is_estimated
+            else [],
+            'total': _encode_ellipses(each, each.covariance) if row == 0 and is_widened else [],
         }
         for row, (each, ratio, (ghost, ghost_at)) in enumerate(described)
     ]
@@ -206,8 +207,10 @@ def select_evenly(count: int, most: int) -> np.ndarray[tuple[int], np.dtype[np.i
     return rows
 
 
-def _encode_ellipses(centres: Array, covariance: Array) -> list[Any]:
-    values = np.stack((centres[..., 0], centres[..., 1], *compute_ellipse_axes(covariance)), axis=-1)
+def _encode_ellipses(candidate: PredictedCandidate, covariance: Array) -> list[Any]:
+    marks = select_evenly(len(candidate.mean), ELLIPSES_PER_CANDIDATE + 1)[1:]
+    centres, axes = candidate.mean[marks, :2], compute_ellipse_axes(covariance[marks, :2, :2])
+    values = np.column_stack((centres, *axes))[find_apart(centres, axes[0])]
     return _quantise(values, np.array([LENGTH, LENGTH, LENGTH, LENGTH, 1.0]))
 
 

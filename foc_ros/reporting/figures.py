@@ -29,6 +29,8 @@ LEAST_PT = 5.0
 """Size of the text below which nobody can read it, and the legend is left out [pt]."""
 LINE = 1.35
 """Height of a line, in parts of the size of its text."""
+_DRAWN: WeakKeyDictionary[Any, set[Any]] = WeakKeyDictionary()
+"""What `plot_prediction` drew on axes."""
 _PLACES: WeakKeyDictionary[Any, tuple[Any, Any]] = WeakKeyDictionary()
 """Subplot and place of axes before a legend took a part of it."""
 
@@ -59,7 +61,8 @@ def _describe_trouble(snapshot: Prediction) -> str | None:
 def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     """Draw a prediction with its obstacles and goals, on axes of a new pyplot figure by default; return the axes.
 
-    The legend takes a part of their place. It is left out, with a FocWarning, where nobody could read it.
+    What an earlier call drew on them is replaced. The legend takes a part of their place. It is left out, with a FocWarning,
+    where nobody could read it.
     """
     import matplotlib.pyplot as plt
 
@@ -69,7 +72,11 @@ def plot_prediction(prediction: Prediction, axes: Any = None) -> Any:
     with plt.rc_context(draw.STYLE):
         if axes is None:
             axes = plt.figure(figsize=(WIDTH_IN, _get_height(bounds)), layout='constrained').subplots()
+        for earlier in _DRAWN.pop(axes, set()) & {*axes.get_children()}:  # those that are there still
+            earlier.remove()
+        others = {*axes.get_children()}
         draw_snapshot(axes, snapshot, bounds, hand, is_alone)
+        _DRAWN[axes] = {*axes.get_children()} - others
     return axes
 
 

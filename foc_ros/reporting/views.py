@@ -26,8 +26,8 @@ from foc_ros.ros.messages.decode_poses import decode_frame, decode_stamp
 from foc_ros.ros.messages.encode_prediction import CLOUD_ROW, LIKELIHOOD_COLUMNS, OTHER, STATUSES, UNKNOWN
 from foc_ros.ros.messages.ranking import find_drawn_curves, order_candidates
 
-COLOURS, SLOTS = 6, 12
-"""Numbers of colours, and of the letters that tell candidates apart: the letters beyond F have the same colours again."""
+SLOTS = 10
+"""Number of the letters, each with a colour, that tell candidates apart."""
 NOTED, LIKELY = 0.01, 0.05
 """Likelihoods from which a candidate is worth mentioning, and from which its ellipses are drawn."""
 
@@ -122,7 +122,7 @@ def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -
     if not during:
         return None
     sizes = {row: np.linalg.eigvalsh(each.candidates[0].covariance[:, :2, :2]).max() for row, each in during.items()}
-    settled = [row for row, size in sizes.items() if size <= 1.5**2 * np.median(list(sizes.values()))]
+    settled = [row for row, size in sizes.items() if size <= 3.0**2 * np.median(list(sizes.values()))]
     begin, end = (start_ns + share * (end_ns - start_ns) for share in (0.15, 0.6))
     on_the_way = [row for row in settled if begin <= during[row].stamp_ns <= end]
     return max(on_the_way or settled, key=lambda row: count_likely_paths(during[row]))
@@ -231,7 +231,7 @@ class CandidateTracks:
 
 
 class Slots:
-    """Gives each class a slot of letter and colour, kept over an absence unless a present class has slot or colour."""
+    """Gives each class a slot of letter and colour, kept over an absence unless a present class has it."""
 
     def __init__(self) -> None:
         self._owners: dict[int, int] = {}
@@ -239,15 +239,14 @@ class Slots:
         self._turn = 0
 
     def assign(self, ways: Sequence[int]) -> list[int | None]:
-        """Return the slots of classes, by their numbers, most likely first: of a colour of its own if there is one, or None."""
+        """Return the slots of classes, by their numbers, most likely first; None where all are taken."""
         self._turn += 1
         slots = {way: slot for slot, way in self._owners.items() if way in ways and self._used[slot] == self._turn - 1}
         for way in ways:
-            colours = {slot % COLOURS for slot in slots.values()}
             free = [slot for slot in range(SLOTS) if slot not in slots.values()]
             if way not in slots and free:
                 own = self._owners.get
-                slots[way] = min(free, key=lambda slot: (slot % COLOURS in colours, own(slot) != way, self._used[slot], slot))
+                slots[way] = min(free, key=lambda slot: (own(slot) != way, self._used[slot], slot))
                 self._owners = {slot: owner for slot, owner in self._owners.items() if owner != way} | {slots[way]: way}
         for slot in slots.values():
             self._used[slot] = self._turn
@@ -255,12 +254,13 @@ class Slots:
 
 
 def build_candidate_tracks(snapshots: Sequence[Prediction]) -> CandidateTracks:
-    """Return the candidates of successive snapshots by track, which lasts as long as its class has one letter."""
-    given, numbers, tracks = Slots(), dict[tuple[int, int | None], int](), list[dict[str, int]]()
+    """Return the candidates of successive snapshots by track, which lasts until its class has another letter."""
+    given, last, numbers, tracks = Slots(), dict[int, int | None](), dict[tuple[int, int | None], int](), list[dict[str, int]]()
     for snapshot in snapshots:
         shown = snapshot.candidates_with_likelihood
-        ways = [each.way for each in shown]
-        keys = zip(ways, given.assign(ways), strict=True)
+        ways = [each.way for each in shown if each.likelihood >= NOTED]  # unlikely ones would take the colours of others
+        last |= zip(ways, given.assign(ways), strict=True)
+        keys = [(each.way, last.get(each.way)) for each in shown]
         found = [numbers.setdefault(key, len(numbers)) for key in keys]
         tracks.append({each.label: track for each, track in zip(shown, found, strict=True)})
     return CandidateTracks(snapshots, tracks, {track: slot for (_, slot), track in numbers.items() if slot is not None})

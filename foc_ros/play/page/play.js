@@ -98,7 +98,7 @@ function draw(now) {
     name: `${row}`, x: each.x, y: each.y, radius: each.radius || 0, stddev: settings.radius_stddev, corners: cornersOf(each),
   }, each === view.selected));
   view.scene.goals.forEach((goal, row) => scene.goal([goal.x, goal.y], row, { lit: view.goal === row, selected: goal === view.selected, radius: settings.target_radius }));
-  if (!view.hidden) scene.candidates(view.candidates);
+  scene.candidates(view.hidden ? [] : view.candidates);
   const { position, target, force } = hand;
   if (!view.hidden) { // the distance between pointer and hand tells whether there is guidance
     if (Math.hypot(...force) > 0.01) scene.line([position, position.map((value, axis) => value + METRES_PER_NEWTON * force[axis])], ink(FORCE.ink), FORCE.width);

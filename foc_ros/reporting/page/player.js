@@ -16,7 +16,7 @@ const slotAt = (track, row) => (track !== undefined && shareOf(track, row) >= NO
 const shareOf = (track, row) => { const value = data.tracks[track].share[row - data.tracks[track].first]; return value === undefined ? null : value; };
 // Above this number of points, the likelihoods are drawn without marks.
 const MOST_MARKS = 3000;
-const state = { frame: 0, from: 0, to: 0, playing: false, focus: null };
+const state = { frame: 0, from: 0, to: 0, playing: false, focus: null, topSpeed: 1 };
 
 // The row of the first value that is not below a bound.
 const first = (values, least) => { const row = values.findIndex((value) => value >= least); return row < 0 ? values.length : row; };
@@ -86,17 +86,20 @@ function drawLikelihoods() {
   charts.likelihoods.draw({ span: span(), top: 1, lines, hatched, now: frameTimes[state.frame] });
 }
 
+// Returns the candidates of a frame that are worth mentioning.
+const noted = (frame) => frame.candidates.filter(({ track }) => shareOf(track, frame.at) >= NOTED);
+
 function drawSpeeds(frame) {
   const now = data.times[frame.at];
   const [from, past, to] = [span()[0], now + 1e-6, span()[1] + 1e-6].map((time) => first(hand.t, time));
   const measured = (begin, end) => hand.t.slice(begin, end).map((time, row) => [time, hand.v[begin + row]]);
-  const predicted = [...frame.candidates].reverse().map((each) => {
+  const predicted = noted(frame).reverse().map((each) => {
     const speeds = sums(each.v, SPEED);
-    const points = sums(each.t, TIME).map((time, row) => [now + time, Math.min(speeds[row], topSpeed)]);
+    const points = sums(each.t, TIME).map((time, row) => [now + time, speeds[row]]);
     return { points: points.filter(([time]) => time <= span()[1]), colour: colourOf(slotAt(each.track, frame.at)), dotted: each.compromised, alpha: alphaOf(each.track), width: 1.2 + 2.5 * shareOf(each.track, frame.at) };
   });
   const lines = [...predicted, { points: measured(Math.max(past - 1, from), to), colour: 'var(--soft)', width: 1.5 }, { points: measured(from, past), colour: 'var(--ink)', width: 2.5 }];
-  charts.speeds.draw({ span: span(), top: topSpeed, lines, now });
+  charts.speeds.draw({ span: span(), top: state.topSpeed, lines, now });
 }
 
 function drawTimes() {
@@ -164,6 +167,8 @@ function choose(movement) {
   [state.from, state.to] = framesOf(movement);
   state.focus = null;
   [byId('time').min, byId('time').max] = [state.from, state.to];
+  const fastest = data.frames.slice(state.from, state.to + 1).flatMap(noted).map(({ v }) => Math.max(...sums(v, SPEED)));
+  state.topSpeed = 1.05 * Math.max(0.01, ...fastest, ...hand.v.filter((_, row) => hand.t[row] >= span()[0] && hand.t[row] <= span()[1]));
   state.frame = data.openings[movement < 0 ? data.opened : movement] ?? state.from;
   drawAll();
 }
@@ -202,8 +207,6 @@ function play() {
   requestAnimationFrame(step);
 }
 
-// A few predictions of a strange movement would leave no room for the others.
-const topSpeed = 1.15 * Math.max(0.01, ...hand.v, quantile(data.frames.map((frame) => (frame.candidates.length ? Math.max(...sums(frame.candidates[0].v, SPEED)) : 0)), 0.9));
 if (data.frames.length < data.count) {
   const drawn = data.times.length < data.count ? `${data.times.length} of them` : 'all of them';
   byId('decimated').textContent = `The slider stops at ${data.frames.length} of the ${data.count} predictions; likelihoods are drawn for ${drawn}. `;

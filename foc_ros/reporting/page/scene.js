@@ -4,11 +4,11 @@
 // that is not known to avoid the obstacles as surely as wanted, dashed a total uncertainty; a pale wide line is a ghost, which is no proper prediction.
 'use strict';
 const FULL = 2 * Math.PI;
-const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9'];
+const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#7E57C2', '#8B5A2B', '#C2185B', '#8BC34A'];
 const LIT = '#E69F00';
 const FORCE = { ink: '--ink', width: 4 };
 const letterOf = (slot) => (slot === null || slot === undefined ? '' : String.fromCharCode(65 + slot));
-const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot % COLOURS.length]);
+const colourOf = (slot) => (slot === null || slot === undefined ? ink('--soft') : COLOURS[slot]);
 const percent = (share) => (share === null ? '' : share < 0.0005 ? '< 0.1 %' : `${(100 * share).toFixed(share < 0.0095 ? 1 : 0)} %`);
 // Likelihood below which a path has no letter, colour or words: those of paths that hardly anybody takes would cover the others.
 const NOTED = 0.01;
@@ -26,12 +26,12 @@ function takePlace(places, taken, distance) {
 }
 
 class Scene {
-  // Attributes: paths, what was drawn since `begin`: points [m], text, kind and width of each path, for texts under the pointer; letters,
-  // words: where they are [m], of words beside ghosts several places.
+  // Attributes: paths, what was drawn since `begin`: points [m], text, kind and width of each path, for texts under the pointer; goals: their
+  // names, which are written upon paths; letters, words: where they are [m], of words several places.
   constructor(canvas) {
     this.canvas = canvas;
     this.pen = canvas.getContext('2d');
-    [this.paths, this.words, this.letters] = [[], [], []];
+    [this.paths, this.goals, this.words, this.letters] = [[], [], [], []];
     this.entered = new Set(); // what was written of obstacles that paths lead through
   }
 
@@ -68,7 +68,7 @@ class Scene {
     pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
     pen.setTransform(scale, 0, 0, -scale, origin[0], origin[1]);
     pen.lineJoin = 'round';
-    [this.paths, this.words, this.entered] = [[], [], new Set()];
+    [this.paths, this.goals, this.words, this.entered] = [[], [], [], new Set()];
   }
 
   stroke(colour, width, dash = [], alpha = 1) {
@@ -86,7 +86,6 @@ class Scene {
     this.pen.globalAlpha = 1;
   }
 
-  // Returns the width [m].
   text(words, [x, y], colour, { size = 12, up = 0, halo = false, align = 'center' } = {}) {
     const { pen, origin, scale, pixel } = this;
     pen.save();
@@ -102,7 +101,7 @@ class Scene {
     pen.fillText(words, 0, 0);
     const { width } = pen.measureText(words);
     pen.restore();
-    return width / scale;
+    for (let along = 0; halo && along < width / scale; along += 9 * this.unit) this.words.push([x - width / scale / 2 + along, y + up * this.unit]);
   }
 
   trace(points) {
@@ -153,35 +152,43 @@ class Scene {
       this.stroke(ink('--soft'), width, [], PALE * alpha);
       const [x, y] = path[Math.round((path.length - 1) * (ghostAt ?? place))];
       // Words of one obstacle would cover each other.
-      const length = this.entered.has(ghost) ? 0 : this.text(ghost, [x, y], ink('--soft'), { size: 11, up: 14, halo: true });
-      for (let along = 0; along < length; along += 9 * this.unit) this.words.push([x - length / 2 + along, y + 14 * this.unit]);
+      if (!this.entered.has(ghost)) this.text(ghost, [x, y], ink('--soft'), { size: 11, up: 14, halo: true });
       if (typeof ghostAt === 'number') this.entered.add(ghost);
       return;
     }
-    for (const [x, y, a, b, angle] of motor) {
-      this.pen.beginPath();
-      this.pen.ellipse(x, y, a, b, angle, 0, FULL);
-      this.fill(colour, alpha * (0.2 + 0.2 * likelihood));
-      this.stroke(colour, 0.8, [], 0.8 * alpha);
-    }
-    for (const [x, y, a, b, angle] of total) {
-      this.pen.beginPath();
-      this.pen.ellipse(x, y, a, b, angle, 0, FULL);
-      this.stroke(colour, 1, [5, 4], alpha);
-    }
+    this.ellipses(motor);
+    this.fill(colour, alpha * (0.2 + 0.2 * likelihood)); // once, so that an obstacle is seen under many
+    this.stroke(colour, 0.8, [], 0.8 * alpha);
+    this.ellipses(total);
+    this.stroke(colour, 1, [5, 4], alpha);
     this.trace(path);
     this.stroke(colour, width, compromised ? [1.2 * width, 1.5 * width] : [], alpha);
   }
 
-  // Draws candidates, the most likely last, and upon them letters, those of the most likely first, where there is room; alphaOf: of each.
+  ellipses(list) {
+    this.pen.beginPath();
+    for (const [x, y, a, b, angle] of list) {
+      this.pen.moveTo(x + a * Math.cos(angle), y + a * Math.sin(angle));
+      this.pen.ellipse(x, y, a, b, angle, 0, FULL);
+    }
+  }
+
+  // Draws candidates, the most likely last, and upon them the names of goals and letters, those of the most likely first, where there is
+  // room; alphaOf: of each.
   candidates(list, alphaOf = () => 1) {
     list.filter(({ ghost }) => ghost).forEach((each, row) => this.candidate(each, alphaOf(each), 0.5 + 0.15 * (row % 3)));
     const paths = list.filter(({ ghost }) => !ghost);
     [...paths].reverse().forEach((each) => this.candidate(each, alphaOf(each)));
+    this.goals.forEach(({ name, place, up }) => this.text(name, place, ink('--ink'), { size: 11, up, halo: true }));
     const taken = [...this.words];
-    for (const { slot, path } of paths.filter((each) => each.likelihood >= NOTED && letterOf(each.slot))) {
+    const isFree = ([x, y]) => this.goals.every(({ place: [u, v], radius }) => Math.hypot(x - u, y - v) > radius + 10 * this.unit);
+    for (const each of paths.filter(({ likelihood, slot }) => likelihood >= NOTED && letterOf(slot))) {
+      const { slot, path } = each;
       const shares = Array.from({ length: 10 }, (_, row) => 0.3 + 0.05 * ((3 + 2 * slot + row) % 10));
-      const at = takePlace(shares.map((share) => path[Math.round((path.length - 1) * share)]), taken, 20 * this.unit);
+      const places = shares.map((share) => path[Math.round((path.length - 1) * share)]);
+      // A hand at its goal leaves no room upon the path.
+      const beside = each === paths[0] ? [30, -30].flatMap((up) => places.map(([x, y]) => [x, y + up * this.unit])) : [];
+      const at = takePlace([...places, ...beside].filter(isFree), taken, 20 * this.unit);
       if (!at) continue;
       this.disc(at, 9 * this.unit, ink('--page'), { filled: 1, width: 0 });
       this.disc(at, 9 * this.unit, colourOf(slot));
@@ -194,7 +201,7 @@ class Scene {
     this.disc(place, radius, lit ? LIT : ink('--ink'), { filled: lit ? 0.5 : 0, width: 1.5 });
     if (selected) this.disc(place, 1.3 * radius, COLOURS[0]);
     this.text(lit ? '★' : '☆', place, ink('--ink'), { size: 13 });
-    this.text(`goal${row}`, place, ink('--ink'), { size: 11, up: radius / this.unit + 8, halo: true });
+    this.goals.push({ name: `goal${row}`, place, radius, up: radius / this.unit + 8 });
   }
 
   // Draws lines at round lengths with their lengths [m] at the border.
