@@ -20,7 +20,6 @@ from foc_ros.core.hand.kalman import describe_jump
 from foc_ros.core.obstacle_table import Obstacles, make_obstacles
 from foc_ros.core.obstacles.shapes import Shape, collect_obstacles
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.predict import warm_up
 from foc_ros.core.scene import list_missing_objects
 from foc_ros.core.solution import Goal
 from foc_ros.core.support import check_config, check_number, check_vector, collect_goals, find_shape
@@ -154,8 +153,6 @@ class Predictor:
             source = load_library(str(source))
         if not isinstance(source, Sequence) or not all(isinstance(each, Demonstration) for each in source):
             raise InputError('library', 'a file, or demonstrations', repr(library))
-        if self.config.budget_s:
-            warm_up(self.config)  # imports are no part of the time of the first update
         self._pipeline = Pipeline(self.config, tuple(source), is_timed=False)
         self._obstacles: Obstacles | None = make_obstacles()
         self._goal_names: tuple[str, ...] = ()

@@ -31,7 +31,7 @@ def begin():
 
     def start():
         warnings = []
-        begun.append(Worker(Config(), warnings.append))
+        begun.append(Worker(warnings.append))
         return begun[-1], warnings
 
     yield start
@@ -115,8 +115,8 @@ def test_without_its_process_predictions_go_on_and_this_is_told_once(begin):
 
 def test_it_ends_with_the_process_that_began_it():
     program = (
-        'import os, signal\nfrom foc_ros import Config\nfrom foc_ros.ros.worker import Worker\n'
-        'worker = Worker(Config(), print)\nprint(worker._process.pid, flush=True)\nos.kill(os.getpid(), signal.SIGKILL)'
+        'import os, signal\nfrom foc_ros.ros.worker import Worker\n'
+        'worker = Worker(print)\nprint(worker._process.pid, flush=True)\nos.kill(os.getpid(), signal.SIGKILL)'
     )
     ended = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True, timeout=60.0, check=False)
     assert ended.returncode == -signal.SIGKILL

@@ -8,8 +8,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from .candidates import estimate_unfollowed, estimate_unsolved, is_there, rank_candidates, solve_candidates, split_unknown
 from .classes import Search, SearchOrder, search
 from .classes.library import GuessTiming, recall_demonstrations
@@ -19,12 +17,12 @@ from .goals import compare_goals, find_other_share
 from .learning.dispersion import scale_covariances
 from .learning.learnt import NOTHING, Knowledge
 from .learning.recordings import Library, pool_recordings
-from .obstacle_table import Obstacles, make_obstacles
+from .obstacle_table import Obstacles
 from .plant.models import TripleIntegratorModel, make_plant_model
 from .prediction import PredictedCandidate, Prediction
 from .situation import Situation, prepare_situation
 from .solution import Candidate, Status
-from .tracks import HOLD_S, NO_TRACKS, Track, Tracks, take_remainder
+from .tracks import HOLD_S, Track, Tracks, take_remainder
 from .types import NANOSECONDS, Array, HandState, Unassigned
 
 SEARCH_SHARE, SOLVE_SHARE = 0.3, 0.8
@@ -204,11 +202,3 @@ def _share_likelihood(
         unassigned = Unassigned((1.0 - other) * unknown, other)
     known_share = 1.0 - sum(unassigned)
     return [replace(each, likelihood=known_share * each.likelihood) for each in pooled], unassigned
-
-
-def warm_up(config: Config) -> None:
-    """Predict twice in a made-up scene, so that the first real predictions find the modules loaded and the matrices computed."""
-    obstacles, goals = make_obstacles([[0.15, 0.0]], 0.02, 0.001), np.array([[0.3, 0.0]])
-    hand, tracks = HandState(0, np.zeros(6), np.zeros((6, 6))), NO_TRACKS
-    for _ in range(2):  # the second one begins at a solution
-        _, tracks = predict(config, hand, obstacles, goals, tracks)

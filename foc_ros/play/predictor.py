@@ -17,7 +17,6 @@ from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.guidance.guide import GuidanceOutput
 from foc_ros.core.pipeline import Pipeline
-from foc_ros.core.predict import warm_up
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.solution import Status
 from foc_ros.io.class_library import load_library
@@ -62,7 +61,6 @@ class Predictor:
 
     def start(self) -> None:
         """Begin to predict."""
-        warm_up(self._intake.pipeline.config)
         self._guidance.set_released(False)
         self._guidance.start()
         self._thread.start()

@@ -50,11 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             check_parameter_files(given)
     except FocError as error:
         return print_messages('foc_node', list_messages(error))
-    from foc_ros.core.config import Config
-
     from .worker import Worker
 
-    worker = Worker(Config(), lambda text: print(f'foc_node: warning: {text}', file=sys.stderr))
+    worker = Worker(lambda text: print(f'foc_node: warning: {text}', file=sys.stderr))
     import rclpy  # it may start threads, and a process is forked before
     from rclpy.executors import ExternalShutdownException
     from rclpy.signals import SignalHandlerOptions

@@ -32,7 +32,6 @@ from foc_ros.core.config import Config
 from foc_ros.core.deadline import Deadline
 from foc_ros.core.errors import FocError
 from foc_ros.core.pipeline import Compute, Pipeline, PredictionTask
-from foc_ros.core.predict import warm_up
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import Tracks
 from foc_ros.core.types import NANOSECONDS
@@ -104,9 +103,8 @@ class FocNode(LifecycleNode):
             raise FocError(self._start_error)
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
-        """Create the topics, and prepare what the first prediction needs."""
+        """Create the topics."""
         try:
-            warm_up(self._live_parameters.config)
             kinds = {name: kind for name, (kind, _) in OUTPUTS.items()} | self._guidance.list_kinds()
             self._outputs.update({name: endpoints.create_publisher(self, name, kind) for name, kind in kinds.items()})
             self._inputs.update(endpoints.create_subscriptions(self, self._receive))

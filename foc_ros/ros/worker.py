@@ -13,9 +13,7 @@ from mmap import mmap
 from multiprocessing.connection import Connection
 from typing import Any
 
-from foc_ros.core.config import Config
 from foc_ros.core.pipeline import PredictionTask
-from foc_ros.core.predict import warm_up
 from foc_ros.core.prediction import Prediction
 from foc_ros.core.tracks import Tracks
 
@@ -27,7 +25,7 @@ class Worker:
     in this process. The same happens once the other process is gone; `warn` is then called with a text.
     """
 
-    def __init__(self, config: Config, warn: Callable[[str], object]) -> None:
+    def __init__(self, warn: Callable[[str], object]) -> None:
         self._warn, self._is_stopped = warn, False
         self._process: Any = None
         self._is_cancelled = mmap(-1, 1)  # memory that both processes share
@@ -35,7 +33,7 @@ class Worker:
             return
         context = multiprocessing.get_context('fork')
         self._end, far_end = context.Pipe()
-        arguments = self._end, far_end, self._is_cancelled, config
+        arguments = self._end, far_end, self._is_cancelled
         self._process = context.Process(target=_serve, args=arguments, name='prediction', daemon=True)
         self._process.start()
         far_end.close()
@@ -69,12 +67,11 @@ class Worker:
             self._process.join()
 
 
-def _serve(near_end: Connection, end: Connection, is_cancelled: mmap, config: Config) -> None:
+def _serve(near_end: Connection, end: Connection, is_cancelled: mmap) -> None:
     """Answer with a result for each task, until the other process closes its end or is gone."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)  # of a group of processes; the other one decides
     near_end.close()
-    warm_up(config)
     while True:
         try:
             task = end.recv()
