@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -50,7 +50,7 @@ def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
         # said by joblib where a command is interrupted
         warnings.filterwarnings('ignore', '.* tasks which were still being processed', UserWarning)
         if scheduler is None:
-            with parallel_config('loky', n_jobs=count):
+            with parallel_config('loky', n_jobs=count, initializer=_end_with, initargs=(os.getpid(),)):
                 yield
         else:
             with _connect(scheduler) as client, parallel_config(DASK, client=client):
@@ -115,7 +115,7 @@ def _compute(function: Callable[[T], R], items: Sequence[T]) -> Iterator[R | Fai
     is_alone = len(items) == 1 and effective_n_jobs(None) > 1
     # in a process of its own, also alone; arrays are passed as they are, not as files
     parallel = Parallel(2 if is_alone else None, return_as='generator', batch_size=1, max_nbytes=None)
-    with closing(parallel(delayed(_call_guarded)(function, item, os.getpid()) for item in items)) as found:
+    with closing(parallel(delayed(_call_guarded)(function, item) for item in items)) as found:
         for result, texts in found:
             for text in texts:
                 warn(text)
@@ -142,13 +142,8 @@ def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], desc
     return results
 
 
-def _call_guarded(function: Callable[[T], R], item: T, parent: int) -> tuple[R | Failure, list[str]]:
-    """Return the result of an item, or its failure in words, as an exception may not survive pickling; and warnings.
-
-    parent: process that gave the work; a worker process that is its child ends with it.
-    """
-    if os.getppid() == parent:
-        _end_with(parent)
+def _call_guarded(function: Callable[[T], R], item: T) -> tuple[R | Failure, list[str]]:
+    """Return the result of an item, or its failure in words, as an exception may not survive pickling; and warnings."""
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter('always', FocWarning)
         result: R | Failure
@@ -163,9 +158,8 @@ def _call_guarded(function: Callable[[T], R], item: T, parent: int) -> tuple[R |
     return result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
 
 
-@cache
 def _end_with(parent: int) -> None:
-    """Let this process end soon after its parent has ended, by whatever cause."""
+    """Let this process, a worker with or without work, end soon after its parent has ended, by whatever cause."""
 
     def watch() -> None:
         while os.getppid() == parent:
