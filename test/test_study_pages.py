@@ -25,7 +25,7 @@ from foc_ros.io.bags import TYPESTORE, BagReader
 from foc_ros.reporting import study_pages
 from foc_ros.reporting.draw import save_figure
 from foc_ros.reporting.page import Section, write_page
-from foc_ros.reporting.study_pages import FEW, draw_example, warn_of_few
+from foc_ros.reporting.study_pages import draw_example
 from foc_ros.reporting.study_pages import write_fit as write_report
 from foc_ros.reporting.views import HandTrajectory, Slots, build_hand_trajectory, build_snapshot, is_late, read_snapshot
 from foc_ros.ros.messages.encode_prediction import encode_likelihoods, encode_prediction_cloud
@@ -65,9 +65,9 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path):
     assert page.index(f'Better on {held_out}') < page.index('Better on the same recordings')
     assert '&lt;b&gt;few&lt;/b&gt; recordings' in page and 'x.mcap: no hand' in page
     assert page.count('<img') == 1
-    assert '<p class="warning">Few recordings (2)' in page and 'held out: likelihood and widening fitted to' in page
+    assert 'held out: likelihood and widening fitted to' in page
     assert page.index('Fitted to 2 recordings, 3 parameters changed.') < page.index('<table')
-    assert warn_of_few(FEW, 'recordings') == []
+    assert '<tr><th>foc.eta</th><td>0.9</td><td>flat</td></tr>' in page.partition('Parameters that keep their values')[2]
     write_report(tmp_path, 'x', ANSWER | {'parameters': {}})
     assert '<img' not in (tmp_path / 'fit.html').read_text(encoding='utf-8'), 'without parameters there are tables only'
     with pytest.raises(InputError, match='--report'):

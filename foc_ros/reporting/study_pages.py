@@ -15,7 +15,7 @@ import numpy as np
 from foc_ros.analysis.evaluation import report as evaluation
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PLAIN, PUBLISHED, REFITTED, UNIFORM
 from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS
-from foc_ros.analysis.evaluation.scores import TENTHS
+from foc_ros.analysis.evaluation.scores import TENTHS, warn_of_few
 from foc_ros.analysis.fitting import fit as fitting
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
@@ -32,8 +32,6 @@ from .page import Section, explain_tables, make_chart, make_picture, write_page
 from .report import ReportCollector
 from .views import choose_moment
 
-FEW = 20
-"""Number of recordings or trials below which a page warns."""
 AHEAD_S, LEVEL = '0.5', '0.9'
 """The time ahead [s] and the probability of a region that the summary of an evaluation is about."""
 NAT = 'the unit of a natural logarithm of a probability. 0.69 nat more means twice the probability for what really happened.'
@@ -203,7 +201,7 @@ def write_fit(
     count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
     changed = sum(each['value'] != each['given'] for each in (*answer['parameters'].values(), *answer['chosen'].values()))
-    fitted = f'Fitted to {count} recordings, {changed} parameters changed.'
+    fitted = f'Fitted to {count} recording{"s" * (count != 1)}, {changed} parameter{"s" * (changed != 1)} changed.'
     caption = 'Fitted values as multiples of the given ones, with 95 % intervals by bootstrap over recordings; '
     caption += 'the line is the given value.'
     drawn = {name: each for name, each in answer['parameters'].items() if each['given'] > 0.0 and each['value'] > 0.0}
@@ -215,7 +213,7 @@ def write_fit(
         *explain_tables(fitting.make_tables(answer), FIT_WORDS),
         Section('Run the node with these parameters', rows=commands),
     ]
-    warnings = [*warn_of_few(count, 'recordings'), *answer['warnings'], *failed]
+    warnings = [*answer['warnings'], *failed]
     write_page(directory, FIT_PAGE, f'Fit: {title}', sections, warnings, config)
 
 
@@ -315,12 +313,6 @@ def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> Non
             rows = np.linspace(0, len(trial.position) - 1, 24).astype(int)
             options = {'angles': 'xy', 'scale_units': 'xy', 'scale': 60.0, 'width': 0.004, 'color': look['color']}  # [N/m]
             axes.quiver(*trial.position[rows].T, *trial.assistance[rows].T, zorder=6, **options)
-
-
-def warn_of_few(count: int, what: str) -> list[str]:
-    """Return a warning where recordings or trials are few."""
-    words = f'Few {what} ({count}): intervals are wide, and differences may be chance. {FEW} or more tell more.'
-    return [words] if count < FEW else []
 
 
 def draw_example(recordings: Mapping[str, Recording] | None, config: Config | None) -> list[Section]:

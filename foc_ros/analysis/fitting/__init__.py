@@ -5,7 +5,8 @@
 What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings and the
 cross-validation are exact. A parameter that the recordings do not determine keeps its given value: where its profile, the best
 log-likelihood over all other parameters, is flat, hardly better than at the given value, or best at the end of what was tried,
-unless that is a bound of the parameter.
+unless that is a bound of the parameter. Of fewer than `FEWEST` recordings only the filter is fitted, to which each sample tells
+something; its intervals then hold all values that explain the samples as well.
 """
 
 from __future__ import annotations
@@ -18,13 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.scores import CENTRAL, choose_held_out, resample
+from foc_ros.analysis.evaluation.scores import CENTRAL, FEWEST, choose_held_out, resample
 from foc_ros.core.config import list_parameters
 from foc_ros.core.types import Array
 
 BOUNDS = {parameter.name: parameter.bound for parameter in list_parameters()}
-FEWEST = 3
-"""Recordings of which one can be held out."""
 FLAT_NAT = 2.0
 """A profile that varies by less is flat: settings this far apart are not distinguished (95 % of chi-square, halved)."""
 STAGES = 'read', 'noise', 'eta', 'movement', 'replay', 'likelihood', 'before', 'after'
@@ -183,8 +182,11 @@ class SettingTable:
         found = Findings(undetermined=undetermined)
         if len(undetermined) == len(given):  # which may be among none of the settings
             return found, left
-        best, drawn = left.best, left.draw_best()
+        best, drawn, totals = left.best, left.draw_best(), np.nansum(left.values, axis=0)
+        alike = [left.settings[each] for each in np.flatnonzero(totals > totals.max() - FLAT_NAT)]
         for name in [each for each in given if each not in undetermined]:
             resampled = [each[name] for each in drawn]
+            if len(self.values) < FEWEST:
+                resampled = [*{*resampled, *(each[name] for each in alike)}]
             found.estimates[name] = Estimate.from_resamples(clip_to_bounds(name, best[name]), resampled, how)
         return found, left
