@@ -99,19 +99,21 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
     recordings = find_recordings(data)
     write_report = study.load_report('evaluation')
     from foc_ros.analysis.evaluation import observations, report, scores, truth
+    from foc_ros.io.terminal import name_stage
 
+    say = partial(name_stage, stages=('replay', 'compare', 'score', *['without goals'] * unannounced))
     with study.open_workers():
-        observed, failed = observations.observe_all(recordings, study.params, in_order)
+        observed, failed = observations.observe_all(recordings, study.params, in_order, say('replay'))
         print_messages('foc_ros evaluate', [f'{name}: {reason}' for name, reason in failed.items()])
         if not observed:
             print_messages('foc_ros evaluate', [f'none of the {len(failed)} recordings could be evaluated'])
             return 3
         warnings = truth.warn_of_several_movements((each.name, each.path) for each in observed)
         print_messages('foc_ros evaluate', warnings)
-        answer = report.evaluate(observed, study.params)
+        answer = report.evaluate(observed, study.params, say)
         if unannounced:
             without = scores.leave_goals_out(recordings, study.params.plane)
-            left_out, _ = observations.observe_all(without, study.params, in_order)
+            left_out, _ = observations.observe_all(without, study.params, in_order, say('without goals'))
             answer['other_goal'] = scores.score_other_goal(observed, left_out, study.params.likelihood.other_goal)
             if answer['other_goal'] is None:
                 print_messages('foc_ros evaluate', ['no recording has several goals of which one could be left out'])

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
-from foc_ros.analysis.parallel import collect
+from foc_ros.analysis.parallel import collect, count_prediction
 from foc_ros.analysis.recordings import Recording, group_by_operator
 from foc_ros.analysis.replay import Replay, Step, keep_last_run
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows, tabulate_sides
@@ -142,6 +142,8 @@ def observe(
     for step in replayed.steps(recording.items()):
         if step.sample is not None:
             keep_last_run(samples, step.sample, made)
+        if step.prediction is not None:
+            count_prediction()
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state, replayed.pipeline.adapted_config))
@@ -172,11 +174,14 @@ def observe_in_order(recordings: Sequence[Recording], config: Config) -> tuple[l
 
 
 def observe_all(
-    recordings: Mapping[str, Recording], config: Config, in_order: bool = False
+    recordings: Mapping[str, Recording], config: Config, in_order: bool = False, stage: str = 'replay'
 ) -> tuple[list[ObservedRecording], dict[str, str]]:
-    """Observe recordings in parallel with a progress bar, or as `observe_in_order`; return the failures by name as well."""
+    """Observe recordings in parallel with a progress bar, or as `observe_in_order`; return the failures by name as well.
+
+    stage: words of the progress bar.
+    """
     groups = group_by_operator(recordings) if in_order else {name: [each] for name, each in recordings.items()}
-    parts, failed = collect(partial(observe_in_order, config=config), list(groups.items()), 'replay')
+    parts, failed = collect(partial(observe_in_order, config=config), list(groups.items()), stage)
     failed |= {name: reason for _, reasons in parts for name, reason in reasons.items()}
     return [each for observed, _ in parts for each in observed], failed
 

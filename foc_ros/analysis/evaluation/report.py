@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from foc_ros.core.config import Config, flatten
 from foc_ros.core.solution import LEFT
 from foc_ros.core.types import Array
 from foc_ros.io.csv_tables import read_rows
+from foc_ros.io.terminal import show_progress
 
 from .baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
 from .observations import GAP, GOAL, PATH_CLASS, Observation, ObservedRecording, Questions, ask_all
@@ -49,19 +51,27 @@ REGIONS = {
 }
 
 
-def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[str, Any]:
-    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON."""
+def evaluate(recordings: Sequence[ObservedRecording], config: Config, say: Callable[[str], str] = str) -> dict[str, Any]:
+    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON.
+
+    say: returns the words of a progress for `compare` and `score`.
+    """
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
     # log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor
-    tables = collect_all(_tabulate_log_likelihoods, items, 'compare')
+    tables = collect_all(_tabulate_log_likelihoods, items, say('compare'))
     table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
     asked = {name: [ask_all(each, name) for each in recordings] for name in FITTED_TO}
     asked = {name: questions for name, questions in asked.items() if any(questions)}
-    scores = {
-        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], questions) for each in baselines}
-        for name, questions in asked.items()
-    }
+    pairs = [(name, each) for name in asked for each in baselines]
+    work: list[Callable[[], Any]] = [
+        partial(_score_held_out, each, table[FITTED_TO[name], each.name], asked[name]) for name, each in pairs
+    ]
+    work.append(partial(compute_position_scores, recordings))
+    *scored, positions = show_progress((each() for each in work), say('score'), len(work), is_stage=True)
+    scores: dict[str, dict[str, Scores]] = {name: {} for name in asked}
+    for (name, each), found in zip(pairs, scored, strict=True):
+        scores[name][each.name] = found
     best = {key: int(each.sum(axis=0).argmax()) for key, each in table.items()}
     answer = {
         'recordings': len(recordings),
@@ -80,7 +90,7 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
             for name in asked
             if name != GAP
         },
-        'positions': compute_position_scores(recordings),
+        'positions': positions,
         'parameters': flatten(config),
     }
     return answer | {'verdict': make_verdict(answer)}

@@ -26,8 +26,8 @@ from foc_ros.core.types import Array
 BOUNDS = {parameter.name: parameter.bound for parameter in list_parameters()}
 FLAT_NAT = 2.0
 """A profile that varies by less is flat: settings this far apart are not distinguished (95 % of chi-square, halved)."""
-STAGES = 'read', 'noise', 'eta', 'movement', 'replay', 'likelihood', 'before', 'after'
-"""What takes time, in its order. Without obstacles there is neither noise nor eta to fit."""
+STAGES = 'noise', 'eta', 'movement', 'replay', 'likelihood', 'before', 'after'
+"""What takes time, in its order. Without obstacles there is neither noise nor eta to fit, of few recordings no prediction."""
 Setting = Mapping[str, float]
 """Values by dotted name."""
 
@@ -79,11 +79,6 @@ class Findings:
         self.undetermined = {name: why for name, why in undetermined.items() if name not in self.values}
         self.scores |= later.scores
         self.warnings += later.warnings
-
-
-def name_stage(stage: str) -> str:
-    """Return the words of a progress bar for one of the `STAGES`."""
-    return f'stage {STAGES.index(stage) + 1} of {len(STAGES)}, {stage}'
 
 
 def clip_to_bounds(name: str, value: float) -> float:

@@ -7,7 +7,7 @@ First come the parameters that need no prediction, then those that need replays,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -25,8 +25,9 @@ from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
 from foc_ros.core.errors import RecordingError, warn
+from foc_ros.io.terminal import name_stage
 
-from . import Findings, clip_to_bounds, name_stage
+from . import STAGES, Findings, clip_to_bounds
 from .direct import CONSTANTS, FADING, WAIT, fit_duration, fit_estimator, fit_fading, fit_wait
 from .one_replay import LIKELIHOODS, TRIED_WIDENINGS, fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
@@ -63,17 +64,25 @@ Rows = list[tuple[str, ...]]
 
 @dataclass
 class Fit(Findings):
-    """The findings of all steps so far, and the configuration with them; comparison: of given and fitted parameters."""
+    """The findings of all steps so far, and the configuration with them.
+
+    comparison: of given and fitted parameters; stages: those of the `STAGES` that there are.
+    """
 
     config: Config = field(default_factory=Config)
     recordings: int = 0
     failed: dict[str, str] = field(default_factory=dict)
     comparison: dict[str, dict[str, float | None]] = field(default_factory=dict)
+    stages: Sequence[str] = STAGES
 
     def take(self, later: Findings) -> None:
         """Take what a later step found, also into the configuration."""
         super().take(later)
         self.config = replace_values(self.config, later.values)
+
+    def name_stage(self, stage: str) -> str:
+        """Return the words of a progress bar for a stage."""
+        return name_stage(stage, self.stages)
 
     def keep(self, names: Iterable[str], count: int) -> None:
         """Leave parameters as they are because recordings, a number of them, are too few."""
@@ -86,14 +95,14 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     may_lower_eta: whether obstacles may be avoided with less certainty than the configuration wants.
     """
     fit = Fit(config=config)
-    hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), name_stage('read'))
+    hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), 'read')
     if not hands:
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
     fit.recordings, usable = len(hands), {each.name: recordings[each.name] for each in hands}
     fit.warnings += warn_of_several_movements((each.name, each.path) for each in hands)
     few = warn_of_few(len(hands), 'recordings')
     if len(hands) < FEWEST:
-        few = [f'Too few recordings ({len(hands)}): {TOO_FEW}']
+        few, fit.stages = [f'Too few recordings ({len(hands)}): {TOO_FEW}'], STAGES[-2:]
     for words in few:
         warn(words)
     fit.warnings += few
@@ -111,29 +120,33 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
         _search(hands, fit, Replays(usable, thinned | UNSCALED), may_lower_eta)
         _fit_to_one_replay(usable, fit, thinned | UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
-    fit.comparison = compare_configs(compared, (config, fit.config), thinned)
+    fit.comparison = compare_configs(compared, (config, fit.config), thinned, fit.name_stage)
     fit.warnings[:0] = find_worse_positions(fit.comparison)
     return fit
 
 
 def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower_eta: bool) -> None:
     """Fit the parameters that need replays."""
-    if not any(len(each.obstacles) for each in hands):
+    has_obstacles = any(len(each.obstacles) for each in hands)
+    if not has_obstacles:
         reason = 'no recording has an obstacle, without which neither margins nor noise show'
         fit.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
-    elif fit.config.foc.strategy != 'fixed':
+    if not has_obstacles or fit.config.foc.strategy == 'fixed':
         # with strategy `fixed` eta has no effect, and lambda holds for the noise as it is
-        fit.take(search_settings('noise', make_noise_settings(fit.config), replays))
-        fit.take(search_settings('eta', make_eta_settings(fit.config, may_lower_eta), replays))
+        fit.stages = STAGES[2:]
+    else:
+        fit.take(search_settings(fit.name_stage('noise'), make_noise_settings(fit.config), replays))
+        fit.take(search_settings(fit.name_stage('eta'), make_eta_settings(fit.config, may_lower_eta), replays))
         if not may_lower_eta:
             fit.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
-    fit.take(search_settings('movement', make_movement_settings(hands, fit.config), replays))
+    fit.take(search_settings(fit.name_stage('movement'), make_movement_settings(hands, fit.config), replays))
 
 
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
     config = replace_values(fit.config, thinned)
-    observed, failed = collect(partial(observe, config=config, with_plans=True), list(recordings.items()), name_stage('replay'))
+    predict = partial(observe, config=config, with_plans=True)
+    observed, failed = collect(predict, list(recordings.items()), fit.name_stage('replay'))
     fit.failed.update(failed)
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
@@ -141,18 +154,21 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
         fit.keep(FROM_ONE_REPLAY, len(observed))
         return
     given = flatten(fit.config)
-    for step in (fit_likelihood, fit_widening):
-        fit.take(step(observed, fit.config))
+    fit.take(fit_likelihood(observed, fit.config, fit.name_stage('likelihood')))
+    fit.take(fit_widening(observed, fit.config))
     fit.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
     fit.config = replace_values(fit.config, UNSCALED)
 
 
 def compare_configs(
-    recordings: Mapping[str, Recording], configs: tuple[Config, Config], thinned: Mapping[str, object]
+    recordings: Mapping[str, Recording],
+    configs: tuple[Config, Config],
+    thinned: Mapping[str, object],
+    name_stage: Callable[[str], str],
 ) -> dict[str, dict[str, float | None]]:
     """Return the measures `COMPARISON_TITLES` of two configurations, `before` and `after`, from the recordings that both predict.
 
-    thinned: parameters of these replays alone.
+    thinned: parameters of these replays alone; name_stage: returns the words of a progress bar.
     """
     replays = []
     for config, stage in zip(configs, ('before', 'after'), strict=True):
