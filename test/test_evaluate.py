@@ -149,7 +149,10 @@ def test_the_exit_code_is_3_where_nothing_can_be_scored(tmp_path, capsys):
     data = write_tables(tmp_path / 'none', {'blocked': reach(0.0, (0.1, 0.0))}, [(0.3, 0.0)], ring)
     assert run(data) == 3
     captured = capsys.readouterr()
-    assert captured.out == '' and 'blocked: nothing could be predicted' in captured.err
+    assert captured.out == '' and captured.err.startswith('foc_ros evaluate: blocked: nothing could be predicted')
+    write_tables(data, {'one': [each[:1] for each in reach(0.0, (0.1, 0.0))]}, [(0.3, 0.0)], ())
+    assert run(data) == 3
+    assert 'evaluate: one: expected at least 10 hand poses, got 1\n' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

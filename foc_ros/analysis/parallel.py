@@ -139,7 +139,7 @@ def collect(function: Callable[[T], R], items: Sequence[tuple[str, T]], descript
         found = run(function, items, file.name)
         for name, result in show_progress(found, description, len(items), lambda: Path(file.name).stat().st_size, is_stage=True):
             if isinstance(result, Failure):
-                failed[name] = result.reason
+                failed[name] = result.reason.removeprefix(f'{name}: ')
             else:
                 results.append(result)
     return results, failed

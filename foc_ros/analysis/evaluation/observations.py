@@ -36,7 +36,7 @@ from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.situation import simplify_start
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record
 
-from .truth import HORIZONS_S, TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
+from .truth import HORIZONS_S, TIMES_S, Bools, GroundTruth, RecordedPath, Sides, check_samples, find_ground_truth, find_open_gaps
 
 EXACT = 1e-18
 """Variance that is added to that of a position, which may be known [m^2]: that of a nanometre."""
@@ -151,6 +151,7 @@ def observe(
     if not made:
         reason = losses or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
+    check_samples(recording.name, samples)
     if losses:
         warn(f'{recording.name}: {losses}')
     goals = made[-1][0].scene.goals
@@ -169,7 +170,7 @@ def observe_in_order(recordings: Sequence[Recording], config: Config) -> tuple[l
         try:
             observed.append(observe(recording, config, replayed))
         except FocError as error:
-            failed[recording.name] = ' '.join(str(error).split())
+            failed[recording.name] = ' '.join(str(error).split()).removeprefix(f'{recording.name}: ')
     return observed, failed
 
 
