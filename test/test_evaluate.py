@@ -181,8 +181,9 @@ def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_
     assert 'log-likelihood above uniform [nat]' in out and 'foc, held out' in out
     lines = out.splitlines()
     assert max(map(len, lines[:-1])) <= 80
-    assert any(line.startswith('Paths: foc is better than uniform (+') for line in lines)
+    assert any(line.startswith('Paths: foc is by 3 recordings not distinguishable from uniform') for line in lines)
     assert any(line.startswith('Positions 0.5 s ahead: ') for line in lines)
+    assert 'In short:\nfoc predicted 3 recordings, at' in out and 'best simple' in out
 
 
 HEADER = 'recording,object,x_m,y_m,z_m,width_m,depth_m,height_m\n'

@@ -124,7 +124,8 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
     print_messages('foc_ros evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
     answer |= {'failed': failed, 'warnings': warnings, 'labels_not_taken': mismatches}
     write_report(data.resolve().name, answer, recordings, study.params)
-    study.show(answer, report.make_tables(answer), answer['verdict'], EVALUATION_PAGE)
+    sentences = *answer['verdict'], 'In short:', *report.make_summary(answer)
+    study.show(answer, report.make_tables(answer), sentences, EVALUATION_PAGE)
     return 2 if failed else 0
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from foc_ros.analysis.evaluation import report as evaluation
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PLAIN, PUBLISHED, REFITTED, UNIFORM
 from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS
-from foc_ros.analysis.evaluation.scores import TENTHS, warn_of_few
+from foc_ros.analysis.evaluation.scores import FEWEST, TENTHS, warn_of_few
 from foc_ros.analysis.fitting import fit as fitting
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
@@ -32,8 +32,6 @@ from .page import Section, explain_tables, make_chart, make_picture, write_page
 from .report import ReportCollector
 from .views import choose_moment
 
-AHEAD_S, LEVEL = '0.5', '0.9'
-"""The time ahead [s] and the probability of a region that the summary of an evaluation is about."""
 NAT = 'the unit of a natural logarithm of a probability. 0.69 nat more means twice the probability for what really happened.'
 EVALUATION_WORDS = {
     'nat': NAT,
@@ -100,7 +98,8 @@ def write_evaluation(
     config: Config | None = None,
 ) -> None:
     """Write the page; answer: as of `evaluate --json`, of recordings. Raises InputError where that cannot be done."""
-    counts = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
+    counts = f'with the numbers of predictions of {PUBLISHED} and of their recordings, and of {FEWEST} recordings or more with '
+    counts += 'intervals of 95 % by bootstrap over them'
     gain = 'mean log-likelihood of the true {} above uniform [nat], by tenths of the movement.'
     captions = {
         PATH_CLASS: f'Path past the obstacles still ahead: {gain.format("path")}',
@@ -116,7 +115,7 @@ def write_evaluation(
     named = [[caption for _, caption in pictures], *map(list, answer['questions'].values())]
     all_predictors, *tables = explain_tables([('All predictors', (), named), *evaluation.make_tables(answer)], EVALUATION_WORDS)
     sections = [
-        Section('In short', summarise_evaluation(answer)),
+        Section('In short', evaluation.make_summary(answer)),
         *draw_example(recordings, config),
         replace(all_predictors, pictures=pictures, rows=()),
         Section('Compared with simpler predictors', answer['verdict']),
@@ -125,30 +124,6 @@ def write_evaluation(
     failed = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     warnings = [*answer['warnings'], *warn_of_few(answer['recordings'], 'recordings'), *failed]
     write_page(directory, EVALUATION_PAGE, f'Evaluation: {title}', sections, warnings, config)
-
-
-def summarise_evaluation(answer: Mapping[str, Any]) -> list[str]:
-    """Return the main results of `evaluate --json` in plain words."""
-    count = answer['recordings']
-    words = f'{count} recording{"s were" if count > 1 else " was"} predicted'
-    sentences = [f'{words}, at {answer["predictions"]} moments on the way.']
-    questions = {PATH_CLASS: 'path past the obstacles', GOAL: 'goal', GAP: 'gap in the next row of obstacles'}
-    for name, asked in questions.items():
-        if name in answer['questions']:
-            ours, guess = (answer['questions'][name][each] for each in (PUBLISHED, UNIFORM))
-            chances = [100.0 * np.exp(each['log_likelihood']) for each in (ours, guess)]
-            sentences.append(
-                f'The likeliest {asked} was the one that the hand took in {100.0 * ours["right"]:.0f} % of them. The true '
-                f'one had a probability of {chances[0]:.0f} % (geometric mean); a guess among equals gives it {chances[1]:.0f} %.'
-            )
-    positions = answer['positions']
-    error_m, share = positions['displacement_m'][evaluation.OURS]['final'][AHEAD_S], positions['inside_all'][LEVEL][AHEAD_S]
-    if error_m is not None:
-        sentences.append(f'{AHEAD_S} s ahead, the predicted position was {1e3 * error_m:.0f} mm from the true one on average.')
-    if share is not None:
-        level = 100.0 * float(LEVEL)
-        sentences.append(f'The region that should hold {level:.0f} % of the true positions then held {100.0 * share:.0f} %.')
-    return sentences
 
 
 def _find_look(predictor: str, all_predictors: Iterable[str]) -> dict[str, Any]:
@@ -178,12 +153,13 @@ def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> Non
     for predictor in (PUBLISHED, REFITTED, BOLTZMANN):
         bins = [each for each in by_predictor[predictor]['reliability'] if each['count']]
         shares = np.array([each['right'] for each in bins])
-        errors = np.abs(np.array([each['interval'] for each in bins]).reshape(-1, 2).T - shares)
+        intervals = [each['interval'] if each['recordings'] >= FEWEST else (np.nan, np.nan) for each in bins]
+        errors = np.abs(np.array(intervals).reshape(-1, 2).T - shares)
         look = {'capsize': 2, 'label': predictor, **_find_look(predictor, by_predictor)}
         (line, *_) = axes.errorbar([each['confidence'] for each in bins], shares, errors, **look)
         for each in bins if predictor == PUBLISHED else ():
             place = {'xy': (each['confidence'], each['right']), 'xytext': (5, -9), 'textcoords': 'offset points'}
-            axes.annotate(str(each['count']), **place, fontsize=7, color=line.get_color())
+            axes.annotate(f'{each["count"]} of {each["recordings"]}', **place, fontsize=7, color=line.get_color())
     axes.set(xlabel='probability of the likeliest answer', ylabel='share of true answers', aspect='equal')
 
 
@@ -240,7 +216,7 @@ def write_simulation(
     directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[study.PairResult], config: Config | None = None
 ) -> None:
     """Write the page; cells: of `simulate --json`. Raises InputError where that cannot be done."""
-    words = 'mean over the paired trials, with its bootstrap interval of 95 %.'
+    words = f'mean over the paired trials, of {FEWEST} or more with its bootstrap interval of 95 %.'
     measures = [
         make_chart((6.4, 4.2), f'{study.COLUMNS[name][0]}: {words}', _draw_measure, cells, name)
         for name in ('collision_rate', 'completion_s', 'opposing_impulse')
@@ -283,7 +259,8 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
         drawn = [cell for cell in cells if cell['assistance'] == rule and cell[name] is not None]
         at = [operators.index(cell['operator']) + 0.14 * (number - (len(rules) - 1) / 2) for cell in drawn]
         means = factor * np.array([cell[name] for cell in drawn])
-        bounds = factor * np.array([cell[f'{name}_interval'] for cell in drawn]).reshape(-1, 2)
+        intervals = [cell[f'{name}_interval'] if cell['trials'] >= FEWEST else (np.nan, np.nan) for cell in drawn]
+        bounds = factor * np.array(intervals, dtype=float).reshape(-1, 2)
         errors = np.maximum(np.abs(bounds.T - means), 0.0)
         axes.errorbar(
             at,

@@ -151,13 +151,14 @@ def find_tenths(progress: Array) -> NDArray[np.int64]:
 
 
 def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
-    """Return count, mean confidence and share of correct answers, with its interval, for each bin of the confidence."""
+    """Return numbers, mean confidence and share of correct answers, with its interval, for each bin of the confidence."""
     number = np.minimum((scores.confidence * BINS).astype(int), BINS - 1)
     return [
         {
             'from': each / BINS,
             'to': (each + 1) / BINS,
             'count': len(own.correct),
+            'recordings': len(np.unique(own.recording)),
             'confidence': find_mean(own.confidence),
             'right': find_mean(own.correct),
             'interval': compute_mean_interval(own.correct, own.recording) if len(own.correct) else None,
