@@ -163,10 +163,12 @@ def simulate(
         raise InputError('--recordings', f'recordings of people for the operator {HUMAN_PATHS}', 'none')
     found = find_recordings(recordings) if recordings is not None and HUMAN_PATHS in operators else {}
     write_report = study.load_report('simulation')
+    from foc_ros.analysis.evaluation.scores import warn_of_few
     from foc_ros.analysis.parallel import collect_all
     from foc_ros.analysis.simulation.operators import read_tasks
-    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, run_pair, summarise
+    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_summary, make_tables, run_pair, summarise
 
+    print_messages('foc_ros simulate', warn_of_few(trials, 'trials of each operator'))
     tasks = read_tasks(found.values(), study.params) if found else []
     with study.open_workers():
         run = partial(run_pair, config=study.params, rules=RULES)
@@ -174,7 +176,7 @@ def simulate(
     cells = summarise(results, seed)
     write_report(cells, results, study.params)
     words = 'none: without guidance; foc: with it; path: how far the hand moved.'
-    study.show({'cells': cells, 'seed': seed}, make_tables(cells), (words,), SIMULATION_PAGE)
+    study.show({'cells': cells, 'seed': seed}, make_tables(cells), (words, 'In short:', *make_summary(cells)), SIMULATION_PAGE)
     return 0
 
 

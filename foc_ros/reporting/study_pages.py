@@ -87,7 +87,6 @@ SIMULATION_WORDS = {
     'bootstrap interval': 'the mean would be in it in 95 of 100 such studies. Two rules whose intervals overlap may be alike.',
 }
 """What the words in headings, columns and rows of each page mean."""
-RULE_WORDS = {FOC: 'with guidance', NONE: 'without guidance'}
 
 
 def write_evaluation(
@@ -98,8 +97,8 @@ def write_evaluation(
     config: Config | None = None,
 ) -> None:
     """Write the page; answer: as of `evaluate --json`, of recordings. Raises InputError where that cannot be done."""
-    counts = f'with the numbers of predictions of {PUBLISHED} and of their recordings, and of {FEWEST} recordings or more with '
-    counts += 'intervals of 95 % by bootstrap over them'
+    counts = f'with the numbers of predictions of {PUBLISHED}, and with intervals of 95 % by bootstrap over recordings where '
+    counts += f'these are {FEWEST} or more'
     gain = 'mean log-likelihood of the true {} above uniform [nat], by tenths of the movement.'
     captions = {
         PATH_CLASS: f'Path past the obstacles still ahead: {gain.format("path")}',
@@ -159,7 +158,7 @@ def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> Non
         (line, *_) = axes.errorbar([each['confidence'] for each in bins], shares, errors, **look)
         for each in bins if predictor == PUBLISHED else ():
             place = {'xy': (each['confidence'], each['right']), 'xytext': (5, -9), 'textcoords': 'offset points'}
-            axes.annotate(f'{each["count"]} of {each["recordings"]}', **place, fontsize=7, color=line.get_color())
+            axes.annotate(str(each['count']), **place, fontsize=7, color=line.get_color())
     axes.set(xlabel='probability of the likeliest answer', ylabel='share of true answers', aspect='equal')
 
 
@@ -177,7 +176,8 @@ def write_fit(
     count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
     changed = sum(each['value'] != each['given'] for each in (*answer['parameters'].values(), *answer['chosen'].values()))
-    fitted = f'Fitted to {count} recording{"s" * (count != 1)}, {changed} parameter{"s" * (changed != 1)} changed.'
+    kept = len(fitting.format_kept(answer))
+    fitted = f'Fitted to {count} recording{"s" * (count != 1)}, {changed} parameter{"s" * (changed != 1)} changed, {kept} kept.'
     caption = 'Fitted values as multiples of the given ones, with 95 % intervals by bootstrap over recordings; '
     caption += 'the line is the given value.'
     drawn = {name: each for name, each in answer['parameters'].items() if each['given'] > 0.0 and each['value'] > 0.0}
@@ -228,27 +228,12 @@ def write_simulation(
         if each.task
     ]
     sections = [
-        Section('In short', summarise_simulation(cells), pictures=measures),
+        Section('In short', study.make_summary(cells), pictures=measures),
         *explain_tables(study.make_tables(cells), SIMULATION_WORDS),
         Section('Single trials', pictures=trials),
     ]
     warnings = warn_of_few(min(cell['trials'] for cell in cells), 'trials of each operator') if cells else []
     write_page(directory, SIMULATION_PAGE, 'Closed-loop study of guidance', sections, warnings, config)
-
-
-def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return for each operator what guidance changes, in plain words."""
-    measures = {'collision_rate': 'collisions in {:.0f} % of the trials', 'completion_s': '{:.2f} s for a movement'}
-    sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
-    for operator in dict.fromkeys(cell['operator'] for cell in cells):
-        by_rule, told = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}, []
-        for rule, words in RULE_WORDS.items():
-            values = {name: by_rule[rule][name] for name in measures} if rule in by_rule else {}
-            known = [measures[name].format(study.COLUMNS[name][1] * each) for name, each in values.items() if each is not None]
-            if values:
-                told.append(f'{" and ".join(known)} {words}')
-        sentences.append(f'{operator.replace("_", " ").capitalize()}: {"; ".join(told)}.')
-    return sentences
 
 
 def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
@@ -267,7 +252,7 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
             means,
             errors,
             fmt='o',
-            label=RULE_WORDS.get(rule, rule),
+            label=study.RULE_WORDS.get(rule, rule),
             markersize=4,
             capsize=2,
             color=get_class_style(number)[0],
@@ -283,7 +268,7 @@ def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> Non
     axes.plot(*task.path[:, 0].T, color='black', linestyle='--', linewidth=1.0, label='intended')
     for number, (rule, trial) in enumerate(trials.items()):
         look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
-        axes.plot(*trial.position.T, label=RULE_WORDS.get(rule, rule), **look)
+        axes.plot(*trial.position.T, label=study.RULE_WORDS.get(rule, rule), **look)
         touching = trial.position[trial.measure_clearances(task) < 0.0]
         axes.plot(*touching.T, linestyle='', marker='x', markersize=4, color=look['color'])
         if rule == FOC:
