@@ -60,7 +60,7 @@ setup(
     python_requires='>=3.11',
     install_requires=[
         'cyclopts>=5.1',
-        'joblib>=1.4',
+        'joblib>=1.5',
         'mcap>=1.1',
         'numpy>=1.23',
         'piqp>=0.6',

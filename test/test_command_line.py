@@ -3,10 +3,12 @@
 """The program: exit codes, errors in one line, no unnecessary imports, and output that fits into 80 columns."""
 
 import io
+import itertools
 import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -283,8 +285,12 @@ def test_names_in_the_first_column_are_whole_beside_long_texts_in_the_last(capsy
     assert name in printed and all(word in printed for word in text.split())
 
 
-def test_progress_is_printed_at_times_where_there_is_no_terminal(monkeypatch, capsys):
-    for quiet_s, lines in ((60.0, []), (0.0, ['replay: 1 of 2', 'replay: 2 of 2'])):
-        monkeypatch.setattr(terminal, 'QUIET_S', quiet_s)
-        assert list(terminal.show_progress('ab', 'replay', 2)) == ['a', 'b']
-        assert capsys.readouterr().err.splitlines() == lines
+def test_progress_is_printed_at_times_where_there_is_no_terminal_also_while_nothing_is_done(monkeypatch, capsys):
+    monkeypatch.setattr(terminal, 'QUIET_S', 60.0)
+    assert list(terminal.show_progress('ab', 'replay', 2)) == ['a', 'b'] and capsys.readouterr().err == ''
+    assert list(terminal.show_progress('ab', 'stage 1 of 2', 2, is_stage=True)) == ['a', 'b']
+    assert capsys.readouterr().err == 'stage 1 of 2, 0 s: 2 of 2\n'
+    monkeypatch.setattr(terminal, 'QUIET_S', 0.01)
+    for _ in terminal.show_progress('a', 'replay', 2, itertools.count(1).__next__):
+        time.sleep(0.2)
+    assert capsys.readouterr().err.splitlines()[:2] == [f'replay, 0 s, {made} predictions: 1 of 2' for made in (1, 2)]

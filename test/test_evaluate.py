@@ -149,7 +149,10 @@ def test_the_exit_code_is_3_where_nothing_can_be_scored(tmp_path, capsys):
     data = write_tables(tmp_path / 'none', {'blocked': reach(0.0, (0.1, 0.0))}, [(0.3, 0.0)], ring)
     assert run(data) == 3
     captured = capsys.readouterr()
-    assert captured.out == '' and 'blocked: nothing could be predicted' in captured.err
+    assert captured.out == '' and captured.err.startswith('foc_ros evaluate: blocked: nothing could be predicted')
+    write_tables(data, {'one': [each[:1] for each in reach(0.0, (0.1, 0.0))]}, [(0.3, 0.0)], ())
+    assert run(data) == 3
+    assert 'evaluate: one: expected at least 10 hand poses, got 1\n' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -178,8 +181,9 @@ def test_the_report_is_one_page_and_the_terminal_shows_tables_verdict_and_wrong_
     assert 'log-likelihood above uniform [nat]' in out and 'foc, held out' in out
     lines = out.splitlines()
     assert max(map(len, lines[:-1])) <= 80
-    assert any(line.startswith('Paths: foc is better than uniform (+') for line in lines)
+    assert any(line.startswith('Paths: foc is by 3 recordings not distinguishable from uniform') for line in lines)
     assert any(line.startswith('Positions 0.5 s ahead: ') for line in lines)
+    assert 'In short:\nfoc predicted 3 recordings, at' in out and 'best simple' in out
 
 
 HEADER = 'recording,object,x_m,y_m,z_m,width_m,depth_m,height_m\n'

@@ -23,7 +23,7 @@ from foc_ros.analysis.evaluation.baselines import (
 )
 from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS, ask, find_relevant_obstacles
 from foc_ros.analysis.evaluation.positions import SINGER_SETTINGS, compute_position_scores, find_denser_share, forecast_singer
-from foc_ros.analysis.evaluation.report import find_gaps, make_verdict
+from foc_ros.analysis.evaluation.report import find_gaps, make_summary, make_verdict
 from foc_ros.analysis.evaluation.scores import (
     Scores,
     choose_held_out,
@@ -160,6 +160,33 @@ def test_the_verdict_is_by_the_interval(interval, words):
         'like straight minimum jerk (40 mm).',
         'Uncertainty: the region of 90 % holds 70 % of the true positions 0.5 s ahead, so it is too narrow.',
     ]
+
+
+def test_the_summary_names_the_best_simple_predictors_and_what_the_recordings_tell():
+    scores = {'foc': (0.8, 0.5), 'nearest gap': (0.7, 0.2), 'Boltzmann': (0.6, 0.4), 'uniform': (0.5, 0.25)}
+    by_name = {name: {'right': right, 'log_likelihood': np.log(chance)} for name, (right, chance) in scores.items()}
+    intervals = {'nearest gap': [0.1, 0.3], 'Boltzmann': [-0.1, 0.3], 'uniform': [0.1, 0.3]}
+    answer = {
+        'recordings': 6,
+        'predictions': 40,
+        'questions': {PATH_CLASS: by_name},
+        'comparisons': {PATH_CLASS: {name: {'interval': each} for name, each in intervals.items()}},
+        'positions': {
+            'displacement_m': {'likelihood-weighted': {'final': {'0.5': 0.0314}}, 'constant velocity': {'final': {'0.5': 0.05}}},
+            'inside_all': {'0.9': {'0.5': 0.87}},
+        },
+    }
+    assert make_summary(answer) == [
+        'foc predicted 6 recordings, at 40 moments on the way.',
+        'The likeliest path past the obstacles was the one that the hand took in 80 % of them; with the best simple predictor, '
+        'nearest gap, in 70 %. The true one had a probability of 50 % (geometric mean); the best simple predictor, Boltzmann, '
+        'gives it 40 %, a guess among equals 25 %.',
+        'By this probability, foc is better than nearest gap; not distinguishable from Boltzmann.',
+        '0.5 s ahead, the predicted position was 31 mm from the true one on average; that of constant velocity 50 mm.',
+        'The region that should hold 90 % of the true positions then held 87 %.',
+    ]
+    told = ' '.join(make_summary(answer | {'recordings': 5}))
+    assert 'foc is' not in told and '6 recordings are needed to tell differences between predictors from chance.' in told
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ QUICK = {'foc.steps': 10, 'homotopy.max_candidates': 2, 'duration.fitts_a_s': 0.
 @pytest.fixture(autouse=True)
 def _few(monkeypatch):
     use_few_predictions(monkeypatch)
-    monkeypatch.setattr(terminal, 'QUIET_S', 0.0)
+    monkeypatch.setattr(terminal, 'QUIET_S', 60.0)
 
 
 def _fit(folder, capsys, *arguments, **parameters):
@@ -37,7 +37,7 @@ def _fit(folder, capsys, *arguments, **parameters):
 
 def test_everything_is_fitted_and_written_for_the_node(tmp_path, capsys):
     answer, config = _fit(write_fit_tables(tmp_path / 'data'), capsys)
-    stages = re.findall(r'^stage (\d) of 8, (\w+)', answer['progress'], re.MULTILINE)
+    stages = re.findall(r'^stage (\d) of 7, (\w+).* \d+ of \d+$', answer['progress'], re.MULTILINE)
     assert list(dict.fromkeys(stages)) == [(str(number), name) for number, name in enumerate(STAGES, 1)]
     assert answer['recordings'] == 6 and answer['failed'] == {}
     values = flatten(config)
@@ -77,20 +77,32 @@ def test_without_obstacles_goals_are_distinguished_and_margins_are_kept(tmp_path
     assert answer['scores']['ways']['fitted'] > answer['scores']['ways']['uniform'] + 0.1
 
 
-def test_two_recordings_do_not_determine_the_likelihood(tmp_path, capsys):
-    answer, config = _fit(write_fit_tables(tmp_path / 'data', count=2), capsys)
-    kept = {f'likelihood.{name}' for name in ('beta', 'planning_horizon_s', 'lookahead_s', 'weaving')} | {'duration.arrival'}
-    assert kept <= set(answer['undetermined'])
-    given = flatten(Config())
-    assert {name: flatten(config)[name] for name in kept} == {name: given[name] for name in kept}
-    assert answer['undetermined']['likelihood.beta'] == {
-        'given': given['likelihood.beta'],
-        'why': 'all values tried, 0.5 to 16, explain the recordings within 2 nat',
+def test_two_recordings_determine_the_filter_alone_which_is_said_at_the_start(tmp_path, capsys):
+    answer, config = _fit(write_fit_tables(tmp_path / 'data', count=2), capsys, **{'covariance.near': 1.5})
+    (changed,) = set(answer['parameters']) - {'estimator.jerk_density'}
+    low, high = answer['parameters'][changed]['interval']
+    assert changed == 'estimator.position_stddev' and low < answer['parameters'][changed]['value'] < high
+    assert {'duration.arrival', 'duration.fitts_a_s', 'duration.wait_s', 'foc.eta', *fitting.FROM_ONE_REPLAY} <= set(
+        answer['undetermined']
+    )
+    values, given = flatten(config), flatten(replace_values(Config(), QUICK | {'covariance.near': 1.5}))
+    assert {name: each for name, each in values.items() if name not in answer['parameters']} == {
+        name: each for name, each in given.items() if name not in answer['parameters']
     }
-    assert 'estimator.position_stddev' in answer['parameters']
+    few = answer['undetermined']['foc.eta']['why']
+    assert few == 'too few recordings: 2, 6 are needed'
+    assert answer['progress'].index('Too few recordings (2): ') < answer['progress'].index('stage 1 of 2, before')
+    assert answer['warnings'][-1].startswith('Too few recordings (2): only what the filter')
     answer['chosen'] = {'covariance.near': {'given': 1.5, 'value': '1.0'}}
-    shown = {row[0]: row[1:3] for row in fitting.format_parameters(answer)}
-    assert shown['likelihood.beta'] == (f'{given["likelihood.beta"]:.3g}', 'kept') and shown['covariance.near'] == ('1.5', '1.0')
+    shown = {row[0]: row[1:3] for row in (*fitting.format_parameters(answer), *fitting.format_kept(answer))}
+    assert shown['foc.eta'] == ('0.9', few) and shown['covariance.near'] == ('1.5', '1.0')
+
+
+def test_recordings_of_which_too_few_can_be_predicted_do_not_determine_what_needs_predictions(monkeypatch):
+    monkeypatch.setattr(fitting, 'collect', lambda *_: ([None] * 5, {'sixth': 'nothing could be predicted'}))
+    fit = fitting.Fit(config=replace_values(Config(), {'covariance.far': 1.5}))
+    fitting._fit_to_one_replay({}, fit, {})
+    assert set(fit.undetermined) == set(fitting.FROM_ONE_REPLAY) and fit.values == {} and fit.config.covariance.far == 1.5
 
 
 def test_a_coverage_that_falls_is_told():
@@ -114,8 +126,7 @@ def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_la
     (tmp_path / 'bags' / 'bad' / 'bad.mcap').write_bytes(b'nothing')
     answer, config = _fit(tmp_path / 'bags', capsys, **FIXED)
     assert answer['recordings'] == 1 and set(answer['failed']) == {'bad'}
-    assert any(words.startswith('cross-validation: 1 recordings are too few') for words in answer['warnings'])
-    assert any(words.startswith('intervals: one recording') for words in answer['warnings'])
+    assert any(words.startswith('Too few recordings (1): ') for words in answer['warnings'])
     assert not {'foc.tau', 'foc.lam', 'foc.eta'} & set(answer['parameters'])
     assert {'duration.fitts_a_s', 'duration.arrival'} <= set(answer['undetermined']), 'they may be the best by chance'
     assert config.foc.tau == 1e-4
@@ -126,7 +137,7 @@ def test_one_bag_and_a_broken_one_with_strategy_fixed_which_keeps_its_tau_and_la
     options = ['--params', str(tmp_path / 'given.yaml'), '--workers', '1', '--allow', 'positions', '--report', str(tmp_path)]
     assert main(['fit', str(tmp_path / 'bags'), '--output', str(output), *options]) == 2
     words = capsys.readouterr().out
-    assert 'log-likelihood of the path taken' in words and 'note: ' in words
+    assert 'Parameters that keep their values' in words and 'note: Too few recordings (1)' in words
     assert 'on the same recordings, with the fitted parameters: ' in words
     assert max(len(line) for line in words.splitlines() if str(tmp_path) not in line) <= 80
     assert words.endswith(f'\nreport: file://{tmp_path}/fit.html\n')

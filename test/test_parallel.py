@@ -9,6 +9,7 @@ import sys
 from contextlib import nullcontext
 from pathlib import Path
 
+import psutil
 import pytest
 import worker_tasks
 from play_helpers import has_ended, until
@@ -70,18 +71,22 @@ def test_a_killed_worker_fails_what_it_was_doing_and_nothing_else(request, is_cl
 
 
 def start_workers(folder):
-    """Return a command that waits for two workers, and the processes of these."""
+    """Return a command that waits for two of its three workers, and the processes of all."""
     folder.mkdir()
     script = f"""if __name__ == '__main__':
         import worker_tasks
         from foc_ros.analysis.parallel import open_workers, run
         from foc_ros.__main__ import handle_interrupts
-        with handle_interrupts(), open_workers(2):
+        with handle_interrupts(), open_workers(3):
             list(run(worker_tasks.wait_here, [(name, {str(folder)!r}) for name in 'ab']))"""
     pipes = {'stderr': subprocess.PIPE, 'text': True, 'start_new_session': True}
     process = subprocess.Popen([sys.executable, '-c', script], cwd=Path(__file__).parent, **pipes)
     until(lambda: len(list(folder.iterdir())) == 2, 'two workers')
-    return process, [int(each.name) for each in folder.iterdir()]
+    workers = [
+        each.pid for each in psutil.Process(process.pid).children() if 'loky.backend.popen_loky_posix' in ' '.join(each.cmdline())
+    ]
+    assert len(workers) == 3
+    return process, workers
 
 
 def test_workers_end_with_a_parent_that_is_killed_or_interrupted_at_its_terminal(tmp_path):

@@ -127,9 +127,9 @@ def test_a_fit_and_its_comparison(tmp_path, monkeypatch):
 
     async def run():
         fitted = await work(page, 'fit')
-        assert fitted['state'] == 'done'
+        assert fitted['state'] == 'done' and '6 trials or more are needed' in fitted['text']
         assert page.last('result')['columns'] == ['parameter', 'before', 'after']
-        assert 'duration.fitts_b_s' in [row[0] for row in page.last('result')['rows']]
+        assert {row[0].partition('.')[0] for row in page.last('result')['rows']} == {'estimator'}
         compared = await work(page, 'compare')
         assert 'on the trials of the fit' in compared['text']
         scores = [row[0] for row in page.last('result')['rows']]
@@ -144,7 +144,7 @@ def test_a_fit_and_its_comparison(tmp_path, monkeypatch):
     page.send({'type': 'parameters', 'name': 'mine'})  # the page keeps the others if positions become worse
     assert page.last('settings')['parameters'] == 'mine'
     mine = page.session.predictor.configs[-1]
-    assert mine.duration != QUICK.duration
+    assert mine.estimator != QUICK.estimator
     assert mine.plane == 'xy'
     page.send({'type': 'parameters', 'name': 'standard'})
     assert page.session.predictor.configs[-1] == QUICK
@@ -164,7 +164,9 @@ def fit_with_errors(page, monkeypatch, before_m, after_m, failed=None):
         parameters = {name: {'given': 4.0, 'value': value} for name, value in FITTED.items()}
         comparison = {'class_gain': {'before': 0.1, 'after': 0.3}, 'error_m 0.5': {'before': before_m, 'after': after_m}}
         chosen = {'foc.eta': {'given': 0.9, 'value': 0.9}}  # not shown, because it has not changed
-        return json.dumps({'parameters': parameters, 'chosen': chosen, 'comparison': comparison, 'failed': failed or {}})
+        return json.dumps(
+            {'recordings': 6, 'parameters': parameters, 'chosen': chosen, 'comparison': comparison, 'failed': failed or {}}
+        )
 
     monkeypatch.setattr(jobs, 'run_command', fit)
     return asyncio.run(work(page, 'fit'))

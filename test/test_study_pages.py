@@ -25,7 +25,7 @@ from foc_ros.io.bags import TYPESTORE, BagReader
 from foc_ros.reporting import study_pages
 from foc_ros.reporting.draw import CLASS_COLOURS, save_figure
 from foc_ros.reporting.page import FOLDER, Section, write_page
-from foc_ros.reporting.study_pages import FEW, draw_example, warn_of_few
+from foc_ros.reporting.study_pages import draw_example
 from foc_ros.reporting.study_pages import write_fit as write_report
 from foc_ros.reporting.views import (
     SLOTS,
@@ -74,9 +74,9 @@ def test_the_page_holds_values_intervals_scores_and_warnings(tmp_path):
     assert page.index(f'Better on {held_out}') < page.index('Better on the same recordings')
     assert '&lt;b&gt;few&lt;/b&gt; recordings' in page and 'x.mcap: no hand' in page
     assert page.count('<img') == 1
-    assert '<p class="warning">Few recordings (2)' in page and 'held out: likelihood and widening fitted to' in page
-    assert page.index('Fitted to 2 recordings, 3 parameters changed.') < page.index('<table')
-    assert warn_of_few(FEW, 'recordings') == []
+    assert 'held out: likelihood and widening fitted to' in page
+    assert page.index('Fitted to 2 recordings, 3 parameters changed, 2 kept.') < page.index('<table')
+    assert '<tr><th>foc.eta</th><td>0.9</td><td>flat</td></tr>' in page.partition('Parameters that keep their values')[2]
     write_report(tmp_path, 'x', ANSWER | {'parameters': {}})
     assert '<img' not in (tmp_path / 'fit.html').read_text(encoding='utf-8'), 'without parameters there are tables only'
     with pytest.raises(InputError, match='--report'):
@@ -117,23 +117,10 @@ def test_a_page_names_what_made_it_and_no_path(tmp_path):
     assert 'All parameters have their defaults.' in (tmp_path / 'x.html').read_text(encoding='utf-8')
 
 
-def test_results_are_told_in_plain_words_first():
-    scores = {'right': 0.8, 'log_likelihood': float(np.log(0.5))}
-    answer = {
-        'recordings': 3,
-        'predictions': 40,
-        'questions': {'way': {'foc': scores, 'uniform': {'right': 0.5, 'log_likelihood': float(np.log(0.25))}}},
-        'positions': {
-            'displacement_m': {'likelihood-weighted': {'final': {'0.5': 0.0314}}},
-            'inside_all': {'0.9': {'0.5': 0.87}},
-        },
-    }
-    told = ' '.join(study_pages.summarise_evaluation(answer))
-    words = '3 recordings', '40 moments', 'in 80 % of them', 'probability of 50 %', 'gives it 25 %', '31 mm', 'held 87 %'
-    assert [each for each in words if each not in told] == []
+def test_results_of_a_simulation_are_told_in_plain_words_first():
     cell = {'operator': 'changes_way', 'collision_rate': 0.1, 'completion_s': 1.234}
     cells = [cell | {'assistance': 'none'}, cell | {'assistance': 'foc', 'collision_rate': 0.05, 'completion_s': None}]
-    assert study_pages.summarise_simulation(cells)[1:] == [
+    assert study_pages.study.make_summary(cells)[1:] == [
         'Changes way: collisions in 5 % of the trials with guidance; '
         'collisions in 10 % of the trials and 1.23 s for a movement without guidance.'
     ]
@@ -149,11 +136,31 @@ def test_labels_of_the_axis_of_a_fit_are_apart_and_rules_are_named_in_words(fact
     labels = [each for each in axes.get_xticklabels() if low <= each.get_position()[0] <= high]
     boxes = [each.get_window_extent() for each in labels]
     assert len(labels) >= 3 and all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
-    cell = {'operator': 'noisy', 'collision_rate': 0.1, 'collision_rate_interval': [0.0, 0.2]}
+    cell = {'operator': 'noisy', 'trials': 20, 'collision_rate': 0.1, 'collision_rate_interval': [0.0, 0.2]}
     study_pages._draw_measure(
         axes := Figure().subplots(), [cell | {'assistance': each} for each in ('none', 'foc')], 'collision_rate'
     )
     assert axes.get_legend_handles_labels()[1] == ['without guidance', 'with guidance']
+
+
+@pytest.mark.parametrize(('count', 'has_bars'), [(5, False), (6, True)])
+def test_few_recordings_or_trials_have_no_bars(count, has_bars):
+    one = {'count': 30, 'recordings': count, 'confidence': 0.6, 'right': 0.5, 'interval': [0.4, 0.7]}
+    cell = {
+        'operator': 'noisy',
+        'assistance': 'foc',
+        'trials': count,
+        'collision_rate': 0.1,
+        'collision_rate_interval': [0.0, 0.2],
+    }
+    by_predictor = {name: {'reliability': [one]} for name in ('foc', 'foc, held out', 'Boltzmann')}
+    for draw, given in (
+        (study_pages._draw_reliability, ('way', by_predictor)),
+        (study_pages._draw_measure, ([cell], 'collision_rate')),
+    ):
+        draw(axes := Figure().subplots(), *given)
+        (bars,) = axes.containers[0].lines[2]
+        assert np.isfinite(bars.get_segments()).any() == has_bars
 
 
 def test_movements_are_found_where_they_are_and_tremor_is_none():

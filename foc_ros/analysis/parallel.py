@@ -15,10 +15,12 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import Any, TypeVar
 
 from joblib import Parallel, delayed, effective_n_jobs, parallel_config, register_parallel_backend
@@ -36,6 +38,10 @@ DASK = 'foc_ros.dask'
 """Name of :class:`DaskBackend` among the backends of joblib."""
 
 
+_COUNTER: ContextVar[str | None] = ContextVar('_COUNTER', default=None)
+"""File in which `count_prediction` counts."""
+
+
 @dataclass(frozen=True)
 class Failure:
     """Why an item has no result, in words."""
@@ -50,7 +56,7 @@ def open_workers(count: int, scheduler: str | None = None) -> Iterator[None]:
         # said by joblib where a command is interrupted
         warnings.filterwarnings('ignore', '.* tasks which were still being processed', UserWarning)
         if scheduler is None:
-            with parallel_config('loky', n_jobs=count):
+            with parallel_config('loky', n_jobs=count, initializer=_end_with, initargs=(os.getpid(),)):
                 yield
         else:
             with _connect(scheduler) as client, parallel_config(DASK, client=client):
@@ -86,17 +92,20 @@ class DaskBackend(ThreadingBackend):
 register_parallel_backend(DASK, DaskBackend)
 
 
-def run(function: Callable[[T], R], items: Sequence[tuple[str, T]]) -> Iterator[tuple[str, R | Failure]]:
+def run(
+    function: Callable[[T], R], items: Sequence[tuple[str, T]], counter: str | None = None
+) -> Iterator[tuple[str, R | Failure]]:
     """Apply a function to every item; yield names and results in the order of the items.
 
     function: importable by name where the workers are, and without a state of its own; items: names with arguments that can be
     pickled. A worker that is killed takes those beside it along. All that may have been at work is then computed again, one after
-    the other, so that only the guilty one fails. Raises RecordingError where the workers cannot go on.
+    the other, so that only the guilty one fails. counter: file of `count_prediction`. Raises RecordingError where the workers
+    cannot go on.
     """
     done, at_work = 0, 2 * effective_n_jobs(None)
     while done < len(items):
         try:
-            for result in _compute(function, [item for _, item in items[done:]]):
+            for result in _compute(function, [item for _, item in items[done:]], counter):
                 done += 1
                 yield items[done - 1][0], result
         except CancelledError as error:
@@ -105,17 +114,17 @@ def run(function: Callable[[T], R], items: Sequence[tuple[str, T]]) -> Iterator[
             for name, item in items[done : done + at_work]:
                 done += 1
                 try:
-                    (result,) = _compute(function, [item])
+                    (result,) = _compute(function, [item], counter)
                 except Exception as error:
                     result = Failure(f'its worker process was lost ({type(error).__name__})')
                 yield name, result
 
 
-def _compute(function: Callable[[T], R], items: Sequence[T]) -> Iterator[R | Failure]:
+def _compute(function: Callable[[T], R], items: Sequence[T], counter: str | None) -> Iterator[R | Failure]:
     is_alone = len(items) == 1 and effective_n_jobs(None) > 1
     # in a process of its own, also alone; arrays are passed as they are, not as files
     parallel = Parallel(2 if is_alone else None, return_as='generator', batch_size=1, max_nbytes=None)
-    with closing(parallel(delayed(_call_guarded)(function, item, os.getpid()) for item in items)) as found:
+    with closing(parallel(delayed(_call_guarded)(function, item, counter) for item in items)) as found:
         for result, texts in found:
             for text in texts:
                 warn(text)
@@ -126,12 +135,23 @@ def collect(function: Callable[[T], R], items: Sequence[tuple[str, T]], descript
     """Run with a progress bar; return the results in the order of the items, and the reason of every failure by name."""
     results: list[R] = []
     failed: dict[str, str] = {}
-    for name, result in show_progress(run(function, items), description, len(items)):
-        if isinstance(result, Failure):
-            failed[name] = result.reason
-        else:
-            results.append(result)
+    with NamedTemporaryFile(prefix='foc_ros_') as file:
+        found = run(function, items, file.name)
+        for name, result in show_progress(found, description, len(items), lambda: Path(file.name).stat().st_size, is_stage=True):
+            if isinstance(result, Failure):
+                failed[name] = result.reason.removeprefix(f'{name}: ')
+            else:
+                results.append(result)
     return results, failed
+
+
+def count_prediction() -> None:
+    """Let the progress that is shown count one more prediction: by a byte in a file, if that is on this machine."""
+    if (counter := _COUNTER.get()) is not None:
+        with suppress(OSError):
+            descriptor = os.open(counter, os.O_WRONLY | os.O_APPEND)
+            os.write(descriptor, b'.')
+            os.close(descriptor)
 
 
 def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], description: str) -> list[R]:
@@ -142,13 +162,9 @@ def collect_all(function: Callable[[T], R], items: Sequence[tuple[str, T]], desc
     return results
 
 
-def _call_guarded(function: Callable[[T], R], item: T, parent: int) -> tuple[R | Failure, list[str]]:
-    """Return the result of an item, or its failure in words, as an exception may not survive pickling; and warnings.
-
-    parent: process that gave the work; a worker process that is its child ends with it.
-    """
-    if os.getppid() == parent:
-        _end_with(parent)
+def _call_guarded(function: Callable[[T], R], item: T, counter: str | None) -> tuple[R | Failure, list[str]]:
+    """Return the result of an item, or its failure in words, as an exception may not survive pickling; and warnings."""
+    _COUNTER.set(counter)
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter('always', FocWarning)
         result: R | Failure
@@ -163,9 +179,8 @@ def _call_guarded(function: Callable[[T], R], item: T, parent: int) -> tuple[R |
     return result, [str(each.message) for each in issued if issubclass(each.category, FocWarning)]
 
 
-@cache
 def _end_with(parent: int) -> None:
-    """Let this process end soon after its parent has ended, by whatever cause."""
+    """Let this process, a worker with or without work, end soon after its parent has ended, by whatever cause."""
 
     def watch() -> None:
         while os.getppid() == parent:

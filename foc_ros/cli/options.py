@@ -197,9 +197,11 @@ class Study:
         """Return what writes the report, so that a missing library is reported before the work; without one it does nothing."""
         if self.report is None:
             return lambda *_: None
+        from foc_ros.io.terminal import show_progress
         from foc_ros.reporting import study_pages
 
-        return partial(getattr(study_pages, f'write_{kind}'), self.report)
+        write = partial(getattr(study_pages, f'write_{kind}'), self.report)
+        return lambda *given: [*show_progress((write(*given) for _ in (1,)), 'page', 1)].clear()
 
     def show(self, answer: object, tables: Iterable[Table], sentences: Iterable[str], page: str, commands: str = '') -> None:
         """Print an answer as JSON, or as tables, sentences, commands as they are, and the address of the report."""

@@ -99,19 +99,21 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
     recordings = find_recordings(data)
     write_report = study.load_report('evaluation')
     from foc_ros.analysis.evaluation import observations, report, scores, truth
+    from foc_ros.io.terminal import name_stage
 
+    say = partial(name_stage, stages=('replay', 'compare', 'score', *['without goals'] * unannounced))
     with study.open_workers():
-        observed, failed = observations.observe_all(recordings, study.params, in_order)
+        observed, failed = observations.observe_all(recordings, study.params, in_order, say('replay'))
         print_messages('foc_ros evaluate', [f'{name}: {reason}' for name, reason in failed.items()])
         if not observed:
             print_messages('foc_ros evaluate', [f'none of the {len(failed)} recordings could be evaluated'])
             return 3
         warnings = truth.warn_of_several_movements((each.name, each.path) for each in observed)
         print_messages('foc_ros evaluate', warnings)
-        answer = report.evaluate(observed, study.params)
+        answer = report.evaluate(observed, study.params, say)
         if unannounced:
             without = scores.leave_goals_out(recordings, study.params.plane)
-            left_out, _ = observations.observe_all(without, study.params, in_order)
+            left_out, _ = observations.observe_all(without, study.params, in_order, say('without goals'))
             answer['other_goal'] = scores.score_other_goal(observed, left_out, study.params.likelihood.other_goal)
             if answer['other_goal'] is None:
                 print_messages('foc_ros evaluate', ['no recording has several goals of which one could be left out'])
@@ -122,7 +124,8 @@ def evaluate(data: Data, /, *, in_order: bool = False, unannounced: bool = False
     print_messages('foc_ros evaluate', [f'{name}: {differ}: {words}' for name, words in mismatches.items()])
     answer |= {'failed': failed, 'warnings': warnings, 'labels_not_taken': mismatches}
     write_report(data.resolve().name, answer, recordings, study.params)
-    study.show(answer, report.make_tables(answer), answer['verdict'], EVALUATION_PAGE)
+    sentences = *answer['verdict'], 'In short:', *report.make_summary(answer)
+    study.show(answer, report.make_tables(answer), sentences, EVALUATION_PAGE)
     return 2 if failed else 0
 
 
@@ -160,10 +163,12 @@ def simulate(
         raise InputError('--recordings', f'recordings of people for the operator {HUMAN_PATHS}', 'none')
     found = find_recordings(recordings) if recordings is not None and HUMAN_PATHS in operators else {}
     write_report = study.load_report('simulation')
+    from foc_ros.analysis.evaluation.scores import warn_of_few
     from foc_ros.analysis.parallel import collect_all
     from foc_ros.analysis.simulation.operators import read_tasks
-    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_tables, run_pair, summarise
+    from foc_ros.analysis.simulation.study import RULES, make_pairs, make_summary, make_tables, run_pair, summarise
 
+    print_messages('foc_ros simulate', warn_of_few(trials, 'trials of each operator'))
     tasks = read_tasks(found.values(), study.params) if found else []
     with study.open_workers():
         run = partial(run_pair, config=study.params, rules=RULES)
@@ -171,7 +176,7 @@ def simulate(
     cells = summarise(results, seed)
     write_report(cells, results, study.params)
     words = 'none: without guidance; foc: with it; path: how far the hand moved.'
-    study.show({'cells': cells, 'seed': seed}, make_tables(cells), (words,), SIMULATION_PAGE)
+    study.show({'cells': cells, 'seed': seed}, make_tables(cells), (words, 'In short:', *make_summary(cells)), SIMULATION_PAGE)
     return 0
 
 

@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+import math
 import sys
+import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from textwrap import fill
 from typing import TypeVar
@@ -14,14 +17,15 @@ from typing import TypeVar
 from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn
 from rich.table import Table
+from rich.text import Text
 
 T = TypeVar('T')
 COLUMNS = 80
 """Width of a terminal, into which all tables fit [characters]."""
 QUIET_S = 3.0
-"""Time after which a progress is printed, where there is no terminal [s]."""
+"""Time after which a progress is printed, where there is no terminal [s]; infinite: none is."""
 
 
 class _Console(Console):
@@ -32,19 +36,65 @@ class _Console(Console):
         raise  # noqa: PLE0704
 
 
-def show_progress(items: Iterable[T], words: str, total: int) -> Iterator[T]:
-    """Yield the items and show a progress bar, or a line of text every some seconds where there is no terminal."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        next_s = time.monotonic() + QUIET_S
-        for done, item in enumerate(items, 1):
-            yield item
-            if time.monotonic() >= next_s:
-                print(f'{words}: {done} of {total}', file=sys.stderr, flush=True)
-                next_s = time.monotonic() + QUIET_S
+class _Words(ProgressColumn):
+    """Words that change while nothing is done, so that a reader sees that the program works."""
+
+    def __init__(self, say: Callable[[], str]) -> None:
+        super().__init__()
+        self._say = say
+
+    def render(self, _: object) -> Text:
+        """Return the words of now."""
+        return Text(self._say())
+
+
+def show_progress(
+    items: Iterable[T], words: str, total: int, count: Callable[[], int] | None = None, *, is_stage: bool = False
+) -> Iterator[T]:
+    """Yield the items and show a progress bar, or a line of text every some seconds where there is no terminal.
+
+    count: returns the number of predictions made so far, also for items that are not done; is_stage: whether also the end has a
+    line of text.
+    """
+    console, done, told, began_s = Console(stderr=True), 0, '', time.monotonic()
+
+    def say() -> str:
+        made = count() if count is not None else 0
+        return f'{words}, {time.monotonic() - began_s:.0f} s{f", {made} predictions" if made else ""}'
+
+    if console.is_terminal:
+        columns = _Words(say), BarColumn(16), MofNCompleteColumn()
+        with Progress(*columns, console=console, transient=True) as progress:
+            yield from progress.track(items, total=total)
         return
-    with Progress(console=console, transient=True) as progress:
-        yield from progress.track(items, total=total, description=words)
+
+    def print_line() -> None:
+        nonlocal told
+        with suppress(OSError):
+            if (line := f'{say()}: {done} of {total}') != told:
+                print(line, file=sys.stderr, flush=True)
+            told = line
+
+    def watch() -> None:
+        while not ended.wait(min(QUIET_S, threading.TIMEOUT_MAX)):
+            print_line()
+
+    ended, thread = threading.Event(), threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        for item in items:
+            done += 1
+            yield item
+    finally:
+        ended.set()
+        thread.join()
+    if is_stage and not math.isinf(QUIET_S):
+        print_line()
+
+
+def name_stage(stage: str, stages: Sequence[str]) -> str:
+    """Return the words of a progress for one of several stages."""
+    return f'stage {stages.index(stage) + 1} of {len(stages)}, {stage}'
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:

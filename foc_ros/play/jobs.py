@@ -18,6 +18,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from foc_ros.analysis.evaluation.scores import FEWEST
 from foc_ros.analysis.fitting.fit import find_worse_positions, show_value
 from foc_ros.core.errors import FocError, InputError
 
@@ -139,6 +140,8 @@ class Jobs:
         if losses:
             words = '; '.join(losses)
             text = f'{words[0].upper()}{words[1:]}. Predictions use the standard parameters, unless you choose yours.'
+        if answer['recordings'] < FEWEST:
+            text += f' Durations and likelihoods keep their values: {FEWEST} trials or more are needed for them.'
         return text + _name_unused(answer['failed'])
 
     async def _compare(self, recording: Recording, note: Note) -> str:

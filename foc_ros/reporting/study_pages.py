@@ -15,7 +15,7 @@ import numpy as np
 from foc_ros.analysis.evaluation import report as evaluation
 from foc_ros.analysis.evaluation.baselines import BOLTZMANN, PLAIN, PUBLISHED, REFITTED, UNIFORM
 from foc_ros.analysis.evaluation.observations import GAP, GOAL, PATH_CLASS
-from foc_ros.analysis.evaluation.scores import TENTHS
+from foc_ros.analysis.evaluation.scores import FEWEST, TENTHS, warn_of_few
 from foc_ros.analysis.fitting import fit as fitting
 from foc_ros.analysis.recordings import Recording
 from foc_ros.analysis.replay import Replay
@@ -32,10 +32,6 @@ from .page import Section, explain_tables, make_chart, make_picture, write_page
 from .report import ReportCollector
 from .views import choose_moment
 
-FEW = 20
-"""Number of recordings or trials below which a page warns."""
-AHEAD_S, LEVEL = '0.5', '0.9'
-"""The time ahead [s] and the probability of a region that the summary of an evaluation is about."""
 NAT = 'the unit of a natural logarithm of a probability. 0.69 nat more means twice the probability for what really happened.'
 EVALUATION_WORDS = {
     'nat': NAT,
@@ -91,7 +87,6 @@ SIMULATION_WORDS = {
     'bootstrap interval': 'the mean would be in it in 95 of 100 such studies. Two rules whose intervals overlap may be alike.',
 }
 """What the words in headings, columns and rows of each page mean."""
-RULE_WORDS = {FOC: 'with guidance', NONE: 'without guidance'}
 
 
 def write_evaluation(
@@ -102,7 +97,8 @@ def write_evaluation(
     config: Config | None = None,
 ) -> None:
     """Write the page; answer: as of `evaluate --json`, of recordings. Raises InputError where that cannot be done."""
-    counts = f'with intervals of 95 % by bootstrap over recordings, and the numbers of predictions of {PUBLISHED}'
+    counts = f'with the numbers of predictions of {PUBLISHED}, and with intervals of 95 % by bootstrap over recordings where '
+    counts += f'these are {FEWEST} or more'
     gain = 'mean log-likelihood of the true {} above uniform [nat], by tenths of the movement.'
     captions = {
         PATH_CLASS: f'Path past the obstacles still ahead: {gain.format("path")}',
@@ -118,7 +114,7 @@ def write_evaluation(
     named = [[caption for _, caption in pictures], *map(list, answer['questions'].values())]
     all_predictors, *tables = explain_tables([('All predictors', (), named), *evaluation.make_tables(answer)], EVALUATION_WORDS)
     sections = [
-        Section('In short', summarise_evaluation(answer)),
+        Section('In short', evaluation.make_summary(answer)),
         *draw_example(recordings, config),
         replace(all_predictors, pictures=pictures, rows=()),
         Section('Compared with simpler predictors', answer['verdict']),
@@ -127,30 +123,6 @@ def write_evaluation(
     failed = [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     warnings = [*answer['warnings'], *warn_of_few(answer['recordings'], 'recordings'), *failed]
     write_page(directory, EVALUATION_PAGE, f'Evaluation: {title}', sections, warnings, config)
-
-
-def summarise_evaluation(answer: Mapping[str, Any]) -> list[str]:
-    """Return the main results of `evaluate --json` in plain words."""
-    count = answer['recordings']
-    words = f'{count} recording{"s were" if count > 1 else " was"} predicted'
-    sentences = [f'{words}, at {answer["predictions"]} moments on the way.']
-    questions = {PATH_CLASS: 'path past the obstacles', GOAL: 'goal', GAP: 'gap in the next row of obstacles'}
-    for name, asked in questions.items():
-        if name in answer['questions']:
-            ours, guess = (answer['questions'][name][each] for each in (PUBLISHED, UNIFORM))
-            chances = [100.0 * np.exp(each['log_likelihood']) for each in (ours, guess)]
-            sentences.append(
-                f'The likeliest {asked} was the one that the hand took in {100.0 * ours["right"]:.0f} % of them. The true '
-                f'one had a probability of {chances[0]:.0f} % (geometric mean); a guess among equals gives it {chances[1]:.0f} %.'
-            )
-    positions = answer['positions']
-    error_m, share = positions['displacement_m'][evaluation.OURS]['final'][AHEAD_S], positions['inside_all'][LEVEL][AHEAD_S]
-    if error_m is not None:
-        sentences.append(f'{AHEAD_S} s ahead, the predicted position was {1e3 * error_m:.0f} mm from the true one on average.')
-    if share is not None:
-        level = 100.0 * float(LEVEL)
-        sentences.append(f'The region that should hold {level:.0f} % of the true positions then held {100.0 * share:.0f} %.')
-    return sentences
 
 
 def _find_look(predictor: str, all_predictors: Iterable[str]) -> dict[str, Any]:
@@ -180,7 +152,8 @@ def _draw_reliability(axes: Any, _: str, by_predictor: Mapping[str, Any]) -> Non
     for predictor in (PUBLISHED, REFITTED, BOLTZMANN):
         bins = [each for each in by_predictor[predictor]['reliability'] if each['count']]
         shares = np.array([each['right'] for each in bins])
-        errors = np.abs(np.array([each['interval'] for each in bins]).reshape(-1, 2).T - shares)
+        intervals = [each['interval'] if each['recordings'] >= FEWEST else (np.nan, np.nan) for each in bins]
+        errors = np.abs(np.array(intervals).reshape(-1, 2).T - shares)
         look = {'capsize': 2, 'label': predictor, **_find_look(predictor, by_predictor)}
         (line, *_) = axes.errorbar([each['confidence'] for each in bins], shares, errors, **look)
         for each in bins if predictor == PUBLISHED else ():
@@ -203,7 +176,8 @@ def write_fit(
     count, failed = answer['recordings'], [f'{name}: {reason}' for name, reason in answer['failed'].items()]
     commands = [('parameter file', answer['output']), *zip(('without ROS', 'with ROS'), answer['node'], strict=True)]
     changed = sum(each['value'] != each['given'] for each in (*answer['parameters'].values(), *answer['chosen'].values()))
-    fitted = f'Fitted to {count} recordings, {changed} parameters changed.'
+    kept = len(fitting.format_kept(answer))
+    fitted = f'Fitted to {count} recording{"s" * (count != 1)}, {changed} parameter{"s" * (changed != 1)} changed, {kept} kept.'
     caption = 'Fitted values as multiples of the given ones, with 95 % intervals by bootstrap over recordings; '
     caption += 'the line is the given value.'
     drawn = {name: each for name, each in answer['parameters'].items() if each['given'] > 0.0 and each['value'] > 0.0}
@@ -215,7 +189,7 @@ def write_fit(
         *explain_tables(fitting.make_tables(answer), FIT_WORDS),
         Section('Run the node with these parameters', rows=commands),
     ]
-    warnings = [*warn_of_few(count, 'recordings'), *answer['warnings'], *failed]
+    warnings = [*answer['warnings'], *failed]
     write_page(directory, FIT_PAGE, f'Fit: {title}', sections, warnings, config)
 
 
@@ -242,7 +216,7 @@ def write_simulation(
     directory: Path, cells: Sequence[Mapping[str, Any]], results: Sequence[study.PairResult], config: Config | None = None
 ) -> None:
     """Write the page; cells: of `simulate --json`. Raises InputError where that cannot be done."""
-    words = 'mean over the paired trials, with its bootstrap interval of 95 %.'
+    words = f'mean over the paired trials, of {FEWEST} or more with its bootstrap interval of 95 %.'
     measures = [
         make_chart((6.4, 4.2), f'{study.COLUMNS[name][0]}: {words}', _draw_measure, cells, name)
         for name in ('collision_rate', 'completion_s', 'opposing_impulse')
@@ -254,27 +228,12 @@ def write_simulation(
         if each.task
     ]
     sections = [
-        Section('In short', summarise_simulation(cells), pictures=measures),
+        Section('In short', study.make_summary(cells), pictures=measures),
         *explain_tables(study.make_tables(cells), SIMULATION_WORDS),
         Section('Single trials', pictures=trials),
     ]
     warnings = warn_of_few(min(cell['trials'] for cell in cells), 'trials of each operator') if cells else []
     write_page(directory, SIMULATION_PAGE, 'Closed-loop study of guidance', sections, warnings, config)
-
-
-def summarise_simulation(cells: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return for each operator what guidance changes, in plain words."""
-    measures = {'collision_rate': 'collisions in {:.0f} % of the trials', 'completion_s': '{:.2f} s for a movement'}
-    sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
-    for operator in dict.fromkeys(cell['operator'] for cell in cells):
-        by_rule, told = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}, []
-        for rule, words in RULE_WORDS.items():
-            values = {name: by_rule[rule][name] for name in measures} if rule in by_rule else {}
-            known = [measures[name].format(study.COLUMNS[name][1] * each) for name, each in values.items() if each is not None]
-            if values:
-                told.append(f'{" and ".join(known)} {words}')
-        sentences.append(f'{operator.replace("_", " ").capitalize()}: {"; ".join(told)}.')
-    return sentences
 
 
 def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> None:
@@ -285,14 +244,15 @@ def _draw_measure(axes: Any, cells: Sequence[Mapping[str, Any]], name: str) -> N
         drawn = [cell for cell in cells if cell['assistance'] == rule and cell[name] is not None]
         at = [operators.index(cell['operator']) + 0.14 * (number - (len(rules) - 1) / 2) for cell in drawn]
         means = factor * np.array([cell[name] for cell in drawn])
-        bounds = factor * np.array([cell[f'{name}_interval'] for cell in drawn]).reshape(-1, 2)
+        intervals = [cell[f'{name}_interval'] if cell['trials'] >= FEWEST else (np.nan, np.nan) for cell in drawn]
+        bounds = factor * np.array(intervals, dtype=float).reshape(-1, 2)
         errors = np.maximum(np.abs(bounds.T - means), 0.0)
         axes.errorbar(
             at,
             means,
             errors,
             fmt='o',
-            label=RULE_WORDS.get(rule, rule),
+            label=study.RULE_WORDS.get(rule, rule),
             markersize=4,
             capsize=2,
             color=get_class_style(number)[0],
@@ -308,19 +268,13 @@ def _draw_trial(axes: Any, task: Task, trials: Mapping[str, study.Trial]) -> Non
     axes.plot(*task.path[:, 0].T, color='black', linestyle='--', linewidth=1.0, label='intended')
     for number, (rule, trial) in enumerate(trials.items()):
         look = {'color': get_class_style(number)[0], 'linewidth': 2.0 if rule in (FOC, NONE) else 1.0}
-        axes.plot(*trial.position.T, label=RULE_WORDS.get(rule, rule), **look)
+        axes.plot(*trial.position.T, label=study.RULE_WORDS.get(rule, rule), **look)
         touching = trial.position[trial.measure_clearances(task) < 0.0]
         axes.plot(*touching.T, linestyle='', marker='x', markersize=4, color=look['color'])
         if rule == FOC:
             rows = np.linspace(0, len(trial.position) - 1, 24).astype(int)
             options = {'angles': 'xy', 'scale_units': 'xy', 'scale': 60.0, 'width': 0.004, 'color': look['color']}  # [N/m]
             axes.quiver(*trial.position[rows].T, *trial.assistance[rows].T, zorder=6, **options)
-
-
-def warn_of_few(count: int, what: str) -> list[str]:
-    """Return a warning where recordings or trials are few."""
-    words = f'Few {what} ({count}): intervals are wide, and differences may be chance. {FEW} or more tell more.'
-    return [words] if count < FEW else []
 
 
 def draw_example(recordings: Mapping[str, Recording] | None, config: Config | None) -> list[Section]:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
-from foc_ros.analysis.parallel import collect
+from foc_ros.analysis.parallel import collect, count_prediction
 from foc_ros.analysis.recordings import Recording, group_by_operator
 from foc_ros.analysis.replay import Replay, Step, keep_last_run
 from foc_ros.core.classes.rows import Decisions, Rows, find_decisions, find_direction, find_rows, tabulate_sides
@@ -36,7 +36,7 @@ from foc_ros.core.prediction import PredictedCandidate, Prediction
 from foc_ros.core.situation import simplify_start
 from foc_ros.core.types import NANOSECONDS, Array, HandSample, HandState, Record
 
-from .truth import HORIZONS_S, TIMES_S, Bools, GroundTruth, RecordedPath, Sides, find_ground_truth, find_open_gaps
+from .truth import HORIZONS_S, TIMES_S, Bools, GroundTruth, RecordedPath, Sides, check_samples, find_ground_truth, find_open_gaps
 
 EXACT = 1e-18
 """Variance that is added to that of a position, which may be known [m^2]: that of a nanometre."""
@@ -142,6 +142,8 @@ def observe(
     for step in replayed.steps(recording.items()):
         if step.sample is not None:
             keep_last_run(samples, step.sample, made)
+        if step.prediction is not None:
+            count_prediction()
         if step.prediction is not None and step.prediction.candidates_with_likelihood:
             assert replayed.pipeline.hand_state is not None
             made.append((step, replayed.pipeline.hand_state, replayed.pipeline.adapted_config))
@@ -149,6 +151,7 @@ def observe(
     if not made:
         reason = losses or replayed.pipeline.not_ready_reason() or 'no candidate could be solved'
         raise RecordingError(f'{recording.name}: nothing could be predicted: {reason}')
+    check_samples(recording.name, samples)
     if losses:
         warn(f'{recording.name}: {losses}')
     goals = made[-1][0].scene.goals
@@ -167,16 +170,19 @@ def observe_in_order(recordings: Sequence[Recording], config: Config) -> tuple[l
         try:
             observed.append(observe(recording, config, replayed))
         except FocError as error:
-            failed[recording.name] = ' '.join(str(error).split())
+            failed[recording.name] = ' '.join(str(error).split()).removeprefix(f'{recording.name}: ')
     return observed, failed
 
 
 def observe_all(
-    recordings: Mapping[str, Recording], config: Config, in_order: bool = False
+    recordings: Mapping[str, Recording], config: Config, in_order: bool = False, stage: str = 'replay'
 ) -> tuple[list[ObservedRecording], dict[str, str]]:
-    """Observe recordings in parallel with a progress bar, or as `observe_in_order`; return the failures by name as well."""
+    """Observe recordings in parallel with a progress bar, or as `observe_in_order`; return the failures by name as well.
+
+    stage: words of the progress bar.
+    """
     groups = group_by_operator(recordings) if in_order else {name: [each] for name, each in recordings.items()}
-    parts, failed = collect(partial(observe_in_order, config=config), list(groups.items()), 'replay')
+    parts, failed = collect(partial(observe_in_order, config=config), list(groups.items()), stage)
     failed |= {name: reason for _, reasons in parts for name, reason in reasons.items()}
     return [each for observed, _ in parts for each in observed], failed
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +19,22 @@ from foc_ros.core.config import Config, flatten
 from foc_ros.core.solution import LEFT
 from foc_ros.core.types import Array
 from foc_ros.io.csv_tables import read_rows
+from foc_ros.io.terminal import show_progress
 
-from .baselines import PLAIN, PUBLISHED, REFITTED, Baseline, make_baselines
+from .baselines import PLAIN, PUBLISHED, REFITTED, UNIFORM, Baseline, make_baselines
 from .observations import GAP, GOAL, PATH_CLASS, Observation, ObservedRecording, Questions, ask_all
 from .positions import compute_position_scores
-from .scores import TENTHS, Scores, choose_held_out, compare_scores, compute_log_likelihoods, score_forecasts, summarise
+from .scores import FEWEST, TENTHS, Scores, choose_held_out, compare_scores, compute_log_likelihoods, score_forecasts, summarise
 from .truth import HORIZONS_S
 
 FITTED_TO = {PATH_CLASS: PATH_CLASS, GAP: PATH_CLASS, GOAL: GOAL}
 """The question by whose answers the settings of a predictor are chosen, for each question that it is scored by."""
 OURS = 'likelihood-weighted'
 """The predicted positions that are compared with those of the baselines."""
+OWN_POSITIONS = OURS, 'most likely'
+UNKNOWN = 'not distinguishable from'
+ASKED = {PATH_CLASS: 'path past the obstacles', GOAL: 'goal', GAP: 'gap in the next row of obstacles'}
+"""What each question is about, in words."""
 COVERAGE_S, COVERAGE_LEVEL = '0.5', 0.9
 """Horizon and probability of the region that is judged."""
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
@@ -49,19 +55,27 @@ REGIONS = {
 }
 
 
-def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[str, Any]:
-    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON."""
+def evaluate(recordings: Sequence[ObservedRecording], config: Config, say: Callable[[str], str] = str) -> dict[str, Any]:
+    """Score all predictors on recordings, at least one, that were replayed with a configuration; return plain values for JSON.
+
+    say: returns the words of a progress for `compare` and `score`.
+    """
     baselines = make_baselines(recordings, config.likelihood)
     items = [(recording.name, (recording, baselines)) for recording in recordings]
     # log-likelihood of each recording (r) under each setting (s), (r, s), by question and predictor
-    tables = collect_all(_tabulate_log_likelihoods, items, 'compare')
+    tables = collect_all(_tabulate_log_likelihoods, items, say('compare'))
     table = {key: np.array([each[key] for each in tables]) for key in tables[0]}
     asked = {name: [ask_all(each, name) for each in recordings] for name in FITTED_TO}
     asked = {name: questions for name, questions in asked.items() if any(questions)}
-    scores = {
-        name: {each.name: _score_held_out(each, table[FITTED_TO[name], each.name], questions) for each in baselines}
-        for name, questions in asked.items()
-    }
+    pairs = [(name, each) for name in asked for each in baselines]
+    work: list[Callable[[], Any]] = [
+        partial(_score_held_out, each, table[FITTED_TO[name], each.name], asked[name]) for name, each in pairs
+    ]
+    work.append(partial(compute_position_scores, recordings))
+    *scored, positions = show_progress((each() for each in work), say('score'), len(work), is_stage=True)
+    scores: dict[str, dict[str, Scores]] = {name: {} for name in asked}
+    for (name, each), found in zip(pairs, scored, strict=True):
+        scores[name][each.name] = found
     best = {key: int(each.sum(axis=0).argmax()) for key, each in table.items()}
     answer = {
         'recordings': len(recordings),
@@ -80,7 +94,7 @@ def evaluate(recordings: Sequence[ObservedRecording], config: Config) -> dict[st
             for name in asked
             if name != GAP
         },
-        'positions': compute_position_scores(recordings),
+        'positions': positions,
         'parameters': flatten(config),
     }
     return answer | {'verdict': make_verdict(answer)}
@@ -152,10 +166,10 @@ def find_gaps(observation: Observation) -> list[int]:
 
 def make_verdict(answer: Mapping[str, Any]) -> list[str]:
     """Return the sentences about an answer of `evaluate --json`; two errors of positions are alike within 2 %."""
-    sentences = [_judge_question(name, each) for name, each in answer['comparisons'].items()]
+    sentences = [_judge_question(name, each, answer['recordings']) for name, each in answer['comparisons'].items()]
     errors = answer['positions']['displacement_m']
     for horizon, ours in errors[OURS]['final'].items():
-        others = {name: each['final'][horizon] for name, each in errors.items() if name not in (OURS, 'most likely')}
+        others = {name: each['final'][horizon] for name, each in errors.items() if name not in OWN_POSITIONS}
         judged = []
         for name, each in others.items() if ours is not None else ():
             word = 'like' if abs(ours - each) <= 0.02 * each else 'better than' if ours < each else 'worse than'
@@ -184,22 +198,75 @@ def judge_coverage(share: float, recordings: int) -> str:
     return f'so it is too {"narrow" if difference < 0.0 else "wide"}'
 
 
-def _judge_question(name: str, comparisons: Mapping[str, Any]) -> str:
+def _judge(comparison: Mapping[str, Any], recordings: int) -> str:
+    """Return in words how a predictor compares with another one; few recordings are no evidence."""
+    if comparison['interval'] is None or recordings < FEWEST:
+        count = 1 if comparison['interval'] is None else recordings
+        return f'by {"one recording" if count == 1 else f"{count} recordings"} {UNKNOWN}'
+    low, high = comparison['interval']
+    return 'better than' if low > 0.0 else 'worse than' if high < 0.0 else UNKNOWN
+
+
+def _judge_question(name: str, comparisons: Mapping[str, Any], recordings: int) -> str:
     unit, factor = ('points of 100', 100.0) if name == GAP else ('nat', 1.0)
-    unknown = 'not distinguishable from'
-    groups: dict[str, list[str]] = {'better than': [], unknown: [], f'by one recording {unknown}': [], 'worse than': []}
+    groups: dict[str, list[str]] = {'better than': [], UNKNOWN: []}
     for baseline, each in comparisons.items():
-        low, high = each['interval'] or (0.0, 0.0)
-        alike = unknown if each['interval'] else f'by one recording {unknown}'
-        worse = each['worse_tenths'] if each['interval'] else []  # the tenths of one recording are no evidence
+        verdict = _judge(each, recordings)
+        worse = [] if verdict.startswith('by ') else each['worse_tenths']
         runs = np.split(worse, np.flatnonzero(np.diff(worse) > 1) + 1)
         tenths = ', '.join(' to '.join(str(end) for end in dict.fromkeys((run[0], run[-1]))) for run in runs if len(run))
         where = f', worse in tenths {tenths}' if 0 < len(worse) < TENTHS else ''
         words = f'{baseline} ({factor * each["difference"]:+.2g} {unit}{where})'
-        groups['better than' if low > 0.0 else 'worse than' if high < 0.0 else alike].append(words)
+        groups.setdefault(verdict, []).append(words)
     judged = '; '.join(f'{verdict} {", ".join(each)}' for verdict, each in groups.items() if each)
     subject = {PATH_CLASS: 'Paths', GAP: 'Next gaps', GOAL: 'Goals'}[name]
     return f'{subject}: {PUBLISHED} is {judged}.'
+
+
+def make_summary(answer: Mapping[str, Any]) -> list[str]:
+    """Return the main results of `evaluate --json` in plain words, beside those of the simple predictors."""
+    count = answer['recordings']
+    words = f'{PUBLISHED} predicted {count} recording{"s" * (count > 1)}'
+    sentences = [f'{words}, at {answer["predictions"]} moments on the way.']
+    for name, asked in ASKED.items():
+        if name in answer['questions']:
+            sentences += _summarise_question(name, asked, answer, count)
+    if 0 < count < FEWEST:
+        sentences.append(f'{FEWEST} recordings are needed to tell differences between predictors from chance.')
+    errors, share = answer['positions']['displacement_m'], answer['positions']['inside_all'][f'{COVERAGE_LEVEL:g}'][COVERAGE_S]
+    if (error_m := errors[OURS]['final'][COVERAGE_S]) is not None:
+        others = [f'{name} {1e3 * errors[name]["final"][COVERAGE_S]:.0f} mm' for name in errors if name not in OWN_POSITIONS]
+        ours = f'{COVERAGE_S} s ahead, the predicted position was {1e3 * error_m:.0f} mm from the true one on average'
+        sentences.append(f'{ours}; that of {", of ".join(others)}.')
+    if share is not None:
+        level = 100.0 * COVERAGE_LEVEL
+        sentences.append(f'The region that should hold {level:.0f} % of the true positions then held {100.0 * share:.0f} %.')
+    return sentences
+
+
+def _summarise_question(name: str, asked: str, answer: Mapping[str, Any], recordings: int) -> list[str]:
+    scores, comparisons = answer['questions'][name], answer['comparisons'][name]
+    simple = [name for name in comparisons if name != UNIFORM]
+    found = {}
+    for score in ('right', 'log_likelihood'):
+        best = max(simple, key=lambda name: scores[name][score])
+        found[score] = [scores[PUBLISHED][score], scores[best][score], best]
+    chances = [100.0 * np.exp(each) for each in (*found['log_likelihood'][:2], scores[UNIFORM]['log_likelihood'])]
+    ours, other, best = found['right']
+    sentences = [
+        f'The likeliest {asked} was the one that the hand took in {100.0 * ours:.0f} % of them; with the best simple predictor, '
+        f'{best}, in {100.0 * other:.0f} %. The true one had a probability of {chances[0]:.0f} % (geometric mean); '
+        f'the best simple predictor, {found["log_likelihood"][2]}, gives it {chances[1]:.0f} %, a guess among equals '
+        f'{chances[2]:.0f} %.'
+    ]
+    verdicts, told = {each: _judge(comparisons[each], recordings) for each in simple}, []
+    for verdict in ('better than', 'worse than', UNKNOWN):
+        names = [each for each in simple if verdicts[each] == verdict]
+        told += (
+            [f'{verdict} {f"all {len(simple)} simple ones" if len(names) == len(simple) else ", ".join(names)}'] if names else []
+        )
+    subject = 'By how often it was right' if name == GAP else 'By this probability'
+    return sentences + ([f'{subject}, {PUBLISHED} is {"; ".join(told)}.'] if told else [])
 
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[Table]:

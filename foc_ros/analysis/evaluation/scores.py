@@ -36,6 +36,10 @@ RESAMPLES, SEED = 1000, 1
 CENTRAL = (2.5, 97.5)
 """Percentiles of an interval of 95 %."""
 TIE = 1e-12
+FEWEST = 6
+"""Recordings below which nothing has an interval of 95 % over recordings: n of them hold the median with 1 - 2^(1 - n)."""
+FEW = 20
+"""Recordings or trials below which a result comes with a warning."""
 
 
 def compute_log_likelihoods(questions: Questions, baseline: Baseline) -> Array:
@@ -147,13 +151,14 @@ def find_tenths(progress: Array) -> NDArray[np.int64]:
 
 
 def compute_reliability(scores: Scores) -> list[dict[str, Any]]:
-    """Return count, mean confidence and share of correct answers, with its interval, for each bin of the confidence."""
+    """Return numbers, mean confidence and share of correct answers, with its interval, for each bin of the confidence."""
     number = np.minimum((scores.confidence * BINS).astype(int), BINS - 1)
     return [
         {
             'from': each / BINS,
             'to': (each + 1) / BINS,
             'count': len(own.correct),
+            'recordings': len(np.unique(own.recording)),
             'confidence': find_mean(own.confidence),
             'right': find_mean(own.correct),
             'interval': compute_mean_interval(own.correct, own.recording) if len(own.correct) else None,
@@ -224,6 +229,12 @@ def describe_other_goal(scores: Mapping[str, Any]) -> str:
         f'{scores["area_under_curve"]:.2f} of all; calibration error {scores["calibration_error"]:.3f}; '
         f'loss {scores["loss"]:.3f} nat.'
     )
+
+
+def warn_of_few(count: int, what: str) -> list[str]:
+    """Return a warning where recordings or trials are few."""
+    words = f'Few {what} ({count}): intervals are wide, and differences may be chance. {FEW} or more tell more.'
+    return [words] if count < FEW else []
 
 
 def draw_rows(n: int, seed: int = SEED, resamples: int = RESAMPLES) -> NDArray[np.intp]:

@@ -107,6 +107,12 @@ class RecordedHand:
         return updates
 
 
+def check_samples(name: str, samples: Sequence[HandSample]) -> None:
+    """Raise RecordingError where a recording has too few samples to show a movement."""
+    if len(samples) < MIN_SAMPLES:
+        raise RecordingError(f'{name}: expected at least {MIN_SAMPLES} hand poses, got {len(samples)}')
+
+
 def read_hand(recording: Recording, config: Config) -> RecordedHand:
     """Read a recording as a replay does, without predicting; raises RecordingError for one without goals or with few samples."""
     replayed, samples = Replay(config), list[HandSample]()
@@ -116,8 +122,7 @@ def read_hand(recording: Recording, config: Config) -> RecordedHand:
     scene = replayed.pipeline.scene
     if scene.goals is None or not len(scene.goals):
         raise RecordingError(f'{recording.name}: {replayed.pipeline.not_ready_reason() or "no goal received"}')
-    if len(samples) < MIN_SAMPLES:
-        raise RecordingError(f'{recording.name}: expected at least {MIN_SAMPLES} hand poses, got {len(samples)}')
+    check_samples(recording.name, samples)
     path = RecordedPath.from_samples(samples, scene.goals)
     return RecordedHand(recording.name, path, scene.obstacles(samples[0].stamp_ns), samples[0].frame_id)
 

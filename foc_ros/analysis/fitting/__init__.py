@@ -5,7 +5,8 @@
 What is tried is a table: every setting of a grid on every recording once. So the bootstrap over recordings and the
 cross-validation are exact. A parameter that the recordings do not determine keeps its given value: where its profile, the best
 log-likelihood over all other parameters, is flat, hardly better than at the given value, or best at the end of what was tried,
-unless that is a bound of the parameter.
+unless that is a bound of the parameter. Of fewer than `FEWEST` recordings only the filter is fitted, to which each sample tells
+something; its intervals then hold all values that explain the samples as well.
 """
 
 from __future__ import annotations
@@ -18,17 +19,15 @@ from typing import Any
 
 import numpy as np
 
-from foc_ros.analysis.evaluation.scores import CENTRAL, choose_held_out, resample
+from foc_ros.analysis.evaluation.scores import CENTRAL, FEWEST, choose_held_out, resample
 from foc_ros.core.config import list_parameters
 from foc_ros.core.types import Array
 
 BOUNDS = {parameter.name: parameter.bound for parameter in list_parameters()}
-FEWEST = 3
-"""Recordings of which one can be held out."""
 FLAT_NAT = 2.0
 """A profile that varies by less is flat: settings this far apart are not distinguished (95 % of chi-square, halved)."""
-STAGES = 'read', 'noise', 'eta', 'movement', 'replay', 'likelihood', 'before', 'after'
-"""What takes time, in its order. Without obstacles there is neither noise nor eta to fit."""
+STAGES = 'noise', 'eta', 'movement', 'replay', 'likelihood', 'before', 'after'
+"""What takes time, in its order. Without obstacles there is neither noise nor eta to fit, of few recordings no prediction."""
 Setting = Mapping[str, float]
 """Values by dotted name."""
 
@@ -80,11 +79,6 @@ class Findings:
         self.undetermined = {name: why for name, why in undetermined.items() if name not in self.values}
         self.scores |= later.scores
         self.warnings += later.warnings
-
-
-def name_stage(stage: str) -> str:
-    """Return the words of a progress bar for one of the `STAGES`."""
-    return f'stage {STAGES.index(stage) + 1} of {len(STAGES)}, {stage}'
 
 
 def clip_to_bounds(name: str, value: float) -> float:
@@ -183,8 +177,11 @@ class SettingTable:
         found = Findings(undetermined=undetermined)
         if len(undetermined) == len(given):  # which may be among none of the settings
             return found, left
-        best, drawn = left.best, left.draw_best()
+        best, drawn, totals = left.best, left.draw_best(), np.nansum(left.values, axis=0)
+        alike = [left.settings[each] for each in np.flatnonzero(totals > totals.max() - FLAT_NAT)]
         for name in [each for each in given if each not in undetermined]:
             resampled = [each[name] for each in drawn]
+            if len(self.values) < FEWEST:
+                resampled = [*{*resampled, *(each[name] for each in alike)}]
             found.estimates[name] = Estimate.from_resamples(clip_to_bounds(name, best[name]), resampled, how)
         return found, left

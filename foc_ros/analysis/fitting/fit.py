@@ -7,7 +7,7 @@ First come the parameters that need no prediction, then those that need replays,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -19,22 +19,27 @@ from foc_ros.analysis.evaluation.baselines import Forecast
 from foc_ros.analysis.evaluation.observations import GAP, ObservedRecording, ask_all, ask_main, observe
 from foc_ros.analysis.evaluation.positions import compute_position_scores
 from foc_ros.analysis.evaluation.report import COVERAGE_LEVEL, COVERAGE_S, OURS
-from foc_ros.analysis.evaluation.scores import find_mean, score_forecasts
+from foc_ros.analysis.evaluation.scores import FEW, FEWEST, find_mean, score_forecasts, warn_of_few
 from foc_ros.analysis.evaluation.truth import RecordedHand, read_hand, warn_of_several_movements
 from foc_ros.analysis.parallel import collect
 from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import Config, flatten, replace_values
-from foc_ros.core.errors import RecordingError
+from foc_ros.core.errors import RecordingError, warn
+from foc_ros.io.terminal import name_stage
 
-from . import FEWEST, Findings, clip_to_bounds, name_stage
-from .direct import fit_duration, fit_estimator, fit_fading, fit_wait
-from .one_replay import fit_likelihood, fit_widening
+from . import STAGES, Findings, clip_to_bounds
+from .direct import CONSTANTS, FADING, WAIT, fit_duration, fit_estimator, fit_fading, fit_wait
+from .one_replay import LIKELIHOODS, TRIED_WIDENINGS, fit_likelihood, fit_widening
 from .race import Replays, make_eta_settings, make_movement_settings, make_noise_settings, sample_names, search_settings
 
 PREDICTIONS = 10
 """About as many predictions are made in each recording, because neighbours say the same."""
 UNSCALED: dict[str, object] = {'covariance.near': 1.0, 'covariance.far': 1.0}
 """A fit sets both factors to 1, because it fits the covariances that they multiply."""
+TOO_FEW = (
+    f'only what the filter of the hand needs is fitted, as every sample shows it. All else keeps its given values: '
+    f'{FEWEST} recordings are needed for an interval of 95 %, and {FEW} or more are better.'
+)
 COMPARISON_TITLES = {
     'class_gain': ('log-likelihood of the answer taken, above uniform [nat]', 1.0, 3),
     'gap_right': ('next gap correct [%]', 100.0, 1),
@@ -51,22 +56,37 @@ SCORE_TITLES = {
     'inside_90': 'positions of moving hands in the 90 % ellipse of the most likely candidate at 0.5 s',
     'inside_all_90': 'positions of moving hands in the 90 % region of all candidates at 0.5 s',
 }
+FROM_ONE_REPLAY = *LIKELIHOODS, *TRIED_WIDENINGS
+FROM_MOVEMENTS = 'duration.arrival', WAIT, FADING, 'foc.noise_x', 'foc.noise_y', 'foc.eta', *FROM_ONE_REPLAY
+"""Parameters to which one movement tells one thing, apart from the constants of durations."""
 Rows = list[tuple[str, ...]]
 
 
 @dataclass
 class Fit(Findings):
-    """The findings of all steps so far, and the configuration with them; comparison: of given and fitted parameters."""
+    """The findings of all steps so far, and the configuration with them.
+
+    comparison: of given and fitted parameters; stages: those of the `STAGES` that there are.
+    """
 
     config: Config = field(default_factory=Config)
     recordings: int = 0
     failed: dict[str, str] = field(default_factory=dict)
     comparison: dict[str, dict[str, float | None]] = field(default_factory=dict)
+    stages: Sequence[str] = STAGES
 
     def take(self, later: Findings) -> None:
         """Take what a later step found, also into the configuration."""
         super().take(later)
         self.config = replace_values(self.config, later.values)
+
+    def name_stage(self, stage: str) -> str:
+        """Return the words of a progress bar for a stage."""
+        return name_stage(stage, self.stages)
+
+    def keep(self, names: Iterable[str], count: int) -> None:
+        """Leave parameters as they are because recordings, a number of them, are too few."""
+        self.undetermined |= dict.fromkeys(names, f'too few recordings: {count}, {FEWEST} are needed')
 
 
 def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lower_eta: bool = False) -> Fit:
@@ -75,64 +95,80 @@ def fit_parameters(recordings: Mapping[str, Recording], config: Config, may_lowe
     may_lower_eta: whether obstacles may be avoided with less certainty than the configuration wants.
     """
     fit = Fit(config=config)
-    hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), name_stage('read'))
+    hands, fit.failed = collect(partial(read_hand, config=config), list(recordings.items()), 'read')
     if not hands:
         raise RecordingError(f'no recording can be used: {"; ".join(f"{name}: {why}" for name, why in fit.failed.items())}')
     fit.recordings, usable = len(hands), {each.name: recordings[each.name] for each in hands}
     fit.warnings += warn_of_several_movements((each.name, each.path) for each in hands)
-    for step in (fit_estimator, fit_fading, fit_duration, fit_wait):
-        fit.take(step(hands, fit.config))
+    few = warn_of_few(len(hands), 'recordings')
+    if len(hands) < FEWEST:
+        few, fit.stages = [f'Too few recordings ({len(hands)}): {TOO_FEW}'], STAGES[-2:]
+    for words in few:
+        warn(words)
+    fit.warnings += few
     if config.foc.strategy == 'fixed':
         fit.warnings.append('foc.tau, foc.lam: kept as they are; examples/plan_recovery finds them from movements')
+    fit.take(fit_estimator(hands, config))
     duration_s = float(np.median([each.times[-1] for each in hands]))
     rate_hz = clip_to_bounds('rate_hz', min(config.rate_hz, PREDICTIONS / max(duration_s, 1e-3)))
     thinned = {'rate_hz': rate_hz, 'covariance.adaptation': 'none'}
-    _search(hands, fit, Replays(usable, thinned | UNSCALED), may_lower_eta)
-    _fit_to_one_replay(usable, fit, thinned | UNSCALED)
-    given = flatten(config)
-    fit.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
-    fit.config = replace_values(fit.config, UNSCALED)
+    if len(hands) < FEWEST:
+        fit.keep((*CONSTANTS[config.duration.model], *FROM_MOVEMENTS), len(hands))
+    else:
+        for step in (fit_fading, fit_duration, fit_wait):
+            fit.take(step(hands, fit.config))
+        _search(hands, fit, Replays(usable, thinned | UNSCALED), may_lower_eta)
+        _fit_to_one_replay(usable, fit, thinned | UNSCALED)
     compared = {name: usable[name] for name in sample_names(list(usable))}
-    fit.comparison = compare_configs(compared, (config, fit.config), thinned)
+    fit.comparison = compare_configs(compared, (config, fit.config), thinned, fit.name_stage)
     fit.warnings[:0] = find_worse_positions(fit.comparison)
     return fit
 
 
 def _search(hands: Sequence[RecordedHand], fit: Fit, replays: Replays, may_lower_eta: bool) -> None:
     """Fit the parameters that need replays."""
-    if not any(len(each.obstacles) for each in hands):
+    has_obstacles = any(len(each.obstacles) for each in hands)
+    if not has_obstacles:
         reason = 'no recording has an obstacle, without which neither margins nor noise show'
         fit.undetermined |= dict.fromkeys(('foc.eta', 'foc.noise_x', 'foc.noise_y'), reason)
-    elif fit.config.foc.strategy != 'fixed':
+    if not has_obstacles or fit.config.foc.strategy == 'fixed':
         # with strategy `fixed` eta has no effect, and lambda holds for the noise as it is
-        fit.take(search_settings('noise', make_noise_settings(fit.config), replays))
-        fit.take(search_settings('eta', make_eta_settings(fit.config, may_lower_eta), replays))
+        fit.stages = STAGES[2:]
+    else:
+        fit.take(search_settings(fit.name_stage('noise'), make_noise_settings(fit.config), replays))
+        fit.take(search_settings(fit.name_stage('eta'), make_eta_settings(fit.config, may_lower_eta), replays))
         if not may_lower_eta:
             fit.warnings.append('foc.eta: values below the given one were not tried; --allow eta tries them')
-    fit.take(search_settings('movement', make_movement_settings(hands, fit.config), replays))
+    fit.take(search_settings(fit.name_stage('movement'), make_movement_settings(hands, fit.config), replays))
 
 
 def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: Mapping[str, object]) -> None:
     """Fit the likelihood and the widening of the covariance to one replay, and score them held out."""
     config = replace_values(fit.config, thinned)
-    observed, failed = collect(partial(observe, config=config, with_plans=True), list(recordings.items()), name_stage('replay'))
+    predict = partial(observe, config=config, with_plans=True)
+    observed, failed = collect(predict, list(recordings.items()), fit.name_stage('replay'))
     fit.failed.update(failed)
     if not observed:
         raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
-    for step in (fit_likelihood, fit_widening):
-        fit.take(step(observed, fit.config))
     if len(observed) < FEWEST:
-        fit.warnings.append(f'cross-validation: {len(observed)} recordings are too few, {FEWEST} are needed')
-    if len(observed) == 1:
-        fit.warnings.append('intervals: one recording, which shows no differences between recordings')
+        fit.keep(FROM_ONE_REPLAY, len(observed))
+        return
+    given = flatten(fit.config)
+    fit.take(fit_likelihood(observed, fit.config, fit.name_stage('likelihood')))
+    fit.take(fit_widening(observed, fit.config))
+    fit.chosen |= {name: str(value) for name, value in UNSCALED.items() if given[name] != value}
+    fit.config = replace_values(fit.config, UNSCALED)
 
 
 def compare_configs(
-    recordings: Mapping[str, Recording], configs: tuple[Config, Config], thinned: Mapping[str, object]
+    recordings: Mapping[str, Recording],
+    configs: tuple[Config, Config],
+    thinned: Mapping[str, object],
+    name_stage: Callable[[str], str],
 ) -> dict[str, dict[str, float | None]]:
     """Return the measures `COMPARISON_TITLES` of two configurations, `before` and `after`, from the recordings that both predict.
 
-    thinned: parameters of these replays alone.
+    thinned: parameters of these replays alone; name_stage: returns the words of a progress bar.
     """
     replays = []
     for config, stage in zip(configs, ('before', 'after'), strict=True):
@@ -197,16 +233,26 @@ def make_answer(fit: Fit, given: Config, output: Path) -> dict[str, Any]:
 
 
 def format_parameters(answer: Mapping[str, Any]) -> Rows:
-    """Return the rows of the parameters in an answer of `fit --json`; of those that are not determined, with the reason."""
+    """Return the rows of the parameters in an answer of `fit --json` that have new values."""
     rows: Rows = []
     for name, each in answer['parameters'].items():
         given, value, low, high = map(show_value, (each['given'], each['value'], *each['interval']))
-        found = (value, each['how']) if value != given else ('kept', f'the best of the values tried: {each["how"]}')
-        rows.append((name, given, found[0], f'{low} to {high}' if low != high else '', found[1]))
+        if value != given:
+            rows.append((name, given, value, f'{low} to {high}', each['how']))
     for name, each in answer['chosen'].items():
         rows.append((name, show_value(each['given']), each['value'], '', 'predicted positions and paths'))
+    return rows
+
+
+def format_kept(answer: Mapping[str, Any]) -> Rows:
+    """Return the rows of the parameters in an answer of `fit --json` that keep their values, with the reason."""
+    rows: Rows = []
+    for name, each in answer['parameters'].items():
+        given, value, low, high = map(show_value, (each['given'], each['value'], *each['interval']))
+        if value == given:
+            rows.append((name, given, f'the best value tried, with an interval of 95 % from {low} to {high}: {each["how"]}'))
     for name, each in answer['undetermined'].items():
-        rows.append((name, show_value(each['given']), 'kept', '', f'not determined: {each["why"]}'))
+        rows.append((name, show_value(each['given']), each['why']))
     return rows
 
 
@@ -252,15 +298,19 @@ def make_verdict(answer: Mapping[str, Any]) -> list[str]:
 
 def make_tables(answer: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], Rows]]:
     """Yield title, columns and rows of the tables of an answer of `fit --json`."""
-    yield 'Before and after', ('with the same recordings', 'before', 'after', ''), format_comparison(answer)
-    yield 'Parameters', ('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer)
     scores: Rows = []
     for score, values in answer['scores'].items():
         settings: dict[str, list[str]] = {}  # those with the same value in one row
         for setting, value in values.items():
             settings.setdefault('-' if value is None else f'{value:.3f}', []).append(setting)
         scores += [(SCORE_TITLES[score], ', '.join(each), shown) for shown, each in settings.items()]
-    yield 'Scores of the likelihood and of the widening, all else being fitted', ('score', 'setting', 'value'), scores
+    tables = (
+        ('Before and after', ('with the same recordings', 'before', 'after', ''), format_comparison(answer)),
+        ('Parameters with new values', ('parameter', 'given', 'fitted', '95 %', 'data'), format_parameters(answer)),
+        ('Parameters that keep their values', ('parameter', 'given', 'why'), format_kept(answer)),
+        ('Scores of the likelihood and of the widening, all else being fitted', ('score', 'setting', 'value'), scores),
+    )
+    yield from (each for each in tables if each[2])
 
 
 def make_sentences(answer: Mapping[str, Any]) -> list[str]:

@@ -25,7 +25,7 @@ from foc_ros.analysis.parallel import collect_all
 from foc_ros.core.config import WHOLE_WAY_S, Config, LikelihoodConfig, flatten, replace_values
 from foc_ros.core.types import Array
 
-from . import Findings, Setting, SettingTable, list_settings, name_stage
+from . import Findings, Setting, SettingTable, list_settings
 
 RULES = tuple(
     LikelihoodConfig(beta=beta, planning_horizon_s=horizon_s, lookahead_s=lookahead_s)
@@ -54,10 +54,11 @@ FEW_WIDENINGS = tuple(product((0.0, *PROCESS_NOISES[1::4]), (0.0, 3e-3, 8e-3, 24
 """Widenings whose best is good enough to compare predictions that differ in other parameters."""
 
 
-def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> Findings:
+def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config, stage: str) -> Findings:
     """Return the parameters of the likelihood, from one replay of the recordings.
 
-    Scores `ways`: mean log-likelihoods by how the setting was chosen, none where no class or goal is in question.
+    stage: words of a progress bar. Scores `ways`: mean log-likelihoods by how the setting was chosen, none where no class or
+    goal is in question.
     """
     questions = [ask_main(each) for each in recordings]
     if not any(questions):
@@ -71,9 +72,7 @@ def fit_likelihood(recordings: Sequence[ObservedRecording], config: Config) -> F
     settings = (*ahead, *plain)
     rules = [replace_values(config, each).likelihood for each in settings]
     rule = Baseline('foc', partial(forecast_shares, power_rule_shares), tuple(rules))
-    rows = collect_all(
-        partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], name_stage('likelihood')
-    )
+    rows = collect_all(partial(_tabulate_classes, rule=rule), [(each.name, each) for each in recordings], stage)
     table = SettingTable(np.array(rows), settings)
     found, left = table.estimate(given, 'likelihood of the paths taken')
     missed = float(np.mean([question.truth not in question.given for each in questions for _, question in each]))

@@ -30,7 +30,7 @@ from foc_ros.analysis.recordings import Recording
 from foc_ros.core.config import ARRIVALS, Config, flatten, replace_values
 from foc_ros.core.types import Array
 
-from . import Estimate, Findings, clip_to_bounds, name_stage
+from . import Estimate, Findings, clip_to_bounds
 from .direct import CONSTANTS, fit_duration
 from .one_replay import FEW_WIDENINGS, RULES, compute_mean_densities
 
@@ -153,7 +153,7 @@ def _average_by_recording(found: Sequence[Mapping[Key, float]], most: float, nam
 
 
 def search_settings(stage: str, settings: Sequence[Config], replays: Replays) -> Findings:
-    """Return what is new in the best of some settings, of which the first is the given one."""
+    """Return what is new in the best of some settings, of which the first is the given one; stage: words of a progress bar."""
     finalists, scores = race(stage, settings, replays)
     best, winners = rank(scores)[0], list(range(len(finalists)))
     if scores.shape[2] > 1:  # else any of them may be the best by chance
@@ -190,7 +190,7 @@ def race(stage: str, settings: Sequence[Config], replays: Replays) -> tuple[list
     """Return the finalists, the given one first, with their scores."""
     names, left, count = sample_names(list(replays.recordings)), list(settings), FIRST
     while True:
-        scores = replays.score(left, names[:count], f'{name_stage(stage)}, {len(left)} settings')
+        scores = replays.score(left, names[:count], f'{stage}, {len(left)} settings')
         if count >= len(names) or len(left) == 1:
             return left, scores
         kept = {0, *rank(scores)[: max(-(-len(left) // 2), 4)]}

@@ -41,6 +41,7 @@ COLUMNS = {
     'wrong_way_effort': ('extra effort, wrong way [N² s]', 1.0, 2),
 }
 """The measures by name: heading, factor and digits."""
+RULE_WORDS = {FOC: 'with guidance', NONE: 'without guidance'}
 
 
 class Assistance:
@@ -229,6 +230,21 @@ def summarise(results: Sequence[PairResult], seed: int) -> list[dict[str, Any]]:
                     cell |= {measure: find_mean(finite), f'{measure}_interval': interval}
             cells.append(cell)
     return cells
+
+
+def make_summary(cells: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return for each operator what guidance changes, in plain words."""
+    measures = {'collision_rate': 'collisions in {:.0f} % of the trials', 'completion_s': '{:.2f} s for a movement'}
+    sentences = ['Simulated operators reached goals among obstacles, each trial with and without guidance (foc and none).']
+    for operator in dict.fromkeys(cell['operator'] for cell in cells):
+        by_rule, told = {cell['assistance']: cell for cell in cells if cell['operator'] == operator}, []
+        for rule, words in RULE_WORDS.items():
+            values = {name: by_rule[rule][name] for name in measures} if rule in by_rule else {}
+            known = [measures[name].format(COLUMNS[name][1] * each) for name, each in values.items() if each is not None]
+            if values:
+                told.append(f'{" and ".join(known)} {words}')
+        sentences.append(f'{operator.replace("_", " ").capitalize()}: {"; ".join(told)}.')
+    return sentences
 
 
 def make_tables(cells: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
