@@ -39,11 +39,11 @@ def learn(data: Data, /, *, output: Path, params: options.Params = options.DEFAU
     movements, failed = collect(partial(learn_recording, config=params), list(recordings.items()), 'learn')
     learnt = [each for found in movements for each in found]
     if not learnt:
-        raise RecordingError(f'{data}: no recording could be learnt: {next(iter(failed.values()))}')
+        raise RecordingError(f'{data}: no recording could be learnt: {": ".join(next(iter(failed.items())))}')
     save_library(output, learnt)
     words = f'{len(learnt)} movements written to {output}; the parameter homotopy.library names this file for node and replay'
     print(json_format.dumps({'learned': len(learnt), 'failed': failed, 'output': str(output)}) if json else words)
-    return print_messages('foc_ros learn', failed.values())
+    return print_messages('foc_ros learn', [f'{name}: {reason}' for name, reason in failed.items()])
 
 
 @app.command(group=RECORDINGS)

@@ -149,7 +149,7 @@ def _fit_to_one_replay(recordings: Mapping[str, Recording], fit: Fit, thinned: M
     observed, failed = collect(predict, list(recordings.items()), fit.name_stage('replay'))
     fit.failed.update(failed)
     if not observed:
-        raise RecordingError(f'nothing could be predicted: {"; ".join(failed.values())}')
+        raise RecordingError(f'nothing could be predicted: {"; ".join(f"{name}: {why}" for name, why in failed.items())}')
     if len(observed) < FEWEST:
         fit.keep(FROM_ONE_REPLAY, len(observed))
         return
