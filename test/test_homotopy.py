@@ -305,6 +305,15 @@ def test_without_time_each_goal_has_a_candidate_at_once_and_one_goal_after_the_o
     assert next_goals == [0, 1, 2, 3, 4, 5, 0]
 
 
+def test_without_time_there_are_a_few_classes_more_and_they_do_not_become_more():
+    counts, previous, goal = [], (), 0
+    for _ in range(7):
+        found = search_within(-1.0, make_obstacles(CROWD[:12], 0.012), previous=previous, first_goal=goal, k=24)
+        previous, goal = found.candidates, found.next_goal
+        counts.append(len(previous))
+    assert counts == [10] * 7
+
+
 def test_without_time_previous_candidates_stay_unless_their_obstacles_or_goals_are_gone():
     before = find(make_obstacles(CROWD[:4], 0.02), SIX_GOALS, k=12, steps=20).candidates
     assert {each.goal for each in before} == set(range(6))

@@ -54,7 +54,7 @@ class PathQuery:
 
     hand, goal: lines from both to the nodes of a graph; heuristic (v,): least length from each node to the goal [m]; named (k,):
     rows of the obstacles in the names; velocity (2,): of the hand [m/s]; max_states: number that the search may look at;
-    deadline: after it, the search ends once it has found a path.
+    deadline: looked at every 200 states; after it, the search ends once it has found a path.
     """
 
     graph: Graph

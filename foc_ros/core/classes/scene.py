@@ -106,7 +106,7 @@ class SearchScene:
         self._graphs: dict[bytes, tuple[Graph, Lines]] = {}
 
     def find_classes(self, goal: int, deadline: Deadline) -> Iterator[PathClass]:
-        """Yield each class to a goal once, in the order of their rank; after the deadline, the first one only."""
+        """Yield each class to a goal once, in the order of their rank; after the deadline, no more than a few."""
         rows = np.flatnonzero(self.names.blocks[goal])
         graph, hand = self._connect_hand(rows)
         lines, heuristic = _join_goal(graph, *self._goals[goal].tolist())

@@ -27,7 +27,7 @@ REPEAT = 1.5
 MOST_UNFOLLOWED = 8
 """Number of classes besides the candidates that are looked for, to know what is not followed."""
 LEAST = 4
-"""Number of classes besides the best ones that are looked for whatever the time: each takes a tenth of the time of the first."""
+"""Number of classes that are looked for besides the best ones if time is short: each takes a tenth of the time of the first."""
 STAY = 0.95
 """A class of the previous prediction ranks as if it were this times as long: noise does not swap classes of equal length."""
 
@@ -110,7 +110,7 @@ def search(
         search, they are returned as they are.
     order : SearchOrder, optional
         The deadline, and the goal at which the search begins. The first class to this goal, and to each goal without a previous
-        candidate, is searched whatever the time. Its objects do not block the ways to their goals.
+        candidate, is searched whatever the time, and `LEAST` more. Its objects do not block the ways to their goals.
 
     Returns
     -------
@@ -242,9 +242,11 @@ class _Ranking:
             found_now = [found for *_, found in chosen]
             named = {each.goal: each.named for each in [*bests, *found_now]}
             known = [each for each in self._scene.known if each.label not in labels and named.get(each.goal) == each.named]
+            # what has no time to be found has no time to be solved either: the classes do not become more
+            room = min(room, max(LEAST, len(self._followed) - len(bests)))
             chosen.clear()
             del before[len(self._shortest) :]
-            for each in sorted([*found_now, *known]):
+            for each in sorted([*found_now, *known], key=lambda each: each[:2]):
                 add(each)
         return sorted([*bests, *[found for *_, found in chosen[:room]]])
 
