@@ -62,6 +62,15 @@ def test_the_page_opens_at_a_moment_whose_paths_are_finished():
     assert choose_moment(made, START_NS - 10**8, START_NS + 4 * 10**8) == 1
 
 
+def test_a_long_rest_at_the_end_of_a_movement_does_not_decide_which_moment_is_shown():
+    times_ns = [300_000_000, 500_000_000, *range(700_000_000, 1_000_000_000, 50_000_000)]
+    made = [prediction(START_NS + each, np.zeros(2), 0.45 if row == 0 else 0.8) for row, each in enumerate(times_ns)]
+    for row in range(2, len(made)):
+        calm = [replace(each, solution=each.solution.with_covariance(1e-4 * each.covariance)) for each in made[row].candidates]
+        made[row] = replace(made[row], candidates=tuple(calm))
+    assert choose_moment(made, START_NS, START_NS + 10**9) == 0
+
+
 def test_the_first_movement_shown_is_no_way_back():
     made = [prediction(START_NS, np.zeros(2), 0.8)]
     out = [HandSample(START_NS, np.zeros(2)), HandSample(START_NS + 10**9, GOALS[0])]

@@ -121,11 +121,12 @@ def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -
     during = {row: each for row, each in enumerate(snapshots) if start_ns <= each.stamp_ns <= end_ns and each.most_likely}
     if not during:
         return None
-    sizes = {row: np.linalg.eigvalsh(each.candidates[0].covariance[:, :2, :2]).max() for row, each in during.items()}
-    settled = [row for row, size in sizes.items() if size <= 3.0**2 * np.median(list(sizes.values()))]
     begin, end = (start_ns + share * (end_ns - start_ns) for share in (0.15, 0.6))
-    on_the_way = [row for row in settled if begin <= during[row].stamp_ns <= end]
-    return max(on_the_way or settled, key=lambda row: count_likely_paths(during[row]))
+    # at rest the ellipses are small: those of the way are compared with each other
+    shown = {row: each for row, each in during.items() if begin <= each.stamp_ns <= end} or during
+    sizes = {row: np.linalg.eigvalsh(each.candidates[0].covariance[:, :2, :2]).max() for row, each in shown.items()}
+    settled = [row for row, size in sizes.items() if size <= 3.0**2 * np.median(list(sizes.values()))]
+    return max(settled, key=lambda row: count_likely_paths(shown[row]))
 
 
 def find_entered(snapshot: Prediction) -> list[str]:
