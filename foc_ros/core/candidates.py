@@ -32,7 +32,7 @@ SHORTEST_M = 1e-6
 NO_NUMBER = 2**31
 """In place of the number of a class that is not followed: larger than all of them."""
 LEFT_BEHIND = 3.0
-"""The hand has left an earlier solution if it costs more than this times as much to follow it from where the hand is now."""
+"""Cost of an earlier solution from where the hand is now, relative to its cost then, above which the hand has left it."""
 DETOUR = 64.0 / 9.0
 """Effort of going aside over that of going straight, see `compute_detour_effort`."""
 

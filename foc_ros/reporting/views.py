@@ -122,7 +122,7 @@ def choose_moment(snapshots: Sequence[Prediction], start_ns: int, end_ns: int) -
     if not during:
         return None
     begin, end = (start_ns + share * (end_ns - start_ns) for share in (0.15, 0.6))
-    # at rest the ellipses are small: those of the way are compared with each other
+    # ellipses at rest are small, so those on the way are compared only with each other
     shown = {row: each for row, each in during.items() if begin <= each.stamp_ns <= end} or during
     sizes = {row: np.linalg.eigvalsh(each.candidates[0].covariance[:, :2, :2]).max() for row, each in shown.items()}
     settled = [row for row, size in sizes.items() if size <= 3.0**2 * np.median(list(sizes.values()))]

@@ -27,7 +27,7 @@ REPEAT = 1.5
 MOST_UNFOLLOWED = 8
 """Number of classes besides the candidates that are looked for, to know what is not followed."""
 LEAST = 4
-"""Number of classes that are looked for besides the best ones if time is short: each takes a tenth of the time of the first."""
+"""Number of classes besides the best ones that are found even if time is short. Each takes a tenth of the time of the first."""
 STAY = 0.95
 """A class of the previous prediction ranks as if it were this times as long: noise does not swap classes of equal length."""
 
@@ -242,7 +242,7 @@ class _Ranking:
             found_now = [found for *_, found in chosen]
             named = {each.goal: each.named for each in [*bests, *found_now]}
             known = [each for each in self._scene.known if each.label not in labels and named.get(each.goal) == each.named]
-            # what has no time to be found has no time to be solved either: the classes do not become more
+            # where there is no time to find classes, there is none to solve more than before
             room = min(room, max(LEAST, len(self._followed) - len(bests)))
             chosen.clear()
             del before[len(self._shortest) :]
